@@ -1,0 +1,33 @@
+"""What can go wrong: one class for each remedy; messages say what, why and what to do."""
+
+from typing import Any
+
+
+class ArchfemError(Exception):
+    """Anything archfem refuses or fails to do."""
+
+
+class InvalidInput(ArchfemError, ValueError):
+    """A value, a file or a key that cannot be meant: correct it and call again."""
+
+
+class InvalidStructure(ArchfemError, ValueError):
+    """Blocks and joints that do not form a structure: correct the geometry."""
+
+
+class MeshError(ArchfemError):
+    """A mesh that does not fit its structure: change the mesh settings."""
+
+
+class DidNotConverge(ArchfemError):
+    """No equilibrium was found; what was computed up to there is kept.
+
+    Attributes:
+        last: the last equilibrium found (`Equilibrium` or `State`), or None.
+        history: the `History` up to there, for a time history, or None.
+    """
+
+    def __init__(self, message: str, *, last: Any = None, history: Any = None) -> None:
+        super().__init__(message)
+        self.last = last
+        self.history = history

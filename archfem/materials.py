@@ -1,0 +1,98 @@
+"""What blocks are made of and how they touch, with the values of Demirel and Aldemir (2021)."""
+
+from dataclasses import dataclass
+
+from archfem.errors import InvalidInput
+from archfem.units import GPa, MPa, kN
+
+
+def _require(holds: bool, what: str, remedy: str) -> None:
+    if not holds:
+        raise InvalidInput(f"{what}: {remedy}")
+
+
+@dataclass(frozen=True)
+class Material:
+    """A linear elastic, isotropic block material in plane stress.
+
+    Attributes:
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        unit_weight: weight per volume [N/m³].
+        strength: compressive strength [Pa], or None where it is not known.
+        name: what it is called in tables and files.
+    """
+
+    young: float
+    poisson: float
+    unit_weight: float
+    strength: float | None = None
+    name: str = "material"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a material, or can only be a wrong unit."""
+        of = f"of '{self.name}'"
+        _require(
+            1e3 <= self.young <= 1e13,
+            f"young {self.young:.3g} Pa {of} is not between 1 kPa and 10 TPa",
+            "give it in Pa, e.g. 30 * GPa",
+        )
+        _require(
+            -1.0 < self.poisson < 0.5,
+            f"poisson {self.poisson:.3g} {of} is not between -1 and 0.5",
+            "stone has about 0.2",
+        )
+        _require(
+            0.0 < self.unit_weight <= 250.0 * kN,
+            f"unit_weight {self.unit_weight:.3g} N/m³ {of} is not between 0 and 250 kN/m³",
+            "give a weight, not a density, in N/m³, e.g. 20 * kN",
+        )
+        _require(
+            self.strength is None or self.strength > 0.0,
+            f"strength {self.strength} Pa {of} is not positive",
+            "leave it out where it is not known",
+        )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How two faces touch along a dry joint.
+
+    Attributes:
+        normal_stiffness: compression per closing of the joint, k_n [Pa/m].
+        shear_stiffness: shear traction per slip, k_s [Pa/m].
+        friction: Coulomb's coefficient μ of the sliding criterion [-].
+        name: what it is called in tables and files.
+    """
+
+    normal_stiffness: float
+    shear_stiffness: float
+    friction: float = 0.60
+    name: str = "contact"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a contact, or can only be a wrong unit."""
+        for key in ("normal_stiffness", "shear_stiffness"):
+            value = getattr(self, key)
+            _require(
+                1e3 <= value <= 1e16,
+                f"{key} {value:.3g} Pa/m of '{self.name}' is not between 1 kPa/m and 10 PPa/m",
+                "give it in Pa/m: 1 MPa/mm is 1e9",
+            )
+        _require(
+            0.0 <= self.friction <= 10.0,
+            f"friction {self.friction:.3g} of '{self.name}' is not between 0 and 10",
+            "give the coefficient, not the angle",
+        )
+
+
+STONE = Material(30.0 * GPa, 0.2, 20.0 * kN, 56.0 * MPa, "stone")
+BACKFILL = Material(6.25 * MPa, 0.2, 18.0 * kN, None, "backfill")
+STONE_TO_STONE = Contact(1.48e9, 0.30e9, 0.60, "stone to stone")
+SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
+
+MATERIALS = {material.name: material for material in (STONE, BACKFILL)}
+"""Named presets, Table 2 of Demirel and Aldemir (2021)."""
+
+CONTACTS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}
+"""Named presets, Table 2 of Demirel and Aldemir (2021); the table gives no μ for soil."""

@@ -1,0 +1,300 @@
+"""What stands and what touches: blocks, the joints between them, and the structure they form."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem.errors import InvalidStructure
+from archfem.materials import Contact, Material
+from archfem.units import G
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+
+TOUCHING = 1e-6
+"""Largest distance of two points that count as one, relative to the size of the structure."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A plane body bounded by straight edges, or a voussoir cut from a circular ring.
+
+    Attributes:
+        outline: vertices in anticlockwise order [m].
+        material: what it is made of.
+        name: how a person finds it.
+        fixed: an abutment or foundation, which does not move of itself.
+        corners: numbers of the four vertices between which a structured mesh is spanned, or None
+            for an unstructured one. Cells *along* lie on the first and third of the four sides so
+            made, cells *through the thickness* on the second and fourth.
+        part: the part of the structure it belongs to, e.g. "arch" or "north pier".
+        centre: where given, the first and third sides of the four-sided outline are arcs about
+            this point, and the other two are radial: an annular sector.
+    """
+
+    outline: tuple[Point, ...]
+    material: Material
+    name: str
+    fixed: bool = False
+    corners: tuple[int, int, int, int] | None = None
+    part: str = ""
+    centre: Point | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse outlines that do not bound an area anticlockwise."""
+        if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
+            raise InvalidStructure(
+                f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"
+            )
+        if self.area <= 0.0:
+            raise InvalidStructure(
+                f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"
+            )
+
+    @cached_property
+    def points(self) -> Array:
+        """Vertices (n, 2) [m]."""
+        return np.array(self.outline, dtype=float)
+
+    def drawn(self, chords: int = 16) -> Array:
+        """Outline with each arc replaced by this many chords (n, 2) [m]."""
+        if self.centre is None:
+            return self.points
+        return np.concatenate([self.side(0, chords)[:-1], self.side(2, chords)[:-1]])
+
+    def side(self, number: int, pieces: int) -> Array:
+        """Points on the arc side 0 or 2 and the end of the straight side after it (n + 2, 2) [m]."""
+        arm = self.points - np.array(self.centre)
+        start, end = arm[number], arm[number + 1]
+        turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
+        angles = turn * np.linspace(0.0, 1.0, pieces + 1)
+        turned = np.cos(angles)[:, None] * start + np.sin(angles)[:, None] * [-start[1], start[0]]
+        return np.concatenate([turned + self.centre, self.points[[(number + 2) % 4]]])
+
+    @cached_property
+    def _measures(self) -> tuple[float, Array, float]:
+        """Area, centroid, polar second moment of area about the centroid."""
+        if self.centre is None:
+            return _polygon(self.points)
+        return _sector(self.points, np.array(self.centre))
+
+    @property
+    def area(self) -> float:
+        """Area [m²]."""
+        return self._measures[0]
+
+    @property
+    def centroid(self) -> Array:
+        """Centre of gravity (2,) [m]."""
+        return self._measures[1]
+
+    @property
+    def polar_moment(self) -> float:
+        """Polar second moment of area about the centroid [m⁴]."""
+        return self._measures[2]
+
+
+def _polygon(points: Array) -> tuple[float, Array, float]:
+    """Area, centroid and polar moment of a polygon, from the triangles to its first vertex."""
+    a, b = points[1:-1] - points[0], points[2:] - points[0]
+    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = 0.5 * float(np.sum(twice))
+    if area <= 0.0:
+        return area, points[0], 0.0
+    arm = (twice @ (a + b)) / (6.0 * area)
+    about_first = float(np.sum(twice * np.sum(a * a + a * b + b * b, axis=1))) / 12.0
+    return area, points[0] + arm, about_first - area * float(arm @ arm)
+
+
+def _sector(points: Array, centre: Array) -> tuple[float, Array, float]:
+    """Area, centroid and polar moment of an annular sector."""
+    arm = points - centre
+    radii = np.sort(np.linalg.norm(arm[[0, 2]], axis=1))
+    bisector = arm.sum(axis=0) / np.linalg.norm(arm.sum(axis=0))
+    angle = abs(np.arctan2(arm[0, 0] * arm[1, 1] - arm[0, 1] * arm[1, 0], arm[0] @ arm[1]))
+    area = 0.5 * float(radii[1] ** 2 - radii[0] ** 2) * angle
+    reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
+    about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
+    return area, centre + reach * bisector, about_centre - area * reach**2
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A straight dry joint between two blocks.
+
+    Attributes:
+        blocks: numbers of the two blocks it separates, in either order.
+        intrados: its end on the inner face [m].
+        extrados: its end on the outer face [m]; eccentricity is positive toward it.
+        contact: stiffness and friction.
+        name: how a person finds it.
+        part: the part of the structure it belongs to; mechanisms are counted by part.
+    """
+
+    blocks: tuple[int, int]
+    intrados: Point
+    extrados: Point
+    contact: Contact
+    name: str
+    part: str = ""
+
+    @property
+    def lower(self) -> int:
+        """The block of lower number; the joint's normal points away from it."""
+        return min(self.blocks)
+
+    @property
+    def higher(self) -> int:
+        """The block of higher number."""
+        return max(self.blocks)
+
+    @cached_property
+    def ends(self) -> Array:
+        """Both ends, intrados first (2, 2) [m]."""
+        return np.array([self.intrados, self.extrados], dtype=float)
+
+    @cached_property
+    def middle(self) -> Array:
+        """Mid-point, from which eccentricity is measured (2,) [m]."""
+        return self.ends.mean(axis=0)
+
+    @cached_property
+    def depth(self) -> float:
+        """Length h from intrados to extrados [m]."""
+        return float(np.linalg.norm(self.ends[1] - self.ends[0]))
+
+    @cached_property
+    def tangent(self) -> Array:
+        """Unit vector from intrados to extrados (2,)."""
+        return (self.ends[1] - self.ends[0]) / self.depth
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Blocks in contact along dry joints.
+
+    Attributes:
+        blocks: the bodies; fixed ones are abutments.
+        joints: where they touch.
+        width: out-of-plane width w [m].
+        gravity: acceleration of gravity, along -y [m/s²].
+        name: what it is called in titles and files.
+    """
+
+    blocks: tuple[Block, ...]
+    joints: tuple[Joint, ...]
+    width: float = 1.0
+    gravity: float = G
+    name: str = "structure"
+
+    def __post_init__(self) -> None:
+        """Refuse what does not hang together."""
+        if not 0.0 < self.width < 1e4:
+            raise InvalidStructure(
+                f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
+            )
+        if not 0.0 < self.gravity < 1e3:
+            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
+        for kind, things in (("block", self.blocks), ("joint", self.joints)):
+            names = [thing.name for thing in things]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise InvalidStructure(f"{kind} names {twice} are used twice: name each once")
+        if all(block.fixed for block in self.blocks):
+            raise InvalidStructure("no block is free to move: leave at least one not fixed")
+        _ = self.normals
+        self._check_support()
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box around all blocks [m]."""
+        points = np.concatenate([block.drawn() for block in self.blocks])
+        return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Unit normals of the joints, from the lower to the higher block (n_joints, 2)."""
+        return np.array([self._normal(joint) for joint in self.joints]).reshape(-1, 2)
+
+    def _normal(self, joint: Joint) -> Array:
+        """Outward normal of the lower block's edge, which must also be one of the higher's."""
+        if not 0 <= joint.lower < joint.higher < len(self.blocks):
+            raise InvalidStructure(
+                f"joint '{joint.name}' is between blocks {joint.blocks}: "
+                f"give two different numbers from 0 to {len(self.blocks) - 1}"
+            )
+        near = TOUCHING * self.size
+        if joint.depth <= near:
+            raise InvalidStructure(
+                f"joint '{joint.name}' is {joint.depth:.3g} m long: its two ends are one point"
+            )
+        sides = [_side(self.blocks[number], joint, near) for number in (joint.lower, joint.higher)]
+        if sides[0] * sides[1] >= 0:
+            names = [self.blocks[number].name for number in (joint.lower, joint.higher)]
+            raise InvalidStructure(
+                f"joint '{joint.name}' lists blocks {names}, which share no face along "
+                f"{joint.intrados}-{joint.extrados} within {near:.1e} m: check which blocks it "
+                "joins and where its ends are"
+            )
+        return sides[0] * np.array([joint.tangent[1], -joint.tangent[0]])
+
+    def _check_support(self) -> None:
+        """Every block must be joined, through others, to one that is fixed."""
+        held = {number for number, block in enumerate(self.blocks) if block.fixed}
+        pairs = [set(joint.blocks) for joint in self.joints]
+        while reached := {b for pair in pairs if pair & held for b in pair} - held:
+            held |= reached
+        loose = [block.name for number, block in enumerate(self.blocks) if number not in held]
+        if loose:
+            raise InvalidStructure(
+                f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
+            )
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Numbers of the blocks that move."""
+        return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
+
+    @cached_property
+    def weight(self) -> float:
+        """Weight of the blocks that move, for the whole width [N]."""
+        free = (self.blocks[number] for number in self.free)
+        return self.width * sum(block.area * block.material.unit_weight for block in free)
+
+    def density(self, block: Block) -> float:
+        """Density of a block's material under this structure's gravity [kg/m³]."""
+        return block.material.unit_weight / self.gravity
+
+    def joint_number(self, joint: int | str) -> int:
+        """Number of a joint given by number or name."""
+        names = [each.name for each in self.joints]
+        if isinstance(joint, str) and joint in names:
+            return names.index(joint)
+        if isinstance(joint, int) and 0 <= joint < len(names):
+            return joint
+        raise InvalidStructure(f"there is no joint {joint!r}: the joints are {names}")
+
+
+def _side(block: Block, joint: Joint, near: float) -> int:
+    """On which side of a joint a block lies: -1 or 1 where a straight face covers it, else 0.
+
+    An anticlockwise outline has its inside to the left, so a face that runs with the joint, from
+    intrados to extrados, belongs to a block on its left (1), one against it to a block on its
+    right (-1).
+    """
+    relative = block.points - joint.ends[0]
+    along = relative @ joint.tangent
+    off = relative @ np.array([-joint.tangent[1], joint.tangent[0]])
+    low, high = np.minimum(along, np.roll(along, -1)), np.maximum(along, np.roll(along, -1))
+    on_line = (np.abs(off) <= near) & (np.abs(np.roll(off, -1)) <= near) & (high - low > near)
+    if block.centre is not None:
+        on_line[[0, 2]] = False  # these sides are arcs
+    covered = np.sum(
+        np.where(on_line, np.minimum(high, joint.depth) - np.maximum(low, 0.0), 0.0).clip(0.0)
+    )
+    if abs(covered - joint.depth) > 4.0 * near:
+        return 0
+    edge = int(np.flatnonzero(on_line & (low < joint.depth - near) & (high > near))[0])
+    return 1 if np.roll(along, -1)[edge] > along[edge] else -1
