@@ -58,20 +58,20 @@ class Block:
         """Vertices (n, 2) [m]."""
         return np.array(self.outline, dtype=float)
 
-    def drawn(self, chords: int = 16) -> Array:
-        """Outline with each arc replaced by this many chords (n, 2) [m]."""
+    def arc(self, side: int, pieces: int) -> Array:
+        """Points on side 0 or 2 of a sector, at equal angles (pieces + 1, 2) [m]."""
+        arm = self.points - np.array(self.centre)
+        start, end = arm[side], arm[side + 1]
+        turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
+        angles = turn * np.linspace(0.0, 1.0, pieces + 1)[:, None]
+        across = np.array([-start[1], start[0]])
+        return np.array(self.centre) + np.cos(angles) * start + np.sin(angles) * across
+
+    def drawn(self, pieces: int = 16) -> Array:
+        """Outline with each arc replaced by so many chords (n, 2) [m]."""
         if self.centre is None:
             return self.points
-        return np.concatenate([self.side(0, chords)[:-1], self.side(2, chords)[:-1]])
-
-    def side(self, number: int, pieces: int) -> Array:
-        """Points on the arc side 0 or 2 and the end of the straight side after it (n + 2, 2) [m]."""
-        arm = self.points - np.array(self.centre)
-        start, end = arm[number], arm[number + 1]
-        turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
-        angles = turn * np.linspace(0.0, 1.0, pieces + 1)
-        turned = np.cos(angles)[:, None] * start + np.sin(angles)[:, None] * [-start[1], start[0]]
-        return np.concatenate([turned + self.centre, self.points[[(number + 2) % 4]]])
+        return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
 
     @cached_property
     def _measures(self) -> tuple[float, Array, float]:

@@ -1,0 +1,70 @@
+"""What acts on a structure besides its own weight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from archfem.errors import InvalidInput
+from archfem.structure import Array, Structure
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """A force on every block in proportion to its weight.
+
+    Attributes:
+        horizontal: multiple of g, positive along x [-].
+        vertical: multiple of g, positive upward [-]; self-weight is -1.
+    """
+
+    horizontal: float
+    vertical: float = 0.0
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force on the extrados, where a vertical through x leaves the structure.
+
+    Attributes:
+        x: where it stands [m].
+        force: its components for the whole width, up positive (2,) [N].
+    """
+
+    x: float
+    force: tuple[float, float]
+
+    def place(self, structure: Structure) -> tuple[int, Array]:
+        """Number of the loaded block and the loaded point (2,) [m].
+
+        Raises:
+            InvalidInput: no block that moves lies below or above x.
+        """
+        tops = {
+            number: top
+            for number in structure.free
+            if (top := _highest(structure.blocks[number].drawn(), self.x)) is not None
+        }
+        if not tops:
+            points = np.concatenate([structure.blocks[b].drawn() for b in structure.free])
+            low, high = points[:, 0].min(), points[:, 0].max()
+            raise InvalidInput(
+                f"a point load at x = {self.x:.4g} m misses the structure, which reaches from "
+                f"{low:.4g} to {high:.4g} m: move it there"
+            )
+        block = max(tops, key=lambda number: tops[number])
+        return block, np.array([self.x, tops[block]])
+
+
+Action = BodyForce | PointLoad
+
+
+def _highest(outline: Array, x: float) -> float | None:
+    """Largest y at which a vertical line meets a closed outline, or None where it misses."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    step = end[:, 0] - start[:, 0]
+    met = (np.minimum(start[:, 0], end[:, 0]) <= x) & (x <= np.maximum(start[:, 0], end[:, 0]))
+    met &= np.abs(step) > 0.0
+    if not met.any():
+        return None
+    share = (x - start[met, 0]) / step[met]
+    return float(np.max(start[met, 1] + share * (end[met, 1] - start[met, 1])))

@@ -1,0 +1,77 @@
+"""Rigid motions of blocks: two translations of the centroid and a rotation, three to a block."""
+
+import numpy as np
+from scipy import sparse
+
+from archfem.joints import JointOperator, JointPoints
+from archfem.quadrature import Quadrature
+from archfem.structure import Array, Structure
+
+
+def motion_of(points: Array, centroid: Array) -> Array:
+    """Displacement of points of a block per unit rigid motion (p, 2, 3).
+
+    For small motions (u, v, θ), anticlockwise θ, a point moves by u - θ (y - y_c) along x and by
+    v + θ (x - x_c) along y.
+    """
+    arm = points - centroid
+    motion = np.zeros((len(points), 2, 3))
+    motion[:, 0, 0] = motion[:, 1, 1] = 1.0
+    motion[:, 0, 2], motion[:, 1, 2] = -arm[:, 1], arm[:, 0]
+    return motion
+
+
+def first_coordinate(structure: Structure) -> dict[int, int]:
+    """Number of the first of the three coordinates of each block that moves."""
+    return {block: 3 * k for k, block in enumerate(structure.free)}
+
+
+def facets_of(depth: float, cells: int) -> Array:
+    """Ends of equal facets along a joint, from its mid-point toward the extrados [m]."""
+    return depth * np.linspace(-0.5, 0.5, cells + 1)
+
+
+def rigid_joints(structure: Structure, cells: int, rule: Quadrature) -> JointOperator:
+    """Opening and slip of every joint in terms of rigid motions of the blocks.
+
+    Args:
+        structure: its fixed blocks do not move.
+        cells: facets on each joint.
+        rule: quadrature on each facet.
+
+    Returns:
+        Operator on 3 coordinates a free block [m, m, rad].
+    """
+    rules = [rule.on_joint(facets_of(joint.depth, cells)) for joint in structure.joints]
+    points = JointPoints.on(structure, rules)
+    size = 3 * len(structure.free)
+    joints = structure.joints
+    tangents = np.array([joint.tangent for joint in joints])[points.joint]
+    middles = np.array([joint.middle for joint in joints])[points.joint]
+    places = middles + points.arm[:, None] * tangents
+    jump = _jump(structure, points, places, size)
+    normals = structure.normals[points.joint]
+    return JointOperator(points, _along(normals, jump), _along(tangents, jump))
+
+
+def _jump(structure: Structure, points: JointPoints, places: Array, size: int) -> list[Array]:
+    """Displacement of the higher block less that of the lower, x and y: two (p, n) matrices."""
+    start = first_coordinate(structure)
+    jump = [sparse.lil_matrix((len(places), size)) for _ in range(2)]
+    for number, joint in enumerate(structure.joints):
+        rows = np.flatnonzero(points.joint == number)
+        for block, sign in ((joint.higher, 1.0), (joint.lower, -1.0)):
+            if block in start:
+                motion = motion_of(places[rows], structure.blocks[block].centroid)
+                columns = slice(start[block], start[block] + 3)
+                for axis in range(2):
+                    jump[axis][rows[0] : rows[-1] + 1, columns] = sign * motion[:, axis]
+    return [matrix.tocsr() for matrix in jump]
+
+
+def _along(directions: Array, jump: list[Array]) -> sparse.csr_matrix:
+    """Component of the jump at each point along a direction (p, 2)."""
+    component = sum(sparse.diags(directions[:, axis]) @ jump[axis] for axis in range(2))
+    component = component.tocsr()
+    component.eliminate_zeros()
+    return component

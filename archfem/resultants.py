@@ -1,0 +1,84 @@
+"""Joint resultants and what follows from them: eccentricity, mobilised friction, thrust line.
+
+Signs: N > 0 is compression; M and eccentricity are positive toward the extrados; V is positive
+where the higher block is pushed toward the extrados by its slip.
+"""
+
+import numpy as np
+import xarray as xr
+
+from archfem.structure import Array, Structure
+
+UNITS = {
+    "N": ("N", "normal force, compression positive"),
+    "V": ("N", "shear force"),
+    "M": ("N m", "moment about mid-depth, positive toward the extrados"),
+    "eccentricity": ("1", "M / (N h), +0.5 at the extrados; undefined in an open joint"),
+    "friction": ("1", "mobilised friction |V| / N; undefined in an open joint"),
+}
+
+
+def joint_dataset(structure: Structure, resultants: Array, time: Array | None = None) -> xr.Dataset:
+    """Label resultants and derive eccentricity and mobilised friction from them.
+
+    Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
+    without compression is open: its eccentricity and friction are undefined (NaN).
+
+    Args:
+        structure: whose joints they are.
+        resultants: N, V, M for the whole width, (n_joints, 3) or (steps, n_joints, 3)
+            [N, N, N m].
+        time: of the steps (steps,) [s], for the second shape.
+
+    Returns:
+        Variables N, V, M, eccentricity and friction over joint, or over time and joint, with
+        the joints' names, parts, depths and friction limits as coordinates.
+    """
+    dims = ("joint",) if time is None else ("time", "joint")
+    normal, shear, moment = np.moveaxis(resultants, -1, 0)
+    depth = np.array([joint.depth for joint in structure.joints])
+    closed = normal > 0.0
+    safe = np.where(closed, normal, 1.0)
+    values = {
+        "N": normal,
+        "V": shear,
+        "M": moment,
+        "eccentricity": np.where(closed, moment / (safe * depth), np.nan),
+        "friction": np.where(closed, np.abs(shear) / safe, np.nan),
+    }
+    variables = {
+        key: (dims, value, {"units": UNITS[key][0], "long_name": UNITS[key][1]})
+        for key, value in values.items()
+    }
+    coordinates = {
+        "joint": np.arange(len(structure.joints)),
+        "name": ("joint", [joint.name for joint in structure.joints]),
+        "part": ("joint", [joint.part for joint in structure.joints]),
+        "depth": ("joint", depth, {"units": "m"}),
+        "friction_limit": ("joint", [joint.contact.friction for joint in structure.joints]),
+    }
+    if time is not None:
+        coordinates["time"] = ("time", time, {"units": "s"})
+    return xr.Dataset(variables, coordinates)
+
+
+def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
+    """Points where the resultant crosses each joint, in space.
+
+    Args:
+        structure: whose joints they are.
+        joints: as made by `joint_dataset`.
+
+    Returns:
+        (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
+    """
+    middle = xr.DataArray(
+        np.array([joint.middle for joint in structure.joints]),
+        {"axis": ["x", "y"]},
+        ("joint", "axis"),
+    )
+    depth = np.array([joint.tangent * joint.depth for joint in structure.joints])
+    reach = xr.DataArray(depth, {"axis": ["x", "y"]}, ("joint", "axis"))
+    line = middle + joints["eccentricity"] * reach
+    line.attrs = {"units": "m", "long_name": "thrust line"}
+    return line.transpose(..., "joint", "axis")
