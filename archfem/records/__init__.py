@@ -1,0 +1,1 @@
+"""Files of recorded ground motions: one module for each format, found by content."""

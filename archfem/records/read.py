@@ -1,0 +1,50 @@
+"""Which format a record file has, told by its content."""
+
+from os import PathLike
+
+from archfem.errors import InvalidInput
+from archfem.records import columns, peer
+from archfem.records.channel import Channel
+from archfem.records.text import RecordText, unit_named
+
+_FORMATS = (peer,)
+
+
+def read_channels(
+    path: str | PathLike[str],
+    *,
+    column: int | None = None,
+    units: str | None = None,
+    dt: float | None = None,
+) -> list[Channel]:
+    """Read all components of a record, or one of them.
+
+    Args:
+        path: a file in PEER AT2, AFAD, ESM/ITACA (DYNA), COSMOS V2, CSMIP/CDMG V2, USGS SMC or
+            K-NET format, or plain columns.
+        column: which component or plain column, counted from 1; None takes all.
+        units: unit of plain columns: g, m/s2, cm/s2 or gal; other formats state theirs.
+        dt: time between samples of plain columns [s]; other formats state theirs.
+
+    Returns:
+        The channels in the order of the file, accelerations in m/s², verticals upwards.
+
+    Raises:
+        InvalidInput: the file cannot be read as an accelerogram without doubt; names file and line.
+    """
+    text = RecordText.opened(path)
+    if units is not None:
+        unit_named(units)
+    form = next((form for form in _FORMATS if form.recognises(text)), None)
+    if form is None:
+        return columns.read(text, column=column, units=units, dt=dt)
+    channels = form.read(text)
+    if units is not None or dt is not None:
+        raise text.error(
+            "this format states its units and its step itself: leave out units= and dt="
+        )
+    if column is None:
+        return channels
+    if not 1 <= column <= len(channels):
+        raise InvalidInput(f"{text.path} has {len(channels)} components: column {column} is none")
+    return [channels[column - 1]]

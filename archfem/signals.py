@@ -1,0 +1,158 @@
+"""What is done to one sampled acceleration: integrals, filters, base line, resampling, energy."""
+
+import numpy as np
+from scipy import integrate, signal
+
+from archfem.errors import InvalidInput
+from archfem.units import STANDARD_GRAVITY
+
+
+def velocity(samples: np.ndarray, dt: float) -> np.ndarray:
+    """Integrate an acceleration that runs straight from sample to sample; at rest at first.
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+
+    Returns:
+        Velocities (n,) [m/s].
+    """
+    return integrate.cumulative_trapezoid(samples, dx=dt, initial=0.0)
+
+
+def displacement(samples: np.ndarray, dt: float) -> np.ndarray:
+    """Integrate an acceleration that runs straight from sample to sample twice; at rest at first.
+
+    In a step d₁ = d₀ + v₀ Δt + (2 a₀ + a₁) Δt²/6, which is exact.
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+
+    Returns:
+        Displacements (n,) [m].
+    """
+    steps = velocity(samples, dt)[:-1] * dt + (2.0 * samples[:-1] + samples[1:]) * dt**2 / 6.0
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def baseline_corrected(samples: np.ndarray, dt: float, degree: int = 6) -> np.ndarray:
+    """Take the drift out of an acceleration: it ends with no velocity and no displacement.
+
+    The polynomial p(t) = c₂ t² + ... of least squares distance to the displacement, among those
+    that share its last value and slope, is subtracted as p'' from the acceleration. (Fitting the
+    displacement is PEER's way; the two conditions at the end are added.)
+
+    Args:
+        samples: accelerations (n,) [m/s²], n > degree.
+        dt: time between samples [s].
+        degree: degree of the polynomial, at least 3.
+
+    Returns:
+        Accelerations (n,) [m/s²].
+
+    References:
+        Chiou, Darragh, Gregor, Silva, NGA project strong-motion database, Earthquake Spectra 24
+        (2008).
+    """
+    if degree < 3 or len(samples) <= degree:
+        raise InvalidInput(
+            f"base line of degree {degree} for {len(samples)} samples: the degree is at least 3 "
+            "and less than the number of samples"
+        )
+    powers = np.arange(2, degree + 1)
+    time = np.linspace(0.0, 1.0, len(samples))[:, None]
+    length = (len(samples) - 1) * dt
+    moved = displacement(samples, dt)
+    # Each p'' is integrated as the samples are, so that the end comes out zero to round-off.
+    bends = powers * (powers - 1) * time ** (powers - 2) / length**2
+    shapes = np.column_stack([displacement(bend, dt) for bend in bends.T])
+    ends = np.array([[velocity(bend, dt)[-1] for bend in bends.T], shapes[-1]])
+    goal = np.array([velocity(samples, dt)[-1], moved[-1]])
+    # Equality constraints by null space: c = c_end + Z y.
+    least = np.linalg.lstsq(ends, goal, rcond=None)[0]
+    null = np.linalg.svd(ends)[2][2:].T
+    free = np.linalg.lstsq(shapes @ null, moved - shapes @ least, rcond=None)[0]
+    return samples - bends @ (least + null @ free)
+
+
+def band_passed(
+    samples: np.ndarray, dt: float, low: float, high: float, order: int = 4
+) -> np.ndarray:
+    """Keep the frequencies between two corners, without shift in time.
+
+    A Butterworth filter run forwards and backwards over the record with 1.5 order/low seconds of
+    zeros at both ends.
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+        low: lower corner [Hz].
+        high: upper corner [Hz].
+        order: order of the filter in each direction.
+
+    Returns:
+        Accelerations (n,) [m/s²].
+
+    Raises:
+        InvalidInput: not 0 < low < high < half the sampling frequency.
+
+    References:
+        Converse, Brady, BAP: basic strong-motion accelerogram processing, USGS OFR 92-296A (1992).
+    """
+    if not 0.0 < low < high < 0.5 / dt:
+        raise InvalidInput(
+            f"band from {low:g} to {high:g} Hz at a step of {dt:g} s: expected "
+            f"0 < low < high < {0.5 / dt:g} Hz"
+        )
+    pad = int(np.ceil(1.5 * order / low / dt))
+    filter_ = signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
+    padded = np.pad(samples, pad)
+    return signal.sosfiltfilt(filter_, padded, padlen=0)[pad:-pad]
+
+
+def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
+    """Sample anew by straight lines, and keep every peak.
+
+    Each turning point of the old samples is put on the nearest new one; where several meet, the
+    largest stays. Peaks move by half a new step at most and keep their values.
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+        new_dt: time between the new samples [s].
+
+    Returns:
+        Accelerations (m,) [m/s²] that last at least as long.
+    """
+    count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
+    new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
+    rises = np.diff(samples, prepend=samples[0] + 1.0, append=samples[-1] + 1.0) > 0.0
+    turns = np.flatnonzero((rises[1:] != rises[:-1]) & (samples != 0.0))
+    turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
+    new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
+    return new
+
+
+def arias(samples: np.ndarray, dt: float) -> np.ndarray:
+    """Return how Arias intensity grows: π/(2 g) ∫ a² dt (n,) [m/s], Arias (1970)."""
+    energy = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
+    return np.pi / (2.0 * STANDARD_GRAVITY) * energy
+
+
+def significant_window(
+    samples: np.ndarray, dt: float, low: float = 0.05, high: float = 0.95
+) -> tuple[float, float]:
+    """Return when Arias intensity passes two fractions of its end [s].
+
+    References:
+        Trifunac, Brady, A study on the duration of strong earthquake ground motion, BSSA 65 (1975).
+    """
+    growth = arias(samples, dt)
+    if growth[-1] == 0.0 or not 0.0 <= low < high <= 1.0:
+        raise InvalidInput(
+            f"significant duration from {low:g} to {high:g}: expected fractions from 0 to 1 in "
+            "order, and a motion that moves"
+        )
+    start, end = np.searchsorted(growth, np.array([low, high]) * growth[-1])
+    return float(start * dt), float(end * dt)
