@@ -1,0 +1,153 @@
+"""The one place that touches what differs between versions of DOLFINx.
+
+Features are tested, never version numbers: 0.5 (Debian 12) is the one in use, and 0.9 and newer
+are meant to follow. Everything here is serial: one analysis is one process.
+"""
+
+import logging
+import sys
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+# The form compiler reports each call of the C compiler on the root logger; that is noise here.
+logging.getLogger().addFilter(lambda record: "distutils" not in record.pathname)
+
+if "dolfinx" not in sys.modules:
+    # DOLFINx 0.5 makes every library loaded after it global and never undoes it, which breaks
+    # the wheels of HDF5 and VTK. Importing it with the switch disarmed avoids that.
+    _setdlopenflags = sys.setdlopenflags
+    sys.setdlopenflags = lambda flags: None  # type: ignore[assignment]
+    try:
+        import dolfinx
+    finally:
+        sys.setdlopenflags = _setdlopenflags
+
+import dolfinx.fem.petsc
+import ufl
+from dolfinx import cpp, fem
+
+try:
+    from dolfinx.io import gmshio as _gmsh_io
+except ImportError:
+    from dolfinx.io import gmsh as _gmsh_io
+
+COMM = MPI.COMM_SELF
+Numbers = NDArray[np.int32]
+
+
+def mesh_from_gmsh(model: Any) -> tuple[Any, Any, Any]:
+    """Turn the current gmsh model into a plane mesh, its cell tags and its facet tags."""
+    grid, cells, facets = _gmsh_io.model_to_mesh(model, COMM, 0, gdim=2)[:3]
+    return grid, cells, facets
+
+
+def connect(grid: Any, start: int, end: int) -> Any:
+    """Give the entities of dimension `end` at each of dimension `start`; index it with a number."""
+    topology = getattr(grid.topology, "_cpp_object", grid.topology)
+    topology.create_connectivity(start, end)
+    connectivity = grid.topology.connectivity(start, end)
+    return connectivity.links
+
+
+def tags(grid: Any, dimension: int, entities: Numbers, values: Numbers) -> Any:
+    """Tag entities of a mesh."""
+    order = np.argsort(entities)
+    return dolfinx.mesh.meshtags(
+        grid, dimension, entities[order].astype(np.int32), values[order].astype(np.int32)
+    )
+
+
+def space(grid: Any, kind: str, degree: int, size: int) -> Any:
+    """A space of vectors with so many components."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(grid, (kind, degree, (size,)))
+    return fem.VectorFunctionSpace(grid, (kind, degree), dim=size)
+
+
+def cell_dofs(space: Any) -> Numbers:
+    """Nodes of each cell (n_cells, nodes a cell); a node has one dof a component."""
+    listed = space.dofmap.list
+    flat = listed.array if hasattr(listed, "array") else np.asarray(listed)
+    return flat.reshape(-1, space.dofmap.dof_layout.num_dofs)
+
+
+def facet_nodes(space: Any) -> Numbers:
+    """Positions in a cell's node list of the nodes on each of its facets (facets, nodes)."""
+    layout = space.dofmap.dof_layout
+    facets = space.mesh.ufl_cell().num_facets()
+    return np.array([layout.entity_closure_dofs(1, facet) for facet in range(facets)])
+
+
+def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
+    """Give the same space with other node numbers (n_cells, nodes a cell) from 0 to count - 1."""
+    old = space.dofmap
+    dofmap = cpp.fem.DofMap(
+        old.dof_layout,
+        dolfinx.common.IndexMap(COMM, count),
+        old.index_map_bs,
+        cpp.graph.AdjacencyList_int32(np.ascontiguousarray(numbers, dtype=np.int32)),
+        old.index_map_bs,
+    )
+    mesh = space._cpp_object.mesh
+    if hasattr(cpp.fem, "FunctionSpace"):
+        inner = cpp.fem.FunctionSpace(mesh, space.element, dofmap)
+    else:
+        shape = space.value_shape
+        try:
+            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap)
+        except TypeError:
+            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap, shape)
+    new = fem.FunctionSpace(space.mesh, space.ufl_element(), inner)
+    new.original = space  # its compiled element must outlive this copy
+    return new
+
+
+def jump_measure(grid: Any, facets: Any, rule: str, degree: int) -> Any:
+    """Measure over tagged interior facets with a quadrature rule of this polynomial degree."""
+    metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
+    return ufl.Measure("dS", domain=grid, subdomain_data=facets, metadata=metadata)
+
+
+def cell_measure(grid: Any, cells: Any) -> Any:
+    """Measure over tagged cells."""
+    return ufl.Measure("dx", domain=grid, subdomain_data=cells)
+
+
+def constant(grid: Any, value: Any) -> Any:
+    """A number in a form that may change without compiling it again."""
+    return fem.Constant(grid, PETSc.ScalarType(value))
+
+
+def assembled_matrix(form: Any) -> sparse.csr_matrix:
+    """Assemble a bilinear form."""
+    matrix = fem.petsc.assemble_matrix(form)
+    matrix.assemble()
+    indptr, indices, data = matrix.getValuesCSR()
+    result = sparse.csr_matrix((data, indices, indptr), matrix.getSize())
+    matrix.destroy()
+    return result
+
+
+def assembled_vector(form: Any) -> NDArray[np.float64]:
+    """Assemble a linear form."""
+    vector = fem.petsc.assemble_vector(form)
+    values = vector.array.copy()
+    vector.destroy()
+    return values
+
+
+def points_of_vertices(grid: Any) -> Numbers:
+    """Number of the geometry point of each vertex (n_vertices,)."""
+    corners = connect(grid, 2, 0)
+    listed = grid.geometry.dofmap
+    result = np.zeros(grid.topology.index_map(0).size_local, dtype=np.int32)
+    for cell in range(grid.topology.index_map(2).size_local):
+        nodes = listed.links(cell) if hasattr(listed, "links") else listed[cell]
+        result[corners(cell)] = nodes
+    return result

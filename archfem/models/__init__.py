@@ -1,0 +1,50 @@
+"""The waist of the hourglass: what every model of a structure answers.
+
+Everything above (structure, mesh, forms) exists to produce a `Model`; everything below (statics,
+dynamics, modal analysis) consumes one and never asks how it came about.
+"""
+
+from typing import Protocol
+
+from scipy import sparse
+
+from archfem.actions import Action
+from archfem.models.shape import Shape
+from archfem.structure import Array, Structure
+
+
+class Model(Protocol):
+    """A structure ready to be moved: generalised coordinates q and what they cost.
+
+    The matrices of one model share their sparsity pattern: `indices` and `indptr` are the same
+    arrays, so that sums are sums of `data`.
+
+    Attributes:
+        structure: what is modelled.
+        fidelity: name of the rung of the ladder it stands on.
+        size: number n of coordinates.
+        mass: kinetic energy is ½ q̇ᵀ M q̇ (n, n).
+        blocks: stiffness of the blocks without the joints (n, n).
+        body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg …].
+        shape: how the blocks' points move with q.
+    """
+
+    structure: Structure
+    fidelity: str
+    size: int
+    mass: sparse.csr_matrix
+    blocks: sparse.csr_matrix
+    body: Array
+    shape: Shape
+
+    def force(self, q: Array) -> Array:
+        """Internal forces of blocks and joints (n,)."""
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Derivative of `force`; the very same object as before where nothing has changed."""
+
+    def resultants(self, q: Array) -> Array:
+        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+
+    def load(self, action: Action) -> Array:
+        """Generalised forces of an action (n,)."""

@@ -1,0 +1,54 @@
+"""The rung with all nodes: elastic blocks meshed by gmsh, assembled by DOLFINx."""
+
+import numpy as np
+from scipy import sparse
+
+from archfem.forms import Forms
+from archfem.models.jointed import Jointed
+from archfem.models.shape import Shape
+from archfem.quadrature import Quadrature
+from archfem.space import BrokenSpace, joint_operator
+from archfem.structure import Array
+
+
+def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
+    """Model every node of the free blocks.
+
+    Coordinates are nodal displacements, x and y in turn [m]. Blocks' stiffness and consistent
+    mass come from the weak forms; joints from the joint operator on the same quadrature.
+
+    Args:
+        space: broken across the joints.
+        rule: quadrature on each facet of a joint.
+    """
+    forms = Forms(space, rule)
+    free = space.free
+    mass = forms.mass()[free][:, free]
+    axes = np.zeros((len(free), 2))
+    axes[0::2, 0] = axes[1::2, 1] = 1.0
+    return Jointed(
+        space.mesh.structure,
+        "full",
+        mass=mass,
+        blocks=forms.stiffness()[free][:, free],
+        body=mass @ axes,
+        joints=joint_operator(space, rule),
+        shape=_shape(space, forms, free),
+    )
+
+
+def _shape(space: BrokenSpace, forms: Forms, free: Array) -> Shape:
+    """The cells of the free blocks, as polygons around their corners."""
+    moving = np.isin(space.mesh.blocks, space.mesh.structure.free)
+    nodes = free[0::2] // 2
+    number = np.full(len(space.places), -1)
+    number[nodes] = np.arange(len(nodes))
+    corners = [0, 1, 3, 2] if space.cells.shape[1] in (4, 9) else [0, 1, 2]
+    rows = (3 * np.flatnonzero(moving)[:, None] + np.arange(3)).ravel()
+    return Shape(
+        places=space.places[nodes],
+        cells=tuple(number[space.cells[moving][:, corners]]),
+        owner=space.mesh.blocks[moving].astype(int),
+        lift=sparse.identity(len(free), format="csr"),
+        stress=forms.stress()[rows][:, free].tocsr(),
+    )

@@ -1,0 +1,71 @@
+"""Linear blocks between dry joints: the model behind every rung that has matrices."""
+
+import numpy as np
+from scipy import sparse
+
+from archfem.actions import Action, BodyForce
+from archfem.joints import JointOperator, Status
+from archfem.models.shape import Shape
+from archfem.sparsity import Pattern
+from archfem.structure import Array, Structure
+
+
+class Jointed:
+    """A model whose only nonlinearity is the status of its joint points.
+
+    Forces are K q + Gᵀ W t(G q). The tangent changes only when a point opens or closes, so the
+    last one is kept and given again, as the same object, until then.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        fidelity: str,
+        *,
+        mass: sparse.csr_matrix,
+        blocks: sparse.csr_matrix,
+        body: Array,
+        joints: JointOperator,
+        shape: Shape,
+    ) -> None:
+        everything = joints.stiffness(np.ones(len(joints.points.arm), dtype=bool))
+        pattern = Pattern.of(mass, blocks, everything)
+        none = joints.stiffness(np.zeros(len(joints.points.arm), dtype=bool))
+        self.structure = structure
+        self.fidelity = fidelity
+        self.size = mass.shape[0]
+        self.mass = pattern.spread(mass)
+        self.blocks = pattern.spread(blocks)
+        self.body = body
+        self.joints = joints
+        self.shape = shape
+        self._pattern = pattern
+        self._always = self.blocks.data + pattern.spread(none).data
+        self._closing = pattern.outer(
+            joints.opening, joints.points.weight * joints.points.normal_stiffness
+        )
+        self._last: tuple[Status, sparse.csr_matrix] | None = None
+
+    def force(self, q: Array) -> Array:
+        """Internal forces of blocks and joints (n,)."""
+        return self.blocks @ q + self.joints.force(q)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Derivative of `force`; the same object as before while no point opens or closes."""
+        closed = self.joints.status(q)
+        if self._last is None or not np.array_equal(closed, self._last[0]):
+            matrix = self._pattern.matrix(self._always + self._closing @ closed)
+            self._last = (closed, matrix)
+        return self._last[1]
+
+    def resultants(self, q: Array) -> Array:
+        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        return self.joints.resultants(q)
+
+    def load(self, action: Action) -> Array:
+        """Generalised forces of an action (n,)."""
+        if isinstance(action, BodyForce):
+            multiples = np.array([action.horizontal, action.vertical])
+            return self.body @ multiples * self.structure.gravity
+        block, point = action.place(self.structure)
+        return self.shape.at(block, point).T @ np.array(action.force)

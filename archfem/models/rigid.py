@@ -1,0 +1,57 @@
+"""The lowest rung: rigid blocks on elastic joints, three coordinates a block, no mesh."""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+
+from archfem.kinematics import motion_of, rigid_joints
+from archfem.models.jointed import Jointed
+from archfem.models.shape import Shape
+from archfem.quadrature import Quadrature
+from archfem.structure import Structure
+
+
+def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) -> Jointed:
+    """Model blocks as rigid: all compliance is in the joints.
+
+    Coordinates are the motions of the free blocks' centroids, (u, v, θ) each [m, m, rad].
+
+    Args:
+        structure: what to model.
+        cells: facets on each joint.
+        rule: quadrature on each facet.
+    """
+    free = [structure.blocks[number] for number in structure.free]
+    density = np.array([structure.density(block) * structure.width for block in free])
+    mass = density * [block.area for block in free]
+    inertia = density * [block.polar_moment for block in free]
+    diagonal = np.column_stack([mass, mass, inertia]).ravel()
+    body = np.zeros((3 * len(free), 2))
+    body[0::3, 0] = body[1::3, 1] = mass
+    size = 3 * len(free)
+    return Jointed(
+        structure,
+        "rigid",
+        mass=sparse.diags(diagonal).tocsr(),
+        blocks=sparse.csr_matrix((size, size)),
+        body=body,
+        joints=rigid_joints(structure, cells, rule or Quadrature()),
+        shape=_shape(structure),
+    )
+
+
+def _shape(structure: Structure) -> Shape:
+    """One polygon a free block."""
+    outlines = [structure.blocks[number].drawn() for number in structure.free]
+    starts = np.cumsum([0, *map(len, outlines)])
+    motions = [
+        motion_of(outline, structure.blocks[number].centroid).reshape(-1, 3)
+        for number, outline in zip(structure.free, outlines, strict=True)
+    ]
+    return Shape(
+        places=np.concatenate(outlines),
+        cells=tuple(np.arange(a, b) for a, b in pairwise(starts)),
+        owner=np.array(structure.free),
+        lift=sparse.block_diag(motions, format="csr"),
+    )

@@ -1,0 +1,55 @@
+"""How points of the blocks move with a model's coordinates: for loads, pictures and stress."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from archfem.structure import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Polygons that cover the blocks, and how they move.
+
+    Attributes:
+        places: points at rest (m, 2) [m].
+        cells: polygons, each the numbers of its corners in order.
+        owner: block of each polygon (n_cells,).
+        lift: displacements of the points, x and y in turn, from coordinates (2 m, n).
+        stress: mean stress of each polygon, (σ_xx, σ_yy, σ_xy) in turn, from coordinates
+            (3 n_cells, n) [Pa]; None where blocks are rigid.
+    """
+
+    places: Array
+    cells: tuple[NDArray[np.intp], ...]
+    owner: NDArray[np.intp]
+    lift: sparse.csr_matrix
+    stress: sparse.csr_matrix | None = None
+
+    def displacement(self, q: Array) -> Array:
+        """Displacement of every point (m, 2) [m]."""
+        return (self.lift @ q).reshape(-1, 2)
+
+    @cached_property
+    def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Edges of all polygons (e, 2) and their blocks (e,)."""
+        edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.cells])
+        return edges, np.repeat(self.owner, [len(cell) for cell in self.cells])
+
+    def at(self, block: int, point: Array) -> sparse.csr_matrix:
+        """Displacement of a point on the surface of a block, from coordinates (2, n).
+
+        Taken from the nearest edge, linearly between its ends.
+        """
+        edges, owner = self._edges
+        edges = edges[owner == block]
+        start, step = self.places[edges[:, 0]], np.diff(self.places[edges], axis=1)[:, 0]
+        share = np.sum((point - start) * step, axis=1) / np.sum(step * step, axis=1)
+        share = np.clip(share, 0.0, 1.0)
+        distance = np.linalg.norm(start + share[:, None] * step - point, axis=1)
+        nearest = int(np.argmin(distance))
+        ends = [self.lift[2 * node : 2 * node + 2] for node in edges[nearest]]
+        return ((1.0 - share[nearest]) * ends[0] + share[nearest] * ends[1]).tocsr()
