@@ -55,6 +55,33 @@ class PointLoad:
         return block, np.array([self.x, tops[block]])
 
 
+@dataclass(frozen=True)
+class Settlement:
+    """A motion of a support.
+
+    Attributes:
+        block: number or name of a fixed block.
+        motion: of its centroid along x and y, and anticlockwise about it (3,) [m, m, rad].
+    """
+
+    block: int | str
+    motion: tuple[float, float, float]
+
+    def place(self, structure: Structure) -> int:
+        """Number of the block that settles.
+
+        Raises:
+            InvalidInput: there is no such block, or it is not a support.
+        """
+        supports = {b.name: n for n, b in enumerate(structure.blocks) if b.fixed}
+        number = supports.get(self.block, self.block) if isinstance(self.block, str) else self.block
+        if number not in supports.values():
+            raise InvalidInput(
+                f"block {self.block!r} cannot settle: the supports are {supports}; name one of them"
+            )
+        return int(number)
+
+
 Action = BodyForce | PointLoad
 
 

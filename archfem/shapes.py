@@ -1,6 +1,7 @@
 """Parametric structures: give a few lengths, get blocks and joints."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import asin, degrees, radians
 
@@ -129,6 +130,87 @@ def column(
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
+
+
+def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
+    *,
+    radius: float,
+    thickness: float,
+    voussoirs: int,
+    pier_breadth: float,
+    courses: Sequence[float],
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    chords: int | None = None,
+    gravity: float = G,
+) -> Structure:
+    """Set a semicircular ring on two piers, centred under its feet.
+
+    Blocks and joints are numbered from the foot of the left pier over the ring to the foot of the
+    right one: block 0 is the left foundation and joint 0 the left base. "Intrados" is the side of
+    the opening throughout. Joints belong to the parts "left pier", "arch" and "right pier"; the
+    springings belong to the arch.
+
+    Args:
+        radius: of the ring's centre line, which is centred on the origin [m].
+        thickness: of the ring [m].
+        voussoirs: number of stones in the ring.
+        pier_breadth: of both piers, at least the thickness of the ring [m].
+        courses: heights of the courses of each pier, from below [m].
+        width: out of plane [m].
+        material: of all blocks.
+        contact: of all joints.
+        chords: as for `circular_arch`.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidStructure: the lengths do not make a ring, or it does not stand on its piers.
+    """
+    ring = circular_arch(
+        radius=radius, thickness=thickness, embrace=180.0, voussoirs=voussoirs, chords=chords
+    )
+    if not thickness <= pier_breadth < 2.0 * radius:
+        raise InvalidStructure(
+            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
+            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
+        )
+    if not courses or min(courses) <= 0.0:
+        raise InvalidStructure(f"courses {list(courses)} m: give at least one height above 0")
+    levels = [0.0, *np.cumsum(courses).tolist()]
+    levels = [level - levels[-1] for level in [-0.2 * min(courses), *levels]]
+    left = _pier(-radius, pier_breadth, levels, material, "left pier")
+    right = _pier(radius, pier_breadth, levels, material, "right pier")
+    stones = tuple(replace(stone, material=material) for stone in ring.blocks[1:-1])
+    blocks = (*left, *stones, *reversed(right))
+    inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
+    outer = -radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
+    beds = [((inner[0], y), (outer[0], y), "left pier") for y in levels[1:-1]]
+    beds += [(each.intrados, each.extrados, "arch") for each in ring.joints]
+    beds += [((inner[1], y), (outer[1], y), "right pier") for y in reversed(levels[1:-1])]
+    joints = tuple(
+        Joint((k, k + 1), intrados, extrados, contact, f"joint {k}", part)
+        for k, (intrados, extrados, part) in enumerate(beds)
+    )
+    return Structure(blocks, joints, width, gravity, "arch on piers")
+
+
+def _pier(
+    middle: float, breadth: float, levels: Sequence[float], material: Material, part: str
+) -> list[Block]:
+    """Foundation and courses between levels, from below."""
+    left, right = middle - breadth / 2.0, middle + breadth / 2.0
+    return [
+        Block(
+            ((left, top), (left, low), (right, low), (right, top)),
+            material,
+            f"{part} course {k}" if k else f"{part} foundation",
+            fixed=k == 0,
+            corners=(0, 1, 2, 3),
+            part=part,
+        )
+        for k, (low, top) in enumerate(pairwise(levels))
+    ]
 
 
 def _circle(
