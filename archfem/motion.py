@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from numbers import Real
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -266,7 +267,8 @@ class Motion:
         )
 
     def _each(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
-        return replace(self, **{name: change(self.component(name)) for name in self.components})
+        changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
+        return replace(self, **changed)
 
 
 def _checked(samples: np.ndarray | None, component: str) -> np.ndarray:

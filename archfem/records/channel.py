@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_DOWN = re.compile(r"\b(DWN|DOWN|DN|D-U)\b|DWN$", re.IGNORECASE)
+_DOWN = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
 _VERTICAL = re.compile(r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE)
 
 

@@ -9,7 +9,7 @@ from archfem.records.text import NUMBER, RecordText, unit_named, units_written
 
 _STEP = rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER})"
 _DIRECTIONS = re.compile(r"\b(N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", re.IGNORECASE)
-_JITTER = 0.1  # of a step: what rounding in print does to a time column
+_JITTER = 0.25  # of a step: what rounding in print does to a time column
 
 
 def read(
@@ -108,9 +108,10 @@ def _step(text: RecordText, rows: np.ndarray, comments: str, dt: float | None) -
 
 def _step_of(text: RecordText, times: np.ndarray) -> float:
     """Return the constant step of a time column [s]."""
-    step = (times[-1] - times[0]) / (len(times) - 1)
-    drift = np.abs(times - times[0] - step * np.arange(len(times)))
-    if step <= 0.0 or drift.max() > _JITTER * step:
+    count = np.arange(len(times))
+    step, begin = np.polyfit(count, times, 1)
+    apart = np.abs(times - begin - step * count).max()
+    if step <= 0.0 or max(apart, np.abs(np.diff(times) - step).max()) > _JITTER * step:
         jump = int(np.argmax(np.abs(np.diff(times) - np.median(np.diff(times)))))
         raise text.error(
             f"time is not uniform: {times[jump]:g} to {times[jump + 1]:g} s in row {jump + 2}, "

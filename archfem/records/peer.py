@@ -47,5 +47,5 @@ def _count_and_step(text: RecordText) -> tuple[int, float, int]:
 def _direction(text: RecordText, line: int) -> str:
     """Return the component: what follows the last comma of the line that names the station."""
     title = next((content for content in text.lines[1:line] if content.count(",") >= 2), "")
-    direction = title.rpartition(",")[2].partition("(")[0].strip()
+    direction = re.sub(r"\([^()]*\)?", "", title).rpartition(",")[2].strip()
     return direction if len(direction) <= 12 else ""

@@ -3,11 +3,11 @@
 from os import PathLike
 
 from archfem.errors import InvalidInput
-from archfem.records import columns, peer
+from archfem.records import afad, columns, cosmos, csmip, esm, knet, peer, smc
 from archfem.records.channel import Channel
 from archfem.records.text import RecordText, unit_named
 
-_FORMATS = (peer,)
+_FORMATS = (smc, cosmos, csmip, afad, esm, knet, peer)
 
 
 def read_channels(

@@ -1,7 +1,9 @@
 """The text of a record file, its numbers, and errors that name file and line."""
 
 import re
+from collections import Counter
 from dataclasses import dataclass
+from math import isfinite
 from os import PathLike
 from pathlib import Path
 
@@ -18,7 +20,7 @@ LONGEST_STEP = 0.1
 
 _NUMERIC = re.compile(r"[\s\d+\-.,;EeDd]*\d[\s\d+\-.,;EeDd]*")
 _RUN_TOGETHER = re.compile(r"(?<=[\d.])(?=[-+])")
-_SEPARATORS = re.compile(r"[\s,;]+")
+_ALIKE = 0.97  # share of numbers printed alike from which on the rest count as damaged
 
 # The order matters: the longer unit is tried first and blotted out before the next is looked for.
 _UNITS = (
@@ -54,7 +56,7 @@ class RecordText:
         """
         place = Path(path)
         try:
-            content = place.read_bytes()
+            content = place.read_bytes().rstrip(b"\x1a")  # what ends a text under DOS
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidInput(f"cannot read the record {place}: {reason}") from error
@@ -78,30 +80,40 @@ class RecordText:
         """Tell whether a line holds numbers and nothing else."""
         return bool(_NUMERIC.fullmatch(self.lines[line]))
 
-    def row(self, line: int) -> list[float]:
+    def row(self, line: int, width: int | None = None) -> list[float]:
         """Return the numbers of one line; numbers run together are parted at their signs.
+
+        Where that does not part them, a stated width of the columns does.
 
         Raises:
             InvalidInput: something in the line is not a finite number.
         """
-        content = self.lines[line]
-        if content.strip() and not self.is_numeric(line):
-            raise self.error(f"numbers expected, got {content.strip()[:40]!r}", line)
-        tokens = _SEPARATORS.split(_RUN_TOGETHER.sub(" ", content).strip(" \t,;\f\v"))
+        content = self.lines[line].strip()
+        if content and not self.is_numeric(line):
+            raise self.error(f"numbers expected, got {content[:40]!r}", line)
         try:
-            row = [float(token.replace("D", "E").replace("d", "e")) for token in tokens if token]
+            row = [float(token) for token in self._tokens(line, width)]
         except ValueError as error:
-            raise self.error(f"not a number in {content.strip()[:40]!r}", line) from error
-        if not np.all(np.isfinite(row)):
-            raise self.error(f"a number too large in {content.strip()[:40]!r}", line)
+            raise self.error(f"not a number in {content[:40]!r}", line) from error
+        if not all(map(isfinite, row)):
+            raise self.error(f"a number too large in {content[:40]!r}", line)
         return row
 
-    def block(self, first: int, count: int) -> tuple[np.ndarray, int]:
+    def _tokens(self, line: int, width: int | None) -> list[str]:
+        """Part a line into what should be numbers, with E for Fortran's D."""
+        content = self.lines[line].upper().replace("D", "E")
+        tokens = _RUN_TOGETHER.sub(" ", content).replace(",", " ").replace(";", " ").split()
+        if width and not all(re.fullmatch(NUMBER, token) for token in tokens):
+            return [content[at : at + width] for at in range(0, len(content.rstrip()), width)]
+        return tokens
+
+    def block(self, first: int, count: int, width: int | None = None) -> tuple[np.ndarray, int]:
         """Read as many numbers as a header states.
 
         Args:
             first: index of the line they begin in.
             count: how many there are.
+            width: of the columns, where the file states it.
 
         Returns:
             The numbers (count,) and the index of the line after them.
@@ -109,10 +121,12 @@ class RecordText:
         Raises:
             InvalidInput: the numbers end early, or do not end with a line.
         """
+        if count < 1:
+            raise self.error(f"the header states {count} samples")
         numbers: list[float] = []
         line = first
         while len(numbers) < count and line < len(self.lines):
-            numbers.extend(self.row(line))
+            numbers.extend(self.row(line, width))
             line += 1
         if len(numbers) != count:
             short = len(numbers) < count
@@ -122,7 +136,20 @@ class RecordText:
                 f"{len(numbers) if short else 'more'}: {remedy}",
                 line - 1,
             )
+        self._check_print(first, line, width)
         return np.array(numbers), line
+
+    def _check_print(self, first: int, end: int, width: int | None) -> None:
+        """Refuse a number printed unlike nearly all others of its block: it has been damaged."""
+        tails = [
+            (len(token.partition(".")[2]), line)
+            for line in range(first, end)
+            for token in self._tokens(line, width)
+        ]
+        usual, times = Counter(length for length, _ in tails).most_common(1)[0]
+        if _ALIKE * len(tails) < times < len(tails):
+            line = next(line for length, line in tails if length != usual)
+            raise self.error("a number has not as many digits as the others: it is damaged", line)
 
     def last_block(self, first: int, count: int) -> np.ndarray:
         """Read as many numbers as a header states, which end the file.
@@ -145,7 +172,8 @@ class RecordText:
         """
         if self.ended:
             return
-        tokens = _SEPARATORS.split(_RUN_TOGETHER.sub(" ", " ".join(self.lines[-12:]).strip()))
+        last = range(max(len(self.lines) - 12, 0), len(self.lines))
+        tokens = [token for line in last for token in self._tokens(line, None)]
         shapes = [re.sub(r"\d", "0", re.sub(r"[-+]", "+", token)) for token in tokens]
         tails = [shape.partition(".")[2] for shape in shapes]
         if len(set(tails[-6:-1])) == 1 and len(tails[-1]) < len(tails[-2]):
@@ -158,16 +186,16 @@ class RecordText:
             InvalidInput: there is none.
         """
         search = re.compile(pattern, re.IGNORECASE).search
-        for line in range(start, len(self.lines) if stop is None else stop):
-            match = search(self.lines[line])
+        for line, content in enumerate(self.lines[start:stop], start):
+            match = search(content)
             if match:
                 return line, match
         raise self.error(f"no line tells {pattern!r}: the header is damaged")
 
-    def holds(self, pattern: str, stop: int) -> bool:
-        """Tell whether one of the first lines holds a pattern."""
+    def holds(self, pattern: str, stop: int, start: int = 0) -> bool:
+        """Tell whether one of the lines before stop holds a pattern."""
         search = re.compile(pattern, re.IGNORECASE).search
-        return any(search(line) for line in self.lines[:stop])
+        return any(search(line) for line in self.lines[start:stop])
 
     def header_length(self) -> int:
         """Return how many lines stand before the first line of numbers."""
@@ -212,6 +240,12 @@ def unit_named(name: str) -> float:
     if key not in _NAMES:
         raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(_NAMES)}")
     return _NAMES[key]
+
+
+def stated_width(line: str) -> int | None:
+    """Return the width of the columns where a line states a Fortran format such as (8F10.3)."""
+    match = re.search(r"\(\s*\d+[FE](\d+)\.\d+\s*\)", line, re.IGNORECASE)
+    return int(match[1]) if match else None
 
 
 def units_written(header: str) -> set[float]:

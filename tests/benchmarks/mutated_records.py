@@ -1,0 +1,217 @@
+"""Damage record files of every format at random: no foreign traceback may come of it.
+
+    python tests/benchmarks/mutated_records.py [COUNT] [FOLDER_WITH_REAL_RECORDS]
+
+Prints how many damaged files were refused with archfem's own error, how many were read, and how
+those differ from the undamaged record.
+"""
+
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from archfem.errors import InvalidInput
+from archfem.records.read import read_channels
+
+WAVE = 0.5 * np.sin(0.7 * np.arange(40)) - 0.5 * np.sin(0.7 * np.arange(40)).mean()  # m/s²
+PEAK = 100.0 * np.abs(WAVE).max()  # cm/s²
+LARGEST_FILE = 70_000  # bytes; larger real files only cost time
+
+
+def rows(values, form, per_line):
+    """Print values in lines."""
+    cells = [format(value, form) for value in values]
+    lines = ("".join(cells[at : at + per_line]) for at in range(0, len(cells), per_line))
+    return "\n".join(lines) + "\n"
+
+
+def peer():
+    head = "PEER NGA RECORD\nTown, 1/2/1999, Place, 90\nACCELERATION TIME SERIES IN UNITS OF G\n"
+    return head + "NPTS=     40, DT=   .0100 SEC,\n" + rows(WAVE / 9.80665, "16.7E", 5)
+
+
+def afad():
+    head = (
+        "STRONG GROUND MOTION RECORDS OF TURKIYE\nPLACE                   : GAZIANTEP\n"
+        "NUMBER OF DATA          : 40\nSAMPLING INTERVAL (sec) : 0.01\n"
+        f"RAW PGA VALUES (gal)    : (N-S) {PEAK} (E-W) {PEAK} (U-D) {PEAK}\nCopyright\n"
+        "       N-S          E-W          U-D\n"
+    )
+    return (head + rows(np.repeat(100.0 * WAVE, 3), "13.6f", 3)).replace("\n", "\r\n")
+
+
+def esm():
+    return (
+        "EVENT_NAME: TOWN\nSTATION_CODE: PLC\nSAMPLING_INTERVAL_S: 0.010000\nNDATA: 40\n"
+        "DURATION_S: 0.40\nSTREAM: HNE\nUNITS: cm/s^2\n"
+        f"PGA_CM/S^2: {PEAK:.6f}\n"
+        "HEADER_FORMAT: DYNA 1.2\nDATA_TYPE: ACCELERATION\nUSER1: \n"
+    ) + rows(100.0 * WAVE, ".6f", 1)
+
+
+def csmip():
+    channels = []
+    for number, direction in ((1, "90 DEG"), (2, "UP"), (3, " 0 DEG")):
+        head = (
+            f"CORRECTED ACCELEROGRAM   1-2       CHAN  {number}: {direction}     FROM\n"
+            f"TOWN EARTHQUAKE\nPEAK ACCELERATION = {PEAK:9.3f}    CM/SEC/SEC  AT    .100   SEC.\n"
+        )
+        blocks = [
+            f"   40 POINTS OF {kind} DATA EQUALLY SPACED AT  .010 SEC.  (UNITS: CM/SEC{more})\n"
+            + rows(100.0 * WAVE, "10.3f", 8)
+            for kind, more in (("ACCEL", "/SEC"), ("VELOC", ""))
+        ]
+        end = f"/&  ----------  END OF DATA FOR CHANNEL  {number}  ----------\n"
+        channels.append(head + "".join(blocks) + end)
+    return "".join(channels)
+
+
+def cosmos():
+    codes = np.full(100, -999)
+    values = np.full(100, -999.0)
+    codes[53] = 90
+    values[[61, 62, 63]] = 10.0, 0.4, PEAK
+    return (
+        "Corrected acceleration    (Format v01.20 with 13 text lines)\nRecord of Town\n"
+        " 100 Integer-header values follow on  10 lines, Format= (10I8)\n"
+        + rows(codes, "8d", 10)
+        + " 100 Real-header values follow on  20 lines, Format= (5F15.6)\n"
+        + rows(values, "15.6f", 5)
+        + '   1 Comment line(s) follow, each starting with a "|":\n| none\n'
+        + "      40 acceleration pts, approx    0 secs, units=cm/sec2(04),Format=(1E15.6)\n"
+        + rows(100.0 * WAVE, "15.6e", 1)
+        + "End-of-data for ChanHNE acceleration\n"
+    )
+
+
+def smc():
+    integers = np.full(48, -32768)
+    reals = np.full(50, 1.7e38)
+    integers[[12, 13, 15, 16]] = 90, 360, 2, 40
+    reals[[1, 29, 31]] = 100.0, WAVE.max() * 100.0, WAVE.min() * 100.0
+    head = "2 CORRECTED ACCELEROGRAM\n*\nPLC\n" + "station = Town    component= 360\n"
+    comments = "|\n|made for a test\n"
+    return (
+        head + "*\n" * 7 + rows(integers, "10d", 8) + rows(reals, "15.7E", 5) + comments
+    ) + rows(100.0 * WAVE, "10.3E", 8)
+
+
+def knet():
+    counts = np.rint(WAVE * 8e6 / 78.45).astype(int)
+    head = (
+        "Origin Time       2014/12/31 23:49:00\nStation Code      PLC001\n"
+        "Sampling Freq(Hz) 100Hz\nDuration Time(s)  0.4\nDir.              E-W\n"
+        "Scale Factor      7845(gal)/8000000\n"
+        f"Max. Acc. (gal)   {PEAK:.3f}\nMemo.             \n"
+    )
+    return head + rows(counts, "9d", 8)
+
+
+def columns():
+    lines = (f"{0.01 * step:.3f}  {value:.6f}\n" for step, value in enumerate(WAVE))
+    return "# time (s)  acceleration (m/s2)\n" + "".join(lines)
+
+
+SAMPLES = {make.__name__: make() for make in (peer, afad, esm, csmip, cosmos, smc, knet, columns)}
+
+
+def damaged(content, random):
+    """Return a content (bytes) with one to three damages."""
+    for _ in range(random.integers(1, 4)):
+        content = _damage(content, random)
+    return content
+
+
+def _damage(content, random):
+    at = int(random.integers(0, max(len(content), 1)))
+    kind = random.integers(0, 9)
+    if kind == 0:
+        return content[:at]
+    if kind == 1:
+        return content[:at] + content[at + int(random.integers(1, 30)) :]
+    if kind == 2:
+        return content[:at] + bytes(random.integers(0, 256, 3, dtype=np.uint8)) + content[at:]
+    if kind == 3:
+        return (
+            content[:at]
+            + bytes(random.choice(list(b"0123456789+-.eE ,\n"), 1).astype(np.uint8))
+            + content[at + 1 :]
+        )
+    lines = content.split(b"\n")
+    line = int(random.integers(0, min(len(lines), 60)))
+    if kind == 4:
+        del lines[line]
+    elif kind == 5:
+        lines.insert(line, lines[int(random.integers(0, len(lines)))])
+    elif kind == 6:
+        other = int(random.integers(0, len(lines)))
+        lines[line], lines[other] = lines[other], lines[line]
+    elif kind == 7:
+        words = lines[line].split(b" ")
+        words[int(random.integers(0, len(words)))] = bytes(
+            random.choice([b"nan", b"inf", b"1e999", b"-1", b"0", b"99999999999", b"****", b""])
+        )
+        lines[line] = b" ".join(words)
+    else:
+        lines[line] = lines[line].lower() if random.random() < 0.5 else b""
+    return b"\n".join(lines)
+
+
+def mutants(count, *, seed, sources=None):
+    """Yield damaged files (bytes), by default of the samples above."""
+    random = np.random.default_rng(seed)
+    sources = sources or [sample.encode() for sample in SAMPLES.values()]
+    for number in range(count):
+        yield damaged(sources[number % len(sources)], random)
+
+
+def outcome(path, original):
+    """Tell what reading a damaged file leads to, given the undamaged channels."""
+    try:
+        channels = read_channels(path)
+    except InvalidInput:
+        return "refused"
+    if [channel.samples.shape for channel in channels] != [row.samples.shape for row in original]:
+        return "read, other number of samples"
+    apart = [
+        np.count_nonzero(~np.isclose(one.samples, two.samples, rtol=1e-6, atol=1e-9))
+        for one, two in zip(channels, original, strict=True)
+    ]
+    steps = [one.dt != two.dt for one, two in zip(channels, original, strict=True)]
+    if any(steps):
+        return "read, other step"
+    return "read, as undamaged" if max(apart) == 0 else f"read, {min(max(apart), 3)} samples differ"
+
+
+def main(count, folder):
+    """Damage that many files and print what became of them."""
+    sources = [sample.encode() for sample in SAMPLES.values()]
+    if folder:
+        paths = [path for path in sorted(folder.rglob("*")) if path.suffix != ".md"]
+        sources += [
+            path.read_bytes()
+            for path in paths
+            if path.is_file() and path.stat().st_size < LARGEST_FILE
+        ]
+    tally, begun = Counter(), time.perf_counter()
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "record.txt"
+        originals = []
+        for source in sources:
+            path.write_bytes(source)
+            originals.append(read_channels(path))
+        for number, content in enumerate(mutants(count, seed=0, sources=sources)):
+            path.write_bytes(content)
+            tally[outcome(path, originals[number % len(sources)])] += 1
+    print(f"{count} damaged files from {len(sources)}, {time.perf_counter() - begun:.0f} s")
+    for what, times in tally.most_common():
+        print(f"{times:7d}  {what}")
+
+
+if __name__ == "__main__":
+    arguments = sys.argv[1:]
+    main(int(arguments[0]) if arguments else 10_000, Path(arguments[1]) if arguments[1:] else None)
