@@ -1,5 +1,7 @@
 """When a joint has failed: hinging, sliding, opening; and when failures make a mechanism."""
 
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +12,12 @@ HINGE = 0.46
 
 FAILURES = 4
 """Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
+
+KINDS = ("local", "semi-global", "global")
+"""Classes of mechanisms, smallest first."""
+
+RING_WORDS, PIER_WORDS = frozenset({"arch", "ring"}), frozenset({"pier", "column"})
+"""Words that make a part a ring or a pier; numbers after them do not matter ("arch 2")."""
 
 
 def hinged(joints: xr.Dataset, limit: float = HINGE) -> xr.DataArray:
@@ -75,54 +83,108 @@ def envelope(joints: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Failures that may turn a structure into a mechanism.
+    """Parts of a structure that fail, or move, together.
 
     Attributes:
-        kind: "local" where they are in one ring.
-        part: the ring.
+        kind: one of `KINDS`: "local" in one ring or one pier, "semi-global" in one ring and one
+            pier, "global" in more; "none" where nothing moves.
+        part: the rings and piers concerned, joined by " + ".
         joints: numbers of the failed joints.
-        time: when they were first found together [s]; None for a static state.
+        time: when [s]; None for a static state.
+        blocks: numbers of the blocks that move; empty where failures were only counted.
     """
 
     kind: str
     part: str
     joints: tuple[int, ...]
     time: float | None = None
+    blocks: tuple[int, ...] = ()
+
+
+def part_role(part: str) -> str:
+    """What a part is to a mechanism, by the words of its name: "ring", "pier" or "other".
+
+    A ring is called an arch or a ring ("main arch"), a pier a pier or a column ("north pier").
+    Without a name a part counts as a ring. Anything else, such as backfill, side walls or
+    abutments, follows what carries it and does not count.
+    """
+    words = {word.rstrip("0123456789") for word in re.split(r"[\s_-]+", part.lower())}
+    if words & RING_WORDS or not part:
+        return "ring"
+    return "pier" if words & PIER_WORDS else "other"
+
+
+def mechanism_kind(parts: Collection[str]) -> str:
+    """Class of a mechanism in these parts: "none", "local", "semi-global" or "global"."""
+    roles = sorted(role for part in set(parts) if (role := part_role(part)) != "other")
+    if len(roles) < 2:
+        return "local" if parts else "none"
+    return "semi-global" if roles == ["pier", "ring"] else "global"
 
 
 def counted_mechanism(
-    joints: xr.Dataset, limit: float = HINGE, failures: int = FAILURES
+    joints: xr.Dataset,
+    limit: float = HINGE,
+    failures: int = FAILURES,
+    kinds: Sequence[str] = KINDS,
 ) -> Mechanism | None:
-    """Find the first instant at which enough joints of one part have failed at once.
+    """Find the first instant at which enough joints have failed at once.
 
     The criterion of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
-    ring. A joint that has come apart counts too.
+    ring alone (local), with joints of one pier among them (semi-global), or of more rings and
+    piers (global). A joint that has come apart counts too. The class is that of all joints failed
+    at the instant; ask for `kinds=("local",)` to find four in one ring whatever else fails.
 
     Args:
-        joints: over joint, or over time and joint.
+        joints: over joint, or over time and joint; `part_role` tells which are of rings, of piers.
         limit: of |e| for a hinge [-].
         failures: how many make a mechanism.
+        kinds: classes to look for.
 
     Returns:
         The mechanism, or None.
     """
     flags = failed(joints, limit)
+    if "time" not in flags.coords:
+        flags = flags.assign_coords(time=np.nan)
     if "time" not in flags.dims:
-        flags = flags.expand_dims(time=[np.nan])
-    found = [
-        Mechanism("local", str(part), *first)
-        for part, own in flags.groupby("part")
-        if (first := _first_count(own, failures)) is not None
+        flags = flags.expand_dims("time")
+    flags = flags.transpose("time", "joint")
+    part, up = flags["part"].values.astype(str), flags.values
+    names = [name for name in dict.fromkeys(part) if part_role(name) != "other"]
+    counts = np.array([up[:, part == name].sum(axis=1) for name in names]).reshape(-1, len(up)).T
+    for instant in np.flatnonzero(counts.sum(axis=1) >= failures):
+        count = dict(zip(names, counts[instant], strict=True))
+        group = _widest_group(count, failures, kinds)
+        if group:
+            time = float(flags["time"][instant])
+            numbers = flags["joint"].values[up[instant] & np.isin(part, group)]
+            return Mechanism(
+                mechanism_kind(group),
+                " + ".join(group),
+                tuple(int(number) for number in numbers),
+                None if np.isnan(time) else time,
+            )
+    return None
+
+
+def _widest_group(
+    count: dict[str, int], failures: int, kinds: Sequence[str]
+) -> tuple[str, ...] | None:
+    """Parts whose failures together are enough, of the widest class asked for, or None."""
+    hit = tuple(name for name in count if count[name])
+    pairs = ((ring, pier) for ring in hit for pier in hit if part_role(ring) == "ring")
+    groups = [*((name,) for name in hit), *(pair for pair in pairs if part_role(pair[1]) == "pier")]
+    enough = [
+        group
+        for group in [*groups, hit]
+        if sum(count[name] for name in group) >= failures and mechanism_kind(group) in kinds
     ]
-    return min(found, key=lambda mechanism: mechanism.time or 0.0, default=None)
-
-
-def _first_count(flags: xr.DataArray, failures: int) -> tuple[tuple[int, ...], float | None] | None:
-    """Joints and time of the first instant with so many flags, or None."""
-    enough = (flags.sum("joint") >= failures).values
-    if not enough.any():
-        return None
-    instant = flags.isel(time=int(enough.argmax()))
-    time = float(instant["time"])
-    joints = tuple(int(j) for j in instant["joint"].values[instant.values])
-    return joints, None if np.isnan(time) else time
+    return max(
+        enough,
+        key=lambda group: (
+            KINDS.index(mechanism_kind(group)),
+            sum(count[name] for name in group),
+        ),
+        default=None,
+    )

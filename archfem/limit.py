@@ -216,7 +216,9 @@ def _unbalanced(dead: Programme) -> Optimum:
     size = len(dead.load)
     either = sparse.identity(size)
     columns = sparse.hstack([either, -either], format="csr")
-    return replace(dead, columns=columns, prices=np.ones(2 * size)).solve()
+    found = replace(dead, columns=columns, prices=np.ones(2 * size)).solve()
+    assert found is not None  # no sum of magnitudes is below zero
+    return found
 
 
 def _loaded(dead: Programme, live: Sequence[BodyForce | PointLoad]) -> Programme:

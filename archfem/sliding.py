@@ -16,8 +16,8 @@ STEPS = 200
 FIRST, FALL, LEAST = 0.3, 0.6, 1e-3
 """Dilatancy as a share of μ: in the first step, its fall from step to step, the least."""
 
-FRESH = 0.6
-"""Share of the newest N in the running mean about which the limit is drawn."""
+FRESH, STEADY = 0.6, 30
+"""Share of the newest N in the running mean; after so many steps it falls, to damp any cycle."""
 
 
 def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
@@ -58,7 +58,8 @@ def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
         settled = abs(new.value - old.value) <= RATE * abs(new.value)
         if share == LEAST and settled and _excess(new, friction) <= RATE:
             return new
-        mean, old = FRESH * _thrust(new) + (1.0 - FRESH) * mean, new
+        fresh = FRESH * min(1.0, STEADY / (step + 1))
+        mean, old = fresh * _thrust(new) + (1.0 - fresh) * mean, new
     raise DidNotConverge(
         f"sliding without dilatancy did not settle in {STEPS} steps: its last objective is "
         f"{old.value:.5g}, with |V| up to {_excess(old, friction):.2g} of the greatest N over μ N"
