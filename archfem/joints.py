@@ -110,6 +110,12 @@ class JointOperator:
         opening, slip = self._transposed
         return opening @ normal + slip @ shear
 
+    def energy(self, q: Array) -> float:
+        """Energy stored in the joints [J]."""
+        normal, shear = self.tractions(q)
+        stored = normal**2 / self.points.normal_stiffness + shear**2 / self.points.shear_stiffness
+        return 0.5 * float(self.points.weight @ stored)
+
     def status(self, q: Array) -> Status:
         """Which points are closed (p,)."""
         return is_closed(self.opening @ q)
@@ -120,6 +126,11 @@ class JointOperator:
         normal = sparse.diags(np.where(closed, self.points.normal_stiffness, 0.0))
         shear = sparse.diags(self.points.shear_stiffness)
         return (opening @ normal @ self.opening + slip @ shear @ self.slip).tocsr()
+
+    def couplings(self) -> sparse.csr_matrix:
+        """A matrix with an entry wherever `stiffness` may have one, whatever cancels (n, n)."""
+        opening, slip = abs(self.opening), abs(self.slip)
+        return (opening.T @ opening + slip.T @ slip).tocsr()
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint (n_joints, 3) [N, N, N m]."""

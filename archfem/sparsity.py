@@ -34,10 +34,14 @@ class Pattern:
         """Number of rows."""
         return len(self.indptr) - 1
 
-    @property
-    def _keys(self) -> NDArray[np.int64]:
-        rows = np.repeat(np.arange(self.size, dtype=np.int64), np.diff(self.indptr))
-        return rows * self.size + self.indices
+    def _places(self, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.intp]:
+        """Positions of entries in the data of this pattern."""
+        own = np.repeat(np.arange(self.size, dtype=np.int64), np.diff(self.indptr))
+        keys = own * self.size + self.indices
+        wanted = rows.astype(np.int64) * self.size + columns
+        places = np.searchsorted(keys, wanted)
+        assert np.array_equal(keys[places], wanted), "an entry lies outside the pattern"
+        return places
 
     def matrix(self, data: Array) -> sparse.csr_matrix:
         """A matrix of this pattern from its entries (nnz,)."""
@@ -48,9 +52,8 @@ class Pattern:
     def spread(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
         """The same matrix stored on this pattern."""
         entries = matrix.tocoo()
-        keys = entries.row.astype(np.int64) * self.size + entries.col
         data = np.zeros(len(self.indices))
-        np.add.at(data, np.searchsorted(self._keys, keys), entries.data)
+        np.add.at(data, self._places(entries.row, entries.col), entries.data)
         return self.matrix(data)
 
     def outer(self, rows: sparse.csr_matrix, weights: Array) -> sparse.csr_matrix:
@@ -65,7 +68,6 @@ class Pattern:
         within = np.arange(len(point)) - np.repeat(np.cumsum(length**2) - length**2, length**2)
         first = rows.indptr[point] + within // length[point]
         second = rows.indptr[point] + within % length[point]
-        keys = rows.indices[first].astype(np.int64) * self.size + rows.indices[second]
         values = rows.data[first] * rows.data[second] * weights[point]
-        place = np.searchsorted(self._keys, keys)
+        place = self._places(rows.indices[first], rows.indices[second])
         return sparse.csr_matrix((values, (place, point)), (len(self.indices), rows.shape[0]))

@@ -43,6 +43,9 @@ class Model(Protocol):
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Derivative of `force`; the very same object as before where nothing has changed."""
 
+    def energy(self, q: Array) -> float:
+        """Potential energy of blocks and joints, whose gradient is `force` [J]."""
+
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
 

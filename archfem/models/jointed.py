@@ -28,8 +28,7 @@ class Jointed:
         joints: JointOperator,
         shape: Shape,
     ) -> None:
-        everything = joints.stiffness(np.ones(len(joints.points.arm), dtype=bool))
-        pattern = Pattern.of(mass, blocks, everything)
+        pattern = Pattern.of(mass, blocks, joints.couplings())
         none = joints.stiffness(np.zeros(len(joints.points.arm), dtype=bool))
         self.structure = structure
         self.fidelity = fidelity
@@ -57,6 +56,10 @@ class Jointed:
             matrix = self._pattern.matrix(self._always + self._closing @ closed)
             self._last = (closed, matrix)
         return self._last[1]
+
+    def energy(self, q: Array) -> float:
+        """Potential energy of blocks and joints [J]."""
+        return 0.5 * float(q @ (self.blocks @ q)) + self.joints.energy(q)
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""

@@ -1,0 +1,239 @@
+"""Time stepping: Newmark and HHT-α, each step one equilibrium solve.
+
+With u the displacements relative to the ground, at every step
+
+    M a + C v + f(u + β_c v) = p - M r a_g,
+
+f the internal forces of blocks and joints, p the self-weight. Stiffness-proportional damping is
+written as f(u + β v), so that the joint's dashpot acts only where the joint is closed,
+t_n = k_n <g + β ġ>_-: a continuous law, whose energy stays convex. Damping on a constant matrix
+(the initial stiffness, or that of the blocks alone) enters through C.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from archfem.errors import DidNotConverge
+from archfem.models import Model
+from archfem.motion import Motion
+from archfem.newton import Newton, Solver, magnitude
+from archfem.schemes import Newmark, Rayleigh, Scheme
+from archfem.statics import self_weight
+from archfem.structure import Array
+
+HALVINGS = 8
+"""Times that a step may be halved before giving up."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where a structure is and how it moves, relative to the ground.
+
+    Attributes:
+        time: since the motion began [s].
+        q: coordinates (n,).
+        velocity: their rates (n,).
+        acceleration: the rates of those (n,).
+    """
+
+    time: float
+    q: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a run.
+
+    Attributes:
+        state: at its end.
+        contact: u + β v, which the joint law and the blocks' stress see (n,).
+        iterations: of Newton's method.
+        smallest: the smallest step that was needed to get there [s].
+    """
+
+    state: State
+    contact: Array
+    iterations: int
+    smallest: float
+
+
+class Stepper:
+    """Advances a model under a ground motion."""
+
+    def __init__(
+        self,
+        model: Model,
+        motion: Motion,
+        *,
+        damping: Rayleigh | None = None,
+        scheme: Scheme | None = None,
+        newton: Newton | None = None,
+    ) -> None:
+        self.model = model
+        self.motion = motion
+        self.scheme = scheme or Newmark()
+        self.lag = damping.stiffness if damping and damping.joints == "closed" else 0.0
+        self._damping = _damping_matrix(model, damping)
+        self._weight = self_weight(model)
+        self._scale = magnitude(self._weight)
+        self._solver = Solver(model.size, newton)
+        self._kept: tuple[float, sparse.csr_matrix, sparse.csr_matrix] | None = None
+
+    def at_rest(self, q: Array, time: float = 0.0) -> State:
+        """The state of a structure at rest as the ground begins to move."""
+        return self.released(State(time, q, np.zeros_like(q), np.zeros_like(q)))
+
+    def released(self, state: State) -> State:
+        """The same state with the acceleration that its forces give."""
+        forces = (
+            self._load(state.time)
+            - self._damping @ state.velocity
+            - self.model.force(self.contact(state))
+        )
+        return replace(state, acceleration=splu(self.model.mass.tocsc()).solve(forces))
+
+    def contact(self, state: State) -> Array:
+        """What the joint law sees, u + β v."""
+        return state.q + self.lag * state.velocity
+
+    def steps(self, start: State, dt: float, end: float) -> Iterator[Step]:
+        """Yield one step after another until the end.
+
+        Args:
+            start: state from which to go.
+            dt: time between the yielded states [s].
+            end: time of the last one [s].
+
+        Raises:
+            DidNotConverge: a step failed even when halved; `last` is the state before it.
+        """
+        state = start
+        first = start.time
+        for number in range(1, round((end - first) / dt) + 1):
+            target = first + number * dt
+            state, iterations, smallest = self._advance(state, target, 0)
+            yield Step(state, self.contact(state), iterations, smallest)
+
+    def _load(self, time: float) -> Array:
+        return self._weight - self.model.body @ self.motion.at(time)[0]
+
+    def _advance(self, state: State, target: float, halvings: int) -> tuple[State, int, float]:
+        """Reach a time in one step, or in halves of it where that fails."""
+        dt = target - state.time
+        try:
+            new, iterations = self._try(state, dt)
+        except DidNotConverge as error:
+            if halvings == HALVINGS:
+                raise DidNotConverge(
+                    f"the step from t = {state.time:.6g} s failed, down to {dt:.3g} s ({error}): "
+                    "the structure may have fallen apart; try a smaller dt or HHT",
+                    last=state,
+                ) from error
+            middle, first, small = self._advance(state, state.time + dt / 2.0, halvings + 1)
+            new, second, smaller = self._advance(middle, target, halvings + 1)
+            return new, first + second, min(small, smaller)
+        return replace(new, time=target), iterations, dt
+
+    def _try(self, state: State, dt: float) -> tuple[State, int]:
+        trial = _Trial(self.model, self.scheme, self._damping, self.lag, state, dt)
+        load = self._load(state.time + trial.share * dt)
+        guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
+        solved = self._solver.solve(
+            lambda q: trial.force(q) - load,
+            lambda q: self._effective(trial, q),
+            guess,
+            self._scale,
+        )
+        return trial.end(solved.q), solved.iterations
+
+    def _effective(self, trial: "_Trial", q: Array) -> sparse.csr_matrix:
+        """Tangent of a trial step; the same object as before while stiffness and step stay."""
+        stiffness = self.model.tangent(trial.between(q))
+        kept = self._kept
+        if kept is None or kept[1] is not stiffness or abs(kept[0] - trial.dt) > 1e-9 * trial.dt:
+            matrix = stiffness.copy()
+            matrix.data = trial.tangent_data(stiffness.data)
+            self._kept = kept = (trial.dt, stiffness, matrix)
+        return kept[2]
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """The equation of one step, at t + (1 + α) dt, as a function of the displacement at its end."""
+
+    model: Model
+    scheme: Scheme
+    damping: sparse.csr_matrix
+    lag: float
+    start: State
+    dt: float
+
+    @property
+    def share(self) -> float:
+        """Where between start and end the equation is written, 1 + α."""
+        return 1.0 + self.scheme.alpha
+
+    @property
+    def _to_velocity(self) -> float:
+        return self.scheme.gamma / (self.scheme.beta * self.dt)
+
+    @property
+    def _to_acceleration(self) -> float:
+        return 1.0 / (self.scheme.beta * self.dt**2)
+
+    def end(self, q: Array) -> State:
+        """State at the end, by Newmark's formulas."""
+        beta, gamma, dt, start = self.scheme.beta, self.scheme.gamma, self.dt, self.start
+        moved, v, a = q - start.q, start.velocity, start.acceleration
+        return State(
+            start.time + dt,
+            q,
+            self._to_velocity * moved
+            + (1.0 - gamma / beta) * v
+            + dt * (1.0 - 0.5 * gamma / beta) * a,
+            self._to_acceleration * moved - v / (beta * dt) - (0.5 / beta - 1.0) * a,
+        )
+
+    def _seen(self, end: State) -> tuple[Array, Array]:
+        """Contact u + β v and velocity where the equation is written."""
+        v = self.start.velocity + self.share * (end.velocity - self.start.velocity)
+        q = self.start.q + self.share * (end.q - self.start.q)
+        return q + self.lag * v, v
+
+    def between(self, q: Array) -> Array:
+        """Contact where the equation is written."""
+        return self._seen(self.end(q))[0]
+
+    def force(self, q: Array) -> Array:
+        """Inertia, damping and internal forces."""
+        end = self.end(q)
+        contact, v = self._seen(end)
+        return self.model.mass @ end.acceleration + self.damping @ v + self.model.force(contact)
+
+    def tangent_data(self, stiffness: Array) -> Array:
+        """Entries of the derivative of `force`, from those of the model's tangent."""
+        return (
+            self._to_acceleration * self.model.mass.data
+            + self.share * self._to_velocity * self.damping.data
+            + self.share * (1.0 + self.lag * self._to_velocity) * stiffness
+        )
+
+
+def _damping_matrix(model: Model, damping: Rayleigh | None) -> sparse.csr_matrix:
+    """The constant part of damping, on the pattern of the model's matrices."""
+    matrix = model.mass.copy()
+    if damping is None:
+        matrix.data = np.zeros_like(matrix.data)
+        return matrix
+    matrix.data = damping.mass * model.mass.data
+    if damping.joints == "initial":
+        matrix.data += damping.stiffness * model.tangent(np.zeros(model.size)).data
+    elif damping.joints == "none":
+        matrix.data += damping.stiffness * model.blocks.data
+    return matrix

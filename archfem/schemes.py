@@ -1,0 +1,108 @@
+"""Settings of a time history: damping, and the scheme that steps it."""
+
+from dataclasses import dataclass
+from math import pi
+
+from archfem.errors import InvalidInput
+
+JOINTS = ("closed", "initial", "none")
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping proportional to mass and stiffness.
+
+    The ratio at a frequency f is a/(4 π f) + b π f; the two coefficients make it the wanted one
+    at two frequencies (Clough and Penzien, 1993, section 12-4).
+
+    Attributes:
+        ratio: of critical damping at both frequencies [-].
+        frequencies: between which damping is at most the ratio [Hz].
+        joints: what the stiffness part acts on: blocks and the closed part of joints ("closed"),
+            blocks and all joints as if they were closed ("initial", which leaves a dashpot in an
+            open joint), or the blocks alone ("none").
+    """
+
+    ratio: float
+    frequencies: tuple[float, float]
+    joints: str = "closed"
+
+    def __post_init__(self) -> None:
+        """Refuse negative damping, frequencies out of order and unknown words."""
+        low, high = self.frequencies
+        if not 0.0 <= self.ratio < 1.0:
+            raise InvalidInput(f"damping ratio {self.ratio} is not between 0 and 1: 5 % is 0.05")
+        if not 0.0 < low < high:
+            raise InvalidInput(
+                f"damping frequencies {self.frequencies} Hz: give two, the lower one first"
+            )
+        if self.joints not in JOINTS:
+            raise InvalidInput(f"damping joints = '{self.joints}': use one of {JOINTS}")
+
+    @property
+    def mass(self) -> float:
+        """Coefficient of the mass matrix [1/s]."""
+        low, high = self.frequencies
+        return 4.0 * pi * self.ratio * low * high / (low + high)
+
+    @property
+    def stiffness(self) -> float:
+        """Coefficient of the stiffness matrix [s]."""
+        return self.ratio / (pi * sum(self.frequencies))
+
+
+@dataclass(frozen=True)
+class Newmark:
+    """Newmark's method; the default is average acceleration, which conserves energy.
+
+    Reference: Newmark, J. Eng. Mech. Div. ASCE 85 (1959).
+
+    Attributes:
+        beta: weight of the new acceleration in the displacement.
+        gamma: weight of the new acceleration in the velocity.
+    """
+
+    beta: float = 0.25
+    gamma: float = 0.5
+
+    alpha = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse schemes that are explicit or grow by themselves."""
+        if not (self.gamma >= 0.5 and self.beta >= 0.25 * (0.5 + self.gamma) ** 2 - 1e-12):
+            raise InvalidInput(
+                f"Newmark with beta {self.beta}, gamma {self.gamma} is not stable at every step: "
+                "keep gamma ≥ 1/2 and beta ≥ (1/2 + gamma)²/4"
+            )
+
+
+@dataclass(frozen=True)
+class HHT:
+    """Hilber, Hughes and Taylor's method: second order, damping what a step cannot resolve.
+
+    Internal forces and loads are taken at t + (1 + α) dt.
+    Reference: Earthquake Eng. Struct. Dyn. 5 (1977) 283.
+
+    Attributes:
+        alpha: from -1/3 (most damping) to 0 (average acceleration).
+    """
+
+    alpha: float = -0.1
+
+    def __post_init__(self) -> None:
+        """Refuse values outside the range of stability."""
+        if not -1.0 / 3.0 - 1e-12 <= self.alpha <= 0.0:
+            raise InvalidInput(f"HHT alpha {self.alpha} is not between -1/3 and 0")
+
+    @property
+    def beta(self) -> float:
+        """Newmark's β that keeps second order."""
+        return 0.25 * (1.0 - self.alpha) ** 2
+
+    @property
+    def gamma(self) -> float:
+        """Newmark's γ that keeps second order."""
+        return 0.5 - self.alpha
+
+
+Scheme = Newmark | HHT

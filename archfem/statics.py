@@ -1,0 +1,100 @@
+"""Equilibrium under loads that stay: self-weight first of all."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from archfem.actions import BodyForce
+from archfem.errors import DidNotConverge
+from archfem.models import Model
+from archfem.newton import Newton, Solver, magnitude
+from archfem.resultants import joint_dataset
+from archfem.structure import Array
+
+SMALLEST_STEP = 1.0 / 64.0
+"""Of the load, to which steps are halved before giving up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A structure at rest.
+
+    Attributes:
+        model: whose equilibrium it is.
+        q: coordinates (n,).
+        iterations: of Newton's method, over all steps.
+        steps: in which the load was brought on.
+    """
+
+    model: Model
+    q: Array
+    iterations: int
+    steps: int
+
+    @cached_property
+    def joints(self) -> xr.Dataset:
+        """N, V, M, eccentricity and friction over joint."""
+        return joint_dataset(self.model.structure, self.model.resultants(self.q))
+
+
+def self_weight(model: Model) -> Array:
+    """Generalised forces of gravity (n,)."""
+    return model.load(BodyForce(0.0, -1.0))
+
+
+def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
+    """Find the equilibrium under self-weight.
+
+    Joints open as they must (nonlinear statics); steps of the load are halved where Newton's
+    method fails. Displacements are small: the structure keeps its shape.
+
+    Args:
+        model: any rung of the ladder.
+        newton: settings of the solves.
+
+    Raises:
+        DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
+            equilibrium found on the way, under part of the weight.
+    """
+    return equilibrium(model, self_weight(model), newton)
+
+
+def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
+    """Find the equilibrium under a load that is brought on from rest.
+
+    Args:
+        model: any rung of the ladder.
+        load: generalised forces (n,).
+        newton: settings of the solves.
+
+    Raises:
+        DidNotConverge: there is none; `last` is the last one on the way.
+    """
+    solver = Solver(model.size, newton)
+    found = Equilibrium(model, np.zeros(model.size), 0, 0)
+    factor, step = 0.0, 1.0
+    while factor < 1.0:
+        target = min(1.0, factor + step)
+        try:
+            solved = solver.solve(
+                lambda q, part=target: model.force(q) - part * load,
+                model.tangent,
+                found.q,
+                magnitude(load),
+            )
+        except DidNotConverge as error:
+            step /= 2.0
+            if step >= SMALLEST_STEP:
+                continue
+            raise DidNotConverge(
+                f"no equilibrium beyond {factor:.3f} of the load ({error}): the structure cannot "
+                "carry it; make it thicker, or check the outline, the supports and the load",
+                last=found,
+            ) from error
+        found = Equilibrium(
+            model, solved.q, found.iterations + solved.iterations, found.steps + 1
+        )
+        factor = target
+    return found
