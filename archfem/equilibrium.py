@@ -135,6 +135,13 @@ class RigidBlocks:
         motion[list(self.structure.free)] = (self.coordinates * coordinates).reshape(-1, 3)
         return motion
 
+    def reach(self, motion: Array) -> float:
+        """Largest displacement of a corner of any block, for a motion (n_blocks, 3) [m]."""
+        return max(
+            float(np.linalg.norm(motion_of(block.drawn(), block.centroid) @ own, axis=1).max())
+            for block, own in zip(self.structure.blocks, motion, strict=True)
+        )
+
     def resultants(self, forces: Array) -> Array:
         """N, V, M from the programme's forces (3 n_joints,): (n_joints, 3) [N, N, N m]."""
         intrados, extrados, shear = self.force * forces.reshape(3, -1)

@@ -19,7 +19,6 @@ from archfem.equilibrium import (
     rigid_load,
 )
 from archfem.errors import InvalidInput
-from archfem.kinematics import motion_of
 from archfem.resultants import joint_dataset
 from archfem.sliding import without_dilatancy
 from archfem.structure import Array, Structure
@@ -147,8 +146,9 @@ def collapse_factor(
     fall = _unbalanced(dead)
     if not _balanced(fall, dead):
         return _result(dead, Outcome.INFEASIBLE, np.nan, replace(fall, forces=np.nan * fall.forces))
-    support = np.zeros((len(structure.blocks), 3))
+    support = None
     if isinstance(live, Settlement):
+        support = np.zeros((len(structure.blocks), 3))
         support[live.place(structure)] = live.motion
         asked, scale = _settled(dead, support), dead.blocks.force
         ends = Outcome.SETTLES, Outcome.LOCKS
@@ -247,27 +247,18 @@ def _result(
     """
     structure = asked.blocks.structure
     motion = asked.blocks.motion(found.coordinates)
-    if support is not None and support.any():
+    if support is not None:
         motion = motion + support
-        speed = _fastest(structure, motion)
-    else:
-        speed = _fastest(structure, motion)
-        motion, speed = (motion / speed, 1.0) if speed > 0.0 else (motion, 1.0)
+    elif motion.any():
+        motion = motion / asked.blocks.reach(motion)
+    least = MOVING * asked.blocks.reach(motion)
     intrados, extrados, slip = asked.blocks.gaps(motion)
-    apart = np.minimum(intrados, extrados) - asked.blocks.friction * abs(slip) > MOVING * speed
-    turning = (abs(extrados - intrados) > MOVING * speed) & ~apart
+    apart = np.minimum(intrados, extrados) - asked.blocks.friction * abs(slip) > least
+    turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
         (int(j), "intrados" if intrados[j] < extrados[j] else "extrados")
         for j in np.flatnonzero(turning)
     )
-    slides = tuple(int(j) for j in np.flatnonzero((abs(slip) > MOVING * speed) & ~apart))
+    slides = tuple(int(j) for j in np.flatnonzero((abs(slip) > least) & ~apart))
     joints = joint_dataset(structure, asked.blocks.resultants(found.forces))
     return Collapse(float(factor), outcome, hinges, slides, joints, motion)
-
-
-def _fastest(structure: Structure, motion: Array) -> float:
-    """Speed of the fastest corner of all blocks [m/s]."""
-    return max(
-        float(np.linalg.norm(motion_of(block.drawn(), block.centroid) @ own, axis=1).max())
-        for block, own in zip(structure.blocks, motion, strict=True)
-    )
