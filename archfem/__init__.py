@@ -1,3 +1,68 @@
-"""archfem: does a dry-stone arch or bridge survive an earthquake?"""
+"""archfem: does a dry-stone arch or bridge survive an earthquake?
+
+    import archfem as af
+
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+    model = af.build(ring, fidelity="full", cells=(4, 4))
+    dead = af.dead_load(model)
+    run = af.time_history(model, af.Motion.read("file.AT2"), start=dead)
+
+SI units throughout. N > 0 is compression, eccentricity > 0 toward the extrados, gravity along -y.
+Names that need PETSc or FEniCSx are loaded when first used, so that the masonry side (structures,
+motions, limit analysis) works without them.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from archfem.actions import BodyForce as BodyForce
+from archfem.actions import PointLoad as PointLoad
+from archfem.criteria import Mechanism as Mechanism
+from archfem.errors import ArchfemError as ArchfemError
+from archfem.errors import DidNotConverge as DidNotConverge
+from archfem.errors import InvalidInput as InvalidInput
+from archfem.errors import InvalidStructure as InvalidStructure
+from archfem.materials import BACKFILL as BACKFILL
+from archfem.materials import SOIL_TO_STONE as SOIL_TO_STONE
+from archfem.materials import STONE as STONE
+from archfem.materials import STONE_TO_STONE as STONE_TO_STONE
+from archfem.materials import Contact as Contact
+from archfem.materials import Material as Material
+from archfem.motion import Motion as Motion
+from archfem.resultants import thrust_line as thrust_line
+from archfem.schemes import HHT as HHT
+from archfem.schemes import Newmark as Newmark
+from archfem.schemes import Rayleigh as Rayleigh
+from archfem.shapes import circular_arch as circular_arch
+from archfem.shapes import column as column
+from archfem.structure import Block as Block
+from archfem.structure import Joint as Joint
+from archfem.structure import Structure as Structure
+
+if TYPE_CHECKING:
+    from archfem.history import History as History
+    from archfem.models.build import build as build
+    from archfem.newton import Newton as Newton
+    from archfem.runs import CountedMechanism as CountedMechanism
+    from archfem.runs import Record as Record
+    from archfem.runs import time_history as time_history
+    from archfem.statics import dead_load as dead_load
 
 __version__ = "0.1.0"
+
+_LATER = {
+    "History": "history",
+    "build": "models.build",
+    "Newton": "newton",
+    "CountedMechanism": "runs",
+    "Record": "runs",
+    "time_history": "runs",
+    "dead_load": "statics",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name that needs PETSc or FEniCSx when it is first used."""
+    if name not in _LATER:
+        raise AttributeError(f"module 'archfem' has no attribute {name!r}")
+    return getattr(import_module(f"archfem.{_LATER[name]}"), name)

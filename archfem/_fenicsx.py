@@ -9,11 +9,12 @@ import sys
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+
+from archfem._petsc import PETSc
 
 # The form compiler reports each call of the C compiler on the root logger; that is noise here.
 logging.getLogger().addFilter(lambda record: "distutils" not in record.pathname)
@@ -28,9 +29,9 @@ if "dolfinx" not in sys.modules:
     finally:
         sys.setdlopenflags = _setdlopenflags
 
-import dolfinx.fem.petsc
-import ufl
-from dolfinx import cpp, fem
+import dolfinx.fem.petsc  # noqa: E402
+import ufl  # noqa: E402
+from dolfinx import cpp, fem  # noqa: E402
 
 try:
     from dolfinx.io import gmshio as _gmsh_io

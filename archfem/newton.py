@@ -9,11 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import count
 
-from petsc4py import PETSc
-
 import numpy as np
 from scipy import sparse
 
+from archfem._petsc import PETSc
 from archfem.errors import DidNotConverge
 from archfem.structure import Array
 

@@ -1,0 +1,88 @@
+"""What was recorded of a time history, and its file."""
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from archfem.criteria import Mechanism, counted_mechanism
+from archfem.errors import InvalidInput
+
+SIGNS = (
+    "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
+    "higher block slips toward the extrados; gravity along -y; displacements relative to the ground"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The record of one run.
+
+    Attributes:
+        dataset: everything that was recorded, with units, signs, versions and, where one was
+            given, the case. Resultants are over (time, joint), fields over (frame, coordinate).
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def joints(self) -> xr.Dataset:
+        """N, V, M, eccentricity and friction over time and joint."""
+        names = [name for name, values in self.dataset.items() if "joint" in values.dims]
+        return self.dataset[names]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the recorded steps (steps,) [s]."""
+        return self.dataset["time"].values
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended, in words."""
+        return str(self.dataset.attrs["outcome"])
+
+    @cached_property
+    def mechanism(self) -> Mechanism | None:
+        """The first mechanism by count, or None."""
+        return counted_mechanism(self.joints)
+
+    def save(self, path: str | Path) -> Path:
+        """Write one NetCDF file, in one stroke: a killed run leaves the old file or the new one.
+
+        Args:
+            path: the file; folders are made.
+        """
+        target = Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = target.with_name(f".{target.name}.{os.getpid()}.part")
+        encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
+        try:
+            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
+            with open(draft, "rb") as written:
+                os.fsync(written.fileno())
+            os.replace(draft, target)
+        finally:
+            draft.unlink(missing_ok=True)
+        return target
+
+    @classmethod
+    def read(cls, path: str | Path) -> "History":
+        """Read a file written by `save`.
+
+        Raises:
+            InvalidInput: there is no such file, or it is something else.
+        """
+        if not Path(path).is_file():
+            raise InvalidInput(f"there is no history file {path}")
+        try:
+            with xr.open_dataset(path, engine="netcdf4") as opened:
+                dataset = opened.load()
+        except OSError as error:
+            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
+        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        if missing:
+            raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
+        return cls(dataset)
