@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import xarray as xr
@@ -173,11 +174,10 @@ def _widest_group(
 ) -> tuple[str, ...] | None:
     """Parts whose failures together are enough, of the widest class asked for, or None."""
     hit = tuple(name for name in count if count[name])
-    pairs = ((ring, pier) for ring in hit for pier in hit if part_role(ring) == "ring")
-    groups = [*((name,) for name in hit), *(pair for pair in pairs if part_role(pair[1]) == "pier")]
+    groups = [*combinations(hit, 1), *combinations(hit, 2), hit]
     enough = [
         group
-        for group in [*groups, hit]
+        for group in groups
         if sum(count[name] for name in group) >= failures and mechanism_kind(group) in kinds
     ]
     return max(
