@@ -1,0 +1,106 @@
+"""The architecture as a test: a module imports only from the layers below its own."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import archfem
+
+ROOT = Path(archfem.__file__).parent
+LAYERS = [
+    "errors units laws",
+    "materials quadrature quantities records signals synthetic schemes _petsc",
+    "structure",
+    "actions shapes joints sparsity motion resultants",
+    "kinematics criteria measures oscillator",
+    "spectra codes equilibrium",
+    "matching capacity sliding",
+    "limit",
+    "mechanism",
+    "_fenicsx",
+    "mesh",
+    "space",
+    "forms",
+    "models",
+    "newton",
+    "statics history",
+    "dynamics",
+    "runs",
+    "case",
+    "view",
+    "cli",
+    "__main__",
+]
+ONLY_IN = {
+    "gmsh": {"mesh"},
+    "pyvista": {"view"},
+    "matplotlib": {"view"},
+    "dolfinx": {"_fenicsx", "forms"},
+    "ufl": {"_fenicsx", "forms"},
+    "petsc4py": {"_petsc"},
+    "pint": {"quantities"},
+}
+RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer.split()}
+MODULES = [path for path in ROOT.rglob("*.py") if path != ROOT / "__init__.py"]
+
+
+def home(path):
+    """The module, or the family folder, that a file belongs to."""
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported(path):
+    """Dotted names of everything a file imports, also inside its functions."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_point_downwards(path):
+    here = home(path)
+    for name in imported(path):
+        package, _, rest = name.partition(".")
+        if package == "archfem" and rest:
+            below = rest.split(".")[0]
+            assert below == here or RANK[below] < RANK[here], f"{here} may not import {below}"
+        assert here in ONLY_IN.get(package, {here}), f"{package} is kept out of {here}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_modules_are_small_and_say_what_they_are(path):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 330
+    assert ast.get_docstring(ast.parse(text))
+
+
+def test_masonry_side_needs_no_fenicsx():
+    """Structures, motions and the rigid model's kinematics, where FEniCSx and PETSc are barred."""
+    script = """
+import sys
+for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "ufl"):
+    sys.modules[name] = None
+import archfem as af
+from archfem import kinematics, limit, mechanism, resultants, criteria
+ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+assert kinematics.rigid_joints(ring, 4, kinematics.Quadrature()).opening.shape == (162, 51)
+assert af.Motion.synthetic(duration=2.0, seed=1).pga > 0
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_rigid_model_needs_no_dolfinx():
+    script = """
+import sys
+for name in ("dolfinx", "gmsh", "ufl"):
+    sys.modules[name] = None
+import archfem as af
+ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+assert abs(af.dead_load(af.build(ring, fidelity="rigid")).joints["N"].values.min() - 21.6e3) < 500
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
