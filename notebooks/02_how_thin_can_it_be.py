@@ -1,0 +1,118 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: py:percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # How thin can it be?
+#
+# A dry-stone arch has no mortar and no tension. It stands as long as a line of thrust fits inside
+# its ring, so it stands by its shape alone: neither the stiffness nor the weight of the stone
+# matters. Then there is a thinnest semicircle that stands at all. **How thin is it?**
+
+# %%
+import numpy as np
+
+from archfem.actions import BodyForce, Settlement
+from archfem.capacity import minimum_thickness, ring_capacity
+from archfem.limit import collapse_factor
+from archfem.shapes import circular_arch
+from archfem.view.capacity import capacity_figure, collapse_figure, structure_figure
+
+# %% [markdown]
+# ## The structure
+#
+# A semicircle of 50 voussoirs with radius 1 m; a thickness in metres is then the ratio $t/R$. It
+# could as well be 10 m: there is no scale in this problem.
+
+
+# %%
+def semicircle(thickness):
+    return circular_arch(radius=1.0, thickness=thickness, embrace=180.0, voussoirs=50)
+
+
+structure_figure(semicircle(0.15))
+
+# %% [markdown]
+# ## The equation
+#
+# Each joint of depth $h$ carries a compression at its intrados end, $F_i$, one at its extrados end,
+# $F_e$, and a shear force $V$. That the thrust stays within the joint, $|M| \le N h/2$, is the same
+# as $F_i, F_e \ge 0$. Milankovitch's question of 1907 is then whether the linear equations of
+# balance have a solution in numbers that are not negative:
+#
+# $$ -G_o^\mathsf{T} F + G_s^\mathsf{T} V = f_\text{weight}, \qquad F \ge 0 . $$
+#
+# Heyman's *safe theorem* (1966) says that one such solution is enough: if we can find a line of
+# thrust, so can the arch. A linear programme finds one, or proves that there is none, and halving
+# a bracket of thicknesses finds the last one that has.
+
+# %%
+least = minimum_thickness(semicircle, friction=None)
+f"a semicircle stands down to t/R = {least:.4f}"
+
+# %% [markdown]
+# ## What it looks like
+#
+# At that thickness a single line of thrust is left. It touches the extrados at the crown, the
+# intrados at the haunches and the extrados at the springings: five hinges, one more than a
+# mechanism needs, since the arch is symmetric. We ask for it by letting a support give way, which
+# makes an arch find its least thrust.
+
+# %%
+thinnest = semicircle(least)
+spread = collapse_factor(thinnest, live=Settlement("left abutment", (-0.01, 0.0, 0.0)))
+collapse_figure(thinnest, spread)
+
+# %% [markdown]
+# Two per cent thinner, there is no line of thrust, and the limit analysis shows how it falls: the
+# crown sinks, the haunches go out.
+
+# %%
+too_thin = semicircle(0.98 * least)
+fall = collapse_factor(too_thin, live=BodyForce(1.0))
+collapse_figure(too_thin, fall)
+
+# %% [markdown]
+# ## Check against theory
+#
+# Milankovitch found $t/R = 0.1075$, with hinges at 54.5° from the crown. With 50 stones the nearest
+# joints are at 54°, and a ring can only hinge at its joints: it may be thinner by a hair.
+
+# %%
+angles = [90.0 - 3.6 * joint for joint, _ in spread.hinges]
+f"t/R = {least:.5f}, {least / 0.1075 - 1.0:+.2%} off; hinges at {np.round(angles, 1)}°"
+
+# %% [markdown]
+# Flatter arches may be much thinner: their thrust line is nearer to a circle. What is left above
+# the least thickness is resistance to an earthquake. The map shows the constant horizontal
+# acceleration that would turn rings into mechanisms, with known values on it.
+
+
+# %%
+def least_of(embrace):
+    ring = {"radius": 1.0, "embrace": embrace, "voussoirs": 20}
+    return minimum_thickness(lambda t: circular_arch(thickness=t, **ring), tolerance=1e-3)
+
+
+embraces, ratios = np.linspace(60.0, 180.0, 9), np.linspace(0.005, 0.25, 12)
+capacity_figure(ring_capacity(embraces, ratios, voussoirs=20), {e: least_of(e) for e in embraces})
+
+# %% [markdown]
+# ## What to try next
+#
+# - Seven voussoirs instead of 50: the ring may be 10 % thinner. Why does an arch with fewer joints
+#   need less?
+# - `contact=Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the springings slide
+#   before the arch is as thin as it could be.
+# - `strength=1 * MPa` in `minimum_thickness`, and a radius of 20 m: when does the strength of stone
+#   begin to matter?
+# - `chords=1` cuts the stones with straight faces. Which way does the least thickness go?
+
+# %%
+checked = least

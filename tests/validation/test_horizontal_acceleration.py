@@ -1,0 +1,75 @@
+"""The constant horizontal acceleration at which a ring turns into a mechanism.
+
+@article{Oppenheim1992,
+  author  = {Oppenheim, Irving J.},
+  title   = {The masonry arch as a four-link mechanism under base motion},
+  journal = {Earthquake Engineering and Structural Dynamics},
+  volume  = {21},
+  pages   = {1005--1017},
+  year    = {1992}
+}
+
+Oppenheim's arch: R = 10 m, t/R = 0.15, embrace 157.5°, seven voussoirs, 0.37 g. The table for 180
+voussoirs, without sliding, is by linear programming of the static theorem.
+"""
+
+import numpy as np
+import pytest
+
+from archfem.actions import BodyForce
+from archfem.capacity import ring_capacity
+from archfem.limit import collapse_factor, stands
+from archfem.mechanism import verified_mechanism
+from archfem.shapes import circular_arch
+
+HALF_A_DIGIT = 5.1e-4
+
+
+def ring(embrace, ratio, voussoirs=180):
+    return circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=voussoirs)
+
+
+@pytest.mark.parametrize(
+    ("embrace", "ratio", "factor"),
+    [
+        (120.0, 0.10, 0.580),
+        (120.0, 0.15, 0.913),
+        (120.0, 0.20, 1.264),
+        (180.0, 0.15, 0.144),
+        (180.0, 0.20, 0.284),
+    ],
+)
+def test_ring_of_many_voussoirs(embrace, ratio, factor):
+    found = collapse_factor(ring(embrace, ratio), live=BodyForce(1.0), friction=None)
+    assert found.factor == pytest.approx(factor, abs=HALF_A_DIGIT)
+    assert [side for _, side in found.hinges] == ["intrados", "extrados"] * 2
+
+
+def test_the_thickest_of_them_would_slide_first():
+    """The table is of pure rotation; at a friction of 0.6 its springings slide before."""
+    found = collapse_factor(ring(120.0, 0.20), live=BodyForce(1.0))
+    assert set(found.sliding) == {0, 180}
+    assert found.factor == pytest.approx(1.185, abs=1e-3)
+
+
+def test_thin_semicircle_does_not_stand_at_all():
+    thin = ring(180.0, 0.10)
+    assert not stands(thin)
+    assert collapse_factor(thin, live=BodyForce(1.0)).outcome == "infeasible"
+
+
+def test_oppenheim_arch():
+    structure = circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
+    found = collapse_factor(structure, live=BodyForce(1.0))
+    assert found.factor == pytest.approx(0.37, abs=0.005)
+    verified = verified_mechanism(structure, found.joints)
+    assert (verified.kind, len(verified.moved.joints)) == ("local", 4)
+
+
+@pytest.mark.slow
+def test_rings_lose_all_capacity_at_their_least_thickness():
+    """The map of capacity vanishes along the known line of least thickness, and only there."""
+    map_ = ring_capacity([120.0, 180.0], [0.0229, 0.1076], voussoirs=180)
+    assert float(map_.sel(embrace=120.0, ratio=0.0229)) == pytest.approx(0.0, abs=2e-3)
+    assert float(map_.sel(embrace=180.0, ratio=0.1076)) == pytest.approx(0.0, abs=2e-3)
+    assert np.isnan(map_.sel(embrace=180.0, ratio=0.0229))
