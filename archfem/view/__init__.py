@@ -1,0 +1,1 @@
+"""Pictures and films of structures, what they did, and what they can take."""

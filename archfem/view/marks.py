@@ -1,0 +1,97 @@
+"""What a picture shows of the joints at one instant: thrust line, hinges, slips and gaps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from scipy import sparse
+
+from archfem.criteria import HINGE, hinged, opened, sliding
+from archfem.models import Model
+from archfem.resultants import thrust_line
+from archfem.structure import Array, Structure
+
+ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
+ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])
+"""Outline of an arrow of length 1 along x (7, 2)."""
+
+LENGTH, APART = 0.55, 0.14
+"""Length of the arrows of a slip, and their distance from the joint, relative to its depth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Where to draw what.
+
+    Attributes:
+        thrust: points of the thrust line (n_joints, 2) [m]; NaN in an open joint.
+        hinges: points where hinged joints stay in contact (n_hinges, 2) [m].
+        slips: outlines of two opposite arrows beside each sliding joint: the higher block's,
+            then the lower's (2 n_sliding, 7, 2) [m].
+        gaps: ends of the joints that have come apart (n_open, 2, 2) [m].
+    """
+
+    thrust: Array
+    hinges: Array
+    slips: Array
+    gaps: Array
+
+
+def joint_marks(
+    structure: Structure,
+    joints: xr.Dataset,
+    *,
+    shift: Array | None = None,
+    limit: float = HINGE,
+) -> Marks:
+    """Find what to draw at the joints.
+
+    Args:
+        structure: whose joints they are.
+        joints: as made by `joint_dataset`, at one instant.
+        shift: displacements, as drawn, of both ends of each joint, intrados first
+            (n_joints, 2, 2) [m]; by default none.
+        limit: of |e| for a hinge [-].
+    """
+    shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
+    ends = np.array([joint.ends for joint in structure.joints]) + shift
+    share = 0.5 + joints["eccentricity"].values[:, None]
+    carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
+    side = hinged(joints, limit).values
+    failed = np.flatnonzero(side)
+    slipping = np.flatnonzero(sliding(joints).values)
+    arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
+    return Marks(
+        thrust=thrust_line(structure, joints).values + carried,
+        hinges=ends[failed, (side[failed] > 0).astype(int)],
+        slips=np.array(arrows).reshape(-1, *ARROW.shape),
+        gaps=ends[opened(joints).values],
+    )
+
+
+def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Array:
+    """Two arrows that say how a joint slips (2, 7, 2) [m]."""
+    joint, normal = structure.joints[number], structure.normals[number]
+    sense = np.sign(shear) * joint.tangent
+    outline = ARROW * LENGTH * joint.depth
+    arrow = outline[:, :1] * sense + outline[:, 1:] * normal
+    away = APART * joint.depth * normal
+    return np.array([middle + away + arrow, middle - away - arrow])
+
+
+def joint_ends(model: Model) -> sparse.csr_matrix:
+    """Displacements of both ends of each joint, intrados first, from coordinates (4 n_joints, n).
+
+    Each is the mean of the two blocks' displacements there.
+    """
+    still = sparse.csr_matrix((2, model.size))
+    blocks = model.structure.blocks
+    rows = [
+        sum(
+            still if blocks[number].fixed else 0.5 * model.shape.at(number, end)
+            for number in joint.blocks
+        )
+        for joint in model.structure.joints
+        for end in joint.ends
+    ]
+    return sparse.vstack(rows, format="csr")

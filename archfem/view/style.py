@@ -1,0 +1,81 @@
+"""One look for all pictures: colours, sizes, and axes that carry units."""
+
+import os
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from archfem.errors import InvalidInput
+from archfem.structure import Structure
+
+STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
+INK, FAINT = "#1b1b1b", "#8d8d8d"
+THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
+LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
+"""Colours of lines that share axes; they stay apart for all common kinds of colour blindness."""
+
+SMALL, NORMAL = 8.0, 9.5
+"""Sizes of type [points]: ticks, legends and labels; titles."""
+
+COLUMN = 6.4
+"""Width of a picture [inch]."""
+
+
+def dress(axes: Axes, x: str = "", y: str = "") -> None:
+    """Label axes and take away what is not needed.
+
+    Args:
+        axes: to dress.
+        x: label of the horizontal axis, with its unit.
+        y: label of the vertical axis, with its unit.
+    """
+    axes.set_xlabel(x, fontsize=SMALL)
+    axes.set_ylabel(y, fontsize=SMALL)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=EDGE, linewidth=0.8)
+    axes.tick_params(labelsize=SMALL, color=EDGE, width=0.8, length=3.0)
+
+
+def legend(axes: Axes, *, alone: bool) -> None:
+    """Explain what is labelled: below axes that are alone on their page, else among the lines."""
+    if alone:
+        axes.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
+    else:
+        axes.legend(frameon=False, fontsize=SMALL)
+
+
+def canvas(structure: Structure) -> Figure:
+    """An empty page that fits a structure."""
+    points = np.concatenate([block.drawn() for block in structure.blocks])
+    wide, high = np.ptp(points, axis=0)
+    height = float(np.clip(0.9 * COLUMN * high / wide + 1.1, 2.4, 8.0))
+    return Figure(figsize=(COLUMN, height), layout="constrained")
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a figure in one stroke: the suffix says how (.pdf, .svg, .png, …).
+
+    Args:
+        figure: what to write.
+        path: the file; folders are made.
+
+    Raises:
+        InvalidInput: the suffix is not one of a picture.
+    """
+    target = Path(path)
+    kinds = sorted(figure.canvas.get_supported_filetypes())
+    kind = target.suffix.removeprefix(".").lower()
+    if kind not in kinds:
+        raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    draft = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
+            figure.savefig(draft, format=kind, dpi=300)
+        os.replace(draft, target)
+    finally:
+        draft.unlink(missing_ok=True)
+    return target
