@@ -66,6 +66,14 @@ def test_at_is_straight_between_samples_and_zero_outside():
     assert values == pytest.approx(np.array(expected, dtype=float), abs=1e-12)
 
 
+def test_the_last_instant_summed_up_in_steps_is_inside():
+    motion = Motion(sine(frequency=0.3), 0.01)
+    late = sum([0.01] * 400)
+    assert late != motion.duration
+    assert motion.at(late)[0, 0] == pytest.approx(motion.horizontal[-1], rel=1e-6)
+    assert Motion([2.0], 0.01).at(0.0)[0, 0] == 2.0
+
+
 def test_scaling_acts_on_all_components(shaking):
     half = shaking.scaled(-0.5)
     assert half.pga == pytest.approx(1.5)

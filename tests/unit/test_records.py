@@ -100,6 +100,15 @@ def test_a_downward_vertical_is_turned_up(recorded):
     assert motion.horizontal[0] == pytest.approx(-0.4486975e-3 * STANDARD_GRAVITY)
 
 
+def test_two_horizontals_of_two_files_can_be_rotated(recorded):
+    files = [recorded / f"peer_at2/RSN125_FRIULI.A_A-TMZ{angle}.AT2" for angle in ("000", "270")]
+    motion = Motion.read(files[0], transverse=files[1])
+    turned = motion.rotated(0.5 * np.pi)
+    assert turned.pga == pytest.approx(0.3151 * STANDARD_GRAVITY, rel=2e-4)
+    # Each keeps its own length until they are mixed; then the longer one counts.
+    assert (len(motion.horizontal), len(turned.horizontal)) == (7277, 7279)
+
+
 def test_three_components_of_one_file_are_kept_together(recorded):
     motion = Motion.read(recorded / "other_formats/ce36456p_CE36456.V2")
     peaks = [np.abs(motion.component(name)).max() for name in motion.components]
@@ -137,6 +146,8 @@ TITLE = "PEER NGA RECORD\nFriuli, 5/6/1976, Tolmezzo, 0\nACCELERATION TIME SERIE
         "DT=  .0100, NPTS=   4",
         "NPTS: 4 DT: 0.01",
         "NPTS=4,DT=.01 SEC",
+        "4, .01, NPTS, DT",
+        "NPTS, DT:  4  .0100 SEC",
         "NPTS=    4\nDT=   .0100 SEC",
     ],
 )
@@ -201,7 +212,7 @@ def test_doubtful_files_are_refused_by_name_and_line(write, content, message):
 
 
 def test_files_that_are_not_there_are_refused(tmp_path):
-    for path in (tmp_path / "missing.AT2", tmp_path, "a\0b"):
+    for path in (tmp_path / "missing.AT2", tmp_path, "a\0b", None):
         with pytest.raises(InvalidInput, match="cannot read the record"):
             Motion.read(path)
 
@@ -240,6 +251,8 @@ def test_rounded_times_still_tell_the_step(write):
         ("0.00 1 2\n0.01 4 1\n0.02 5 1\n", {"units": "gal"}, "2 columns could be"),
         ("0.00 1\n0.01 4\n0.02 5\n", {"units": "gal", "column": 1}, "choose from 2 to 2"),
         ("1 2\n3\n1 5\n", {"units": "gal", "dt": 0.01, "column": 1}, "line 2: 1 columns"),
+        ("0,1\n0,2\n", {"units": "gal", "dt": 0.01, "column": 1}, "decimal commas"),
+        ("1\n2\n", {"units": "gal", "dt": "fast"}, "a number in seconds"),
         ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),
         ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s"),
     ],

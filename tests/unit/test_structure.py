@@ -101,8 +101,8 @@ def test_other_refusals(stack):
         Structure((replace(stack.blocks[0]),), ())
     with pytest.raises(InvalidStructure, match="no joint 'key'"):
         stack.joint_number("key")
+    bad = Joint((0, 1), (0.0, 0.0), (0.0, 0.0), STONE_TO_STONE, "point")
     with pytest.raises(InvalidStructure, match="one point"):
-        bad = Joint((0, 1), (0.0, 0.0), (0.0, 0.0), STONE_TO_STONE, "point")
         replace(stack, joints=(bad, stack.joints[1]))
     with pytest.raises(InvalidStructure, match="lengths above 0"):
         column(breadth=1.0, heights=[])

@@ -1,0 +1,125 @@
+"""A block on a joint: section law, frequencies, uplift, sliding, rocking.
+
+Closed forms of the no-tension elastic joint, and of the rocking block with linear kinematics:
+
+@article{housner1963, author={Housner, G. W.}, title={The behavior of inverted pendulum structures
+during earthquakes}, journal={Bull. Seism. Soc. Am.}, volume={53}, pages={403--417}, year={1963}}
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from archfem.actions import BodyForce
+from archfem.criteria import hinged, sliding
+from archfem.dynamics import Stepper
+from archfem.errors import DidNotConverge
+from archfem.materials import Contact, Material
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.shapes import column
+from archfem.statics import equilibrium, self_weight
+
+GRAVITY = 9.81
+STONE = Material(30e9, 0.2, 2000.0 * GRAVITY)
+JOINT = Contact(1e9, 4e8, 0.6)
+
+
+def block(breadth=0.6, height=2.4, contact=JOINT, material=STONE):
+    return column(breadth=breadth, heights=[height], contact=contact, material=material)
+
+
+def test_three_frequencies():
+    model = build(block(), fidelity="rigid")
+    squares = eigh(model.tangent(np.zeros(3)).toarray(), model.mass.toarray(), eigvals_only=True)
+    assert np.sqrt(squares) / (2.0 * np.pi) == pytest.approx([8.884, 72.644, 91.118], rel=1e-4)
+
+
+def test_frequencies_of_an_elastic_block_approach_the_rigid_ones():
+    hard = Material(3e13 / 10.0, 0.2, 2000.0 * GRAVITY)
+    model = build(block(material=hard), fidelity="full", cells=(4, 8), degree=2)
+    squares = eigh(
+        model.tangent(np.zeros(model.size)).toarray(),
+        model.mass.toarray(),
+        eigvals_only=True,
+        subset_by_index=[0, 2],
+    )
+    # A hundred times stiffer than stone: its own flexibility changes them by less than 0.3 %.
+    assert np.sqrt(squares) / (2.0 * np.pi) == pytest.approx([8.884, 72.644, 91.118], rel=3e-3)
+
+
+@pytest.mark.parametrize("e", [0.05, 0.15, 1.0 / 6.0, 0.25, 0.35, 0.45])
+def test_section_law(e):
+    """Rotation of a joint under N and M = e N h, up to h/6 and beyond.
+
+    64 facets with 3 Lobatto points: the edge of contact falls inside a facet, where the rule
+    errs by less than one part in a thousand.
+    """
+    model = build(block(), fidelity="rigid", cells=(64, 1))
+    normal, depth = 1e6, 0.6
+    load = np.array([0.0, -normal, -e * normal * depth])  # clockwise presses the right edge
+    found = equilibrium(model, load)
+    stiffness, width = JOINT.normal_stiffness, 1.0
+    if e <= 1.0 / 6.0:
+        rotation = 12.0 * e * normal * depth / (stiffness * width * depth**3)
+    else:
+        compressed = 3.0 * (0.5 - e) * depth
+        rotation = 2.0 * normal / (stiffness * width * compressed**2)
+    assert float(found.joints["eccentricity"][0]) == pytest.approx(e, rel=1e-9)
+    assert -found.q[2] == pytest.approx(rotation, rel=1e-3)
+
+
+def test_moment_approaches_its_limit_only_as_rotation_grows():
+    """M = N (h/2 - (1/3) sqrt(2 N / (k_n w θ))) read at the rotation found."""
+    model = build(block(), fidelity="rigid", cells=(256, 1))
+    normal = 1e6
+    found = equilibrium(model, np.array([0.0, -normal, -0.49 * normal * 0.6]))
+    rotation = -found.q[2]
+    moment = normal * (0.3 - np.sqrt(2.0 * normal / (1e9 * rotation)) / 3.0)
+    assert float(found.joints["M"][0]) == pytest.approx(moment, rel=2e-4)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+def test_uplift_at_a_quarter_of_g(fidelity):
+    """b/h = 0.25: just below, the base is hinged but holds; just above, nothing does."""
+    model = build(block(), fidelity=fidelity, cells=(4, 8))
+    weight = self_weight(model)
+    held = equilibrium(model, weight + model.load(BodyForce(0.245)))
+    assert float(held.joints["eccentricity"][0]) == pytest.approx(2.0 * 0.245, rel=1e-6)
+    assert int(hinged(held.joints)[0]) == 1
+    with pytest.raises(DidNotConverge, match="no equilibrium beyond"):
+        equilibrium(model, weight + model.load(BodyForce(0.255)))
+
+
+def test_sliding_at_the_coefficient_of_friction():
+    model = build(block(breadth=4.0, height=0.5), fidelity="rigid")
+    for factor, slides in ((0.59, False), (0.61, True)):
+        found = equilibrium(model, self_weight(model) + model.load(BodyForce(factor)))
+        assert float(found.joints["friction"][0]) == pytest.approx(factor, rel=1e-9)
+        assert bool(sliding(found.joints)[0]) == slides
+
+
+def test_rocking_period():
+    """Quarter period of free rocking from θ₀ = 0.1 α: sqrt(2 I₀ θ₀ / (W b)), 0.737 s in all."""
+    stiff = Contact(1e12, 1e12, 0.6)
+    model = build(block(contact=stiff), fidelity="rigid", cells=(1, 1), quadrature="nodal")
+    theta = 0.1 * np.arctan(0.25)
+    still = Motion(np.zeros(2), 0.15)
+    stepper = Stepper(model, still)
+    # Turned by θ₀ clockwise about the lower right corner, 0.3 m right and 1.2 m below its centre.
+    start = stepper.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
+    start = stepper.released(replace(start))
+    dt = 2e-4
+    states = [step.state for step in stepper.steps(start, dt, 0.25)]
+    angles = np.array([-state.q[2] for state in states])
+    landed = np.interp(
+        0.0,
+        -angles[: int(np.argmin(angles > 0.0)) + 1],
+        [s.time for s in states][: int(np.argmin(angles > 0.0)) + 1],
+    )
+    radius, mass = np.hypot(0.3, 1.2), 2000.0 * 0.6 * 2.4
+    period = 4.0 * np.sqrt(2.0 * (4.0 / 3.0) * mass * radius**2 * theta / (mass * GRAVITY * 0.3))
+    assert period == pytest.approx(0.737, abs=5e-4)
+    assert 4.0 * landed == pytest.approx(period, rel=2e-3)

@@ -1,0 +1,148 @@
+"""The validation ring under its own weight: converged values, balance, invariances.
+
+@article{demirel2021, author={Demirel, I. O. and Aldemir, A.}, title={Simplified approach for seismic
+performance assessment of dry-joint masonry arch bridges}, journal={Buildings}, volume={11},
+year={2021}}
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archfem.materials import Contact, Material
+from archfem.models.build import build
+from archfem.shapes import circular_arch
+from archfem.statics import dead_load
+from archfem.structure import Structure
+
+CONVERGED = 0.2853
+"""Crown eccentricity that all rules approach, to four digits."""
+
+TRIAL = {  # cells, rule, points: crown eccentricity as found in an independent trial
+    (4, "nodal", None): 0.2948,
+    (8, "nodal", None): 0.2884,
+    (16, "nodal", None): 0.2860,
+    (4, "gauss", 3): 0.2857,
+    (4, "lobatto", 3): 0.2867,
+    (4, "lobatto", 4): 0.2849,
+    (2, "lobatto", 3): 0.2853,
+}
+
+
+@pytest.mark.parametrize("setting", TRIAL, ids=str)
+def test_crown_eccentricity(ring, setting):
+    cells, rule, points = setting
+    model = build(ring, cells=(cells, cells), quadrature=rule, points=points)
+    found = dead_load(model).joints
+    assert float(found["eccentricity"][8]) == pytest.approx(TRIAL[setting], abs=6e-5)
+
+
+@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
+def test_converges_under_refinement(ring, rule):
+    errors = []
+    for cells in (4, 8, 16):
+        found = dead_load(build(ring, cells=(cells, cells), quadrature=rule)).joints
+        errors.append(abs(float(found["eccentricity"][8]) - CONVERGED))
+    assert errors[-1] < 8e-4
+    assert errors[2] < 0.5 * errors[0]
+
+
+def test_dead_load_values(ring):
+    found = dead_load(build(ring, cells=(16, 16))).joints
+    assert float(found["eccentricity"][8]) == pytest.approx(CONVERGED, abs=1e-4)
+    assert float(found["eccentricity"][0]) == pytest.approx(0.124, abs=5e-4)
+    assert float(found["N"][8]) == pytest.approx(21.65e3, rel=1e-3)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+def test_every_block_is_in_balance(fidelity):
+    """Joint resultants and weight of each voussoir, forces and moments, to 1e-9 of the weight."""
+    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=4)
+    joints = dead_load(build(ring, fidelity=fidelity)).joints
+    for number in ring.free:
+        block = ring.blocks[number]
+        force = np.array([0.0, -block.area * block.material.unit_weight * ring.width])
+        turning = 0.0
+        for k, joint in enumerate(ring.joints):
+            if number not in joint.blocks:
+                continue
+            side = 1.0 if number == joint.higher else -1.0
+            normal, shear, e = (float(joints[key][k]) for key in ("N", "V", "eccentricity"))
+            push = side * (normal * ring.normals[k] - shear * joint.tangent)
+            arm = joint.middle + e * joint.depth * joint.tangent - block.centroid
+            force += push
+            turning += arm[0] * push[1] - arm[1] * push[0]
+        assert np.abs(force).max() < 1e-9 * ring.weight
+        assert abs(turning) < 1e-9 * ring.weight * ring.size
+
+
+def test_rigid_is_full_projected_on_rigid_motions():
+    """Same joint quadrature: BᵀMB and G B of the full model are the rigid model's own."""
+    from archfem.kinematics import motion_of
+
+    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
+    full, rigid = build(ring, cells=(3, 3)), build(ring, cells=(3, 3), fidelity="rigid")
+    places = full.shape.places
+    owner = np.full(len(places), -1)
+    for cell, block in zip(full.shape.cells, full.shape.owner, strict=True):
+        owner[cell] = block
+    basis = np.zeros((full.size, rigid.size))
+    for k, number in enumerate(ring.free):
+        own = np.flatnonzero(owner == number)
+        motion = motion_of(places[own], ring.blocks[number].centroid)
+        rows = (2 * own[:, None] + np.arange(2)).ravel()
+        basis[rows, 3 * k : 3 * k + 3] = motion.reshape(-1, 3)
+    mass = basis.T @ (full.mass @ basis)
+    assert np.abs(mass - rigid.mass.toarray()).max() < 1e-10 * np.abs(mass).max()
+    for rows, own in (
+        (full.joints.opening, rigid.joints.opening),
+        (full.joints.slip, rigid.joints.slip),
+    ):
+        assert np.abs(rows @ basis - own.toarray()).max() < 1e-11  # gmsh places nodes to 1e-12
+
+
+def test_full_approaches_rigid_as_stone_hardens():
+    """Elasticity's share falls as 1/E: to 1e-5 of e at a thousand times the modulus of stone."""
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17, "chords": 4}
+    rigid = dead_load(build(circular_arch(**given), fidelity="rigid")).joints["eccentricity"]
+    off = []
+    for factor in (10.0, 100.0, 1000.0):
+        hard = Material(factor * 30e9 / 10.0, 0.2, 20e3)
+        found = dead_load(build(circular_arch(**given, material=hard))).joints["eccentricity"]
+        off.append(float(abs(found - rigid).max()))
+    assert off[0] / off[1] == pytest.approx(10.0, rel=0.1)
+    assert off[1] / off[2] == pytest.approx(10.0, rel=0.1)
+    assert off[2] < 1e-5
+
+
+def test_results_per_width_do_not_depend_on_the_width(ring):
+    reference = dead_load(build(ring, fidelity="rigid")).joints
+    for width in (1e-3, 100.0):
+        found = dead_load(build(replace(ring, width=width), fidelity="rigid")).joints
+        assert np.abs(found["eccentricity"] - reference["eccentricity"]).max() < 1e-9
+        assert found["N"].values / width == pytest.approx(reference["N"].values, rel=1e-9)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+def test_numbering_changes_nothing_physical(ring, fidelity):
+    """Blocks renumbered at random and joints listed the other way round."""
+    order = np.random.default_rng(3).permutation(len(ring.blocks))
+    place = np.argsort(order)
+    joints = tuple(
+        replace(j, blocks=(int(place[j.blocks[1]]), int(place[j.blocks[0]]))) for j in ring.joints
+    )
+    shuffled = Structure(tuple(ring.blocks[k] for k in order), joints, ring.width, ring.gravity)
+    first = dead_load(build(ring, fidelity=fidelity)).joints
+    second = dead_load(build(shuffled, fidelity=fidelity)).joints
+    for key in ("N", "eccentricity", "friction"):
+        assert second[key].values == pytest.approx(first[key].values, rel=1e-7, abs=1e-9)
+
+
+def test_softer_joints_change_forces_little_and_displacements_in_proportion(ring):
+    """With k_n and k_s a hundred times less the stones are rigid beside them: q grows likewise."""
+    soft = Contact(1.48e7, 0.30e7)
+    loose = replace(ring, joints=tuple(replace(j, contact=soft) for j in ring.joints))
+    first = dead_load(build(ring, fidelity="rigid"))
+    second = dead_load(build(loose, fidelity="rigid"))
+    assert second.q == pytest.approx(100.0 * first.q, rel=1e-6, abs=1e-12)

@@ -1,0 +1,184 @@
+"""Time stepping: order of accuracy, energy, damping, equivalence of formulations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from orders import observed_order
+from scipy.linalg import eigh
+
+from archfem.dynamics import Stepper
+from archfem.errors import InvalidInput
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.schemes import HHT, Newmark, Rayleigh
+from archfem.statics import dead_load, self_weight
+
+STILL = Motion(np.zeros(2), 1.0)
+
+
+@pytest.fixture(scope="module")
+def model(ring):
+    return build(ring, fidelity="rigid")
+
+
+@pytest.fixture(scope="module")
+def dead(model):
+    return dead_load(model)
+
+
+def swinging(model, dead, mode):
+    """A start in one mode about the dead load, so small that no joint point changes status."""
+    tangent = model.tangent(dead.q)
+    squares, shapes = eigh(tangent.toarray(), model.mass.toarray())
+    stepper = Stepper(model, STILL)
+    state = stepper.at_rest(dead.q)
+    shape = 1e-9 * shapes[:, mode] / np.abs(shapes[:, mode]).max()
+    return stepper.released(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
+
+
+@pytest.mark.parametrize(
+    ("scheme", "bound"), [(Newmark(), 2e-3), (HHT(-0.1), 4e-3)], ids=["newmark", "hht"]
+)
+def test_second_order_in_time(model, dead, scheme, bound):
+    """Free vibration in the lowest mode against the cosine, over five periods.
+
+    The period error of average acceleration is (ω dt)²/12: 0.0021 of a period after five at 80
+    steps each, so the bound is about the theoretical value.
+    """
+    start, shape, omega = swinging(model, dead, 0)
+    end = 5.0 * 2.0 * np.pi / omega
+    errors, sizes = [], np.array([20, 40, 80])
+    for steps in 5 * sizes:
+        stepper = Stepper(model, STILL, scheme=scheme)
+        *_, last = stepper.steps(start, end / steps, end)
+        amplitude = shape @ (last.state.q - dead.q) / (shape @ shape)
+        velocity = shape @ last.state.velocity / (shape @ shape) / omega
+        errors.append(np.hypot(amplitude - 1.0, velocity))
+    theory = 5.0 * 2.0 * np.pi * (2.0 * np.pi / sizes[-1]) ** 2 / 12.0
+    assert observed_order(1.0 / sizes, errors)[-1] == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] < (1.05 if scheme.alpha == 0.0 else 2.5) * theory
+
+
+def energies(model, stepper, start, dt, end):
+    """Kinetic + potential energy less the work of weight, along a run."""
+    weight = self_weight(model)
+    found = []
+    for step in stepper.steps(start, dt, end):
+        state = step.state
+        kinetic = 0.5 * state.velocity @ (model.mass @ state.velocity)
+        found.append(kinetic + model.energy(state.q) - weight @ state.q)
+    return np.array(found)
+
+
+def test_energy_is_conserved_while_joints_stay_closed(model, dead):
+    start, _, omega = swinging(model, dead, 0)
+    dt = 2.0 * np.pi / omega / 20.0
+    energy = energies(model, Stepper(model, STILL), start, dt, 50.0 * dt)
+    rest = model.energy(dead.q) - self_weight(model) @ dead.q
+    kinetic = 0.5 * omega**2 * (start.q - dead.q) @ (model.mass @ (start.q - dead.q))
+    # Both are differences of energies near 10 J: their rounding is 1e-15 J.
+    assert np.ptp(energy) < 1e-6 * kinetic + 1e-13
+    assert energy[0] - rest == pytest.approx(kinetic, rel=1e-3, abs=1e-13)
+
+
+def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
+    """A push that opens joints: what the weight and the springs give is kept, but for O(dt²)."""
+    stepper = Stepper(model, STILL)
+    push = stepper.at_rest(dead.q)
+    velocity = np.zeros(model.size)
+    velocity[0::3] = 0.05
+    start = stepper.released(replace(push, velocity=velocity))
+    given = 0.5 * velocity @ (model.mass @ velocity)
+    drift = [
+        np.ptp(energies(model, Stepper(model, STILL), start, dt, 0.2)) / given
+        for dt in (5e-4, 2.5e-4)
+    ]
+    opened = ~model.joints.status(dead.q + 0.01 * velocity)
+    assert opened.any()
+    assert drift[0] < 0.02
+    assert drift[1] < 0.6 * drift[0]
+
+
+def test_work_of_the_ground_balances_energy(ring, model, dead):
+    """Undamped, joints closed: energy gained = work of -M r a_g, to the trapezoidal rule."""
+    times = np.arange(0.0, 0.5, 0.005)
+    motion = Motion(0.002 * np.sin(2.0 * np.pi * 4.0 * times), 0.005)
+    stepper = Stepper(model, motion)
+    start = stepper.at_rest(dead.q)
+    weight = self_weight(model)
+    states = [start] + [s.state for s in stepper.steps(start, 0.005, 0.49)]
+    force = [-model.body @ motion.at(s.time)[0] for s in states]
+    moved = [b.q - a.q for a, b in zip(states[:-1], states[1:], strict=True)]
+    work = sum(0.5 * (a + b) @ d for a, b, d in zip(force[:-1], force[1:], moved, strict=True))
+    kinetic = 0.5 * states[-1].velocity @ (model.mass @ states[-1].velocity)
+    stored = model.energy(states[-1].q) - model.energy(dead.q) - weight @ (states[-1].q - dead.q)
+    assert kinetic + stored == pytest.approx(work, rel=1e-3)
+
+
+def test_at_rest_stays_at_rest(model, dead):
+    stepper = Stepper(model, STILL, damping=Rayleigh(0.05, (8.0, 16.0)))
+    *_, last = stepper.steps(stepper.at_rest(dead.q), 0.005, 5.0)
+    assert np.abs(last.state.q - dead.q).max() < 1e-12
+
+
+def test_free_fall(stack):
+    """Ground that drops faster than g: nothing holds the blocks, which fall with g."""
+    model = build(stack, fidelity="rigid")
+    down = Motion(np.zeros(201), 0.001, np.full(201, -3.0 * 9.81))
+    stepper = Stepper(model, down)
+    steps = list(stepper.steps(stepper.at_rest(dead_load(model).q), 0.001, 0.2))
+    # Relative to the ground the blocks rise at 2 g once the compressed joints have let go.
+    late = steps[100:]
+    rate = np.diff([s.state.velocity[1] for s in late]) / 0.001
+    assert np.all(model.resultants(late[-1].contact)[:, 0] == 0.0)
+    assert rate == pytest.approx(2.0 * 9.81, rel=1e-9)
+
+
+@pytest.mark.parametrize("joints", ["closed", "initial", "none"])
+def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
+    """Logarithmic decrement of a closed structure; "none" leaves rigid blocks the mass part."""
+    model = build(stack, fidelity="rigid")
+    dead = dead_load(model)
+    start, shape, omega = swinging(model, dead, 0)
+    low = omega / 2.0 / np.pi
+    damping = Rayleigh(0.05, (low, 4.0 * low), joints)
+    stepper = Stepper(model, STILL, damping=damping)
+    dt = 2.0 * np.pi / omega / 400.0
+    steps = list(stepper.steps(start, dt, 400 * dt * 3.2))
+    found = np.array([shape @ (s.state.q - dead.q) / (shape @ shape) for s in steps])
+    peaks = [k for k in range(1, len(found) - 1) if found[k - 1] < found[k] > found[k + 1]]
+    decrement = np.log(found[peaks[0]] / found[peaks[1]])
+    ratio = decrement / np.hypot(2.0 * np.pi, decrement)
+    expected = 0.05 if joints != "none" else 0.05 * 4.0 / 5.0
+    assert ratio == pytest.approx(expected, rel=2e-3)
+
+
+def test_closed_and_initial_damping_differ_only_where_joints_open(stack):
+    model = build(stack, fidelity="rigid")
+    dead = dead_load(model)
+    for amplitude, same in ((0.2, True), (4.0, False)):
+        times = np.arange(0.0, 0.3, 0.005)
+        motion = Motion(amplitude * np.sin(2.0 * np.pi * 5.0 * times), 0.005)
+        ends = []
+        for joints in ("closed", "initial"):
+            stepper = Stepper(model, motion, damping=Rayleigh(0.05, (5.0, 40.0), joints))
+            *_, last = stepper.steps(stepper.at_rest(dead.q), 0.005, 0.25)
+            ends.append(last.state.q)
+        near = np.abs(ends[0] - ends[1]).max() < 1e-9 * np.abs(ends[0]).max()
+        assert near == same
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Rayleigh(5.0, (8.0, 16.0)), "ratio 5.0"),
+        (lambda: Rayleigh(0.05, (16.0, 8.0)), "lower one first"),
+        (lambda: Rayleigh(0.05, (8.0, 16.0), "open"), "joints = 'open'"),
+        (lambda: Newmark(0.0, 0.5), "not stable"),
+        (lambda: HHT(0.2), "HHT alpha 0.2"),
+    ],
+)
+def test_refusals(make, says):
+    with pytest.raises(InvalidInput, match=says):
+        make()
