@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -30,8 +31,7 @@ FEASIBLE = 1e-9
 CUT = 1e-7
 """Largest violation of the crushing limit accepted, as a fraction of the crushing force σ w h."""
 
-CUTS = 60
-"""Rounds of crushing cuts; each halves or squares the error, so a tenth is enough."""
+CUTS = 60  # rounds of crushing cuts; as tangents of a parabola they need about six
 
 
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
@@ -65,7 +65,7 @@ class RigidBlocks:
 
     structure: Structure
 
-    @cached_property
+    @property
     def force(self) -> float:
         """Unit of force in the programme: the mean weight of a free block [N]."""
         return self.structure.weight / len(self.structure.free)
@@ -181,7 +181,7 @@ def friction_limits(coefficient: Array, cohesion: Array) -> Limits:
     return Limits(rows, np.tile(cohesion, 2))
 
 
-def crushing_cuts(joints: Array, at: Array, crushing: Array) -> Limits:
+def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limits:
     """Tangents of the crushing limit |M| <= N h/2 - N²/(2 σ w), for given joints.
 
     A rectangular stress block of the full strength σ asks each end for F >= N²/(2 N_c) with

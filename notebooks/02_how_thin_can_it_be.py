@@ -108,8 +108,8 @@ capacity_figure(ring_capacity(embraces, ratios, voussoirs=20), {e: least_of(e) f
 #
 # - Seven voussoirs instead of 50: the ring may be 10 % thinner. Why does an arch with fewer joints
 #   need less?
-# - `contact=Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the springings slide
-#   before the arch is as thin as it could be.
+# - `contact=Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the
+#   springings slide before the arch is as thin as it could be.
 # - `strength=1 * MPa` in `minimum_thickness`, and a radius of 20 m: when does the strength of stone
 #   begin to matter?
 # - `chords=1` cuts the stones with straight faces. Which way does the least thickness go?
