@@ -61,6 +61,7 @@ class Motion:
         path: str | PathLike[str],
         *,
         vertical: str | PathLike[str] | None = None,
+        transverse: str | PathLike[str] | None = None,
         column: int | None = None,
         units: str | None = None,
         dt: float | None = None,
@@ -73,7 +74,8 @@ class Motion:
 
         Args:
             path: PEER AT2, AFAD, ESM/ITACA, COSMOS V2, CSMIP/CDMG V2, USGS SMC, K-NET, or columns.
-            vertical: second file that holds the vertical component alone.
+            vertical: second file, that holds the vertical component.
+            transverse: another file, that holds the other horizontal.
             column: take this component or plain column only, counted from 1.
             units: unit of plain columns: g, m/s2, cm/s2 or gal.
             dt: time between samples of plain columns [s].
@@ -83,7 +85,11 @@ class Motion:
         """
         channels = read_channels(path, column=column, units=units, dt=dt)
         motion = cls._from_channels(channels, Path(path))
-        return motion if vertical is None else motion.with_vertical(cls.read(vertical))
+        if vertical is not None:
+            motion = motion.with_vertical(cls.read(vertical, units=units, dt=dt))
+        if transverse is not None:
+            motion = motion.with_transverse(cls.read(transverse, units=units, dt=dt))
+        return motion
 
     @classmethod
     def _from_channels(cls, channels: list[Channel], path: Path) -> "Motion":
@@ -118,7 +124,7 @@ class Motion:
         dt: float = 0.005,
         vertical_ratio: float = 2.0 / 3.0,
     ) -> "Motion":
-        """Make an artificial accelerogram: Kanai-Tajimi noise under an envelope, without drift.
+        """Make an artificial accelerogram without drift: Kanai-Tajimi noise under an envelope.
 
         Args:
             duration: time of the last sample [s].
@@ -189,9 +195,7 @@ class Motion:
         both = np.zeros((len(moments), 2))
         for axis, name in enumerate(COMPONENTS[:2]):
             if name in self.components:
-                both[:, axis] = np.interp(
-                    moments, self.times(name), self.component(name), left=0.0, right=0.0
-                )
+                both[:, axis] = signals.between(self.component(name), moments / self.dt)
         return both
 
     def scaled(self, factor: float) -> "Motion":
@@ -257,14 +261,21 @@ class Motion:
         """Take the vertical of another motion, or the only component it has; None leaves it out."""
         if other is None:
             return replace(self, vertical=None)
+        self._check_step(other)
+        upright = other.horizontal if other.vertical is None else other.vertical
+        return replace(self, vertical=upright)
+
+    def with_transverse(self, other: "Motion") -> "Motion":
+        """Take the horizontal of another motion as the transverse."""
+        self._check_step(other)
+        return replace(self, transverse=other.horizontal)
+
+    def _check_step(self, other: "Motion") -> None:
         if not np.isclose(other.dt, self.dt, rtol=1e-6):
             raise InvalidInput(
-                f"the vertical has a step of {other.dt:g} s and the horizontal of {self.dt:g} s: "
+                f"{other.name!r} has a step of {other.dt:g} s and {self.name!r} of {self.dt:g} s: "
                 "bring one to the other's with resampled"
             )
-        return replace(
-            self, vertical=other.horizontal if other.vertical is None else other.vertical
-        )
 
     def _each(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
         changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}

@@ -134,6 +134,19 @@ def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
     return new
 
 
+def between(samples: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return values at places counted in samples (m,), straight in between and zero outside.
+
+    There is no search in it: a time stepper asks often.
+    """
+    last = len(samples) - 1
+    lower = np.clip(np.floor(places), 0, max(last - 1, 0)).astype(int)
+    part = np.minimum(places - lower, 1.0)
+    values = (1.0 - part) * samples[lower] + part * samples[np.minimum(lower + 1, last)]
+    # The last instant of a record may come out of a sum of steps a little late.
+    return np.where((places >= 0.0) & (places <= last + 1e-6), values, 0.0)
+
+
 def arias(samples: np.ndarray, dt: float) -> np.ndarray:
     """Return how Arias intensity grows: π/(2 g) ∫ a² dt (n,) [m/s], Arias (1970)."""
     energy = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)

@@ -56,18 +56,19 @@ def read(
 def _rows(text: RecordText) -> tuple[np.ndarray, str]:
     """Return the table of numbers (n, columns) and all comments in one string."""
     start = text.header_length()
-    comments, table, lines = list(text.lines[:start]), [], []
+    comments, table = list(text.lines[:start]), []
     for line in range(start, len(text.lines)):
         content = text.lines[line].strip()
         if content.startswith(("#", "%", "!", "*")):
             comments.append(content)
         elif content:
             table.append(text.row(line))
-            lines.append(line)
             if len(table[-1]) != len(table[0]):
                 raise text.error(
                     f"{len(table[-1])} columns where the first row has {len(table[0])}", line
                 )
+    if "." not in "".join(text.lines[start:]) and text.holds(r"\d,\d", len(text.lines), start):
+        raise text.error("these look like decimal commas: write points", start)
     text.check_end()
     return np.array(table), "\n".join(comments)
 

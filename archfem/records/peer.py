@@ -7,6 +7,9 @@ from archfem.records.text import NUMBER, RecordText, units_written
 
 _HEADER = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
+_BEFORE = re.compile(rf"\s*(\d+)[\s,]+({NUMBER})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE)
+_AFTER = re.compile(rf"\bNPTS[\s,]+DT\s*[=:]?\s*(\d+)[\s,]+({NUMBER})", re.IGNORECASE)
+
 
 def recognises(text: RecordText) -> bool:
     """Tell whether the header names both NPTS and DT."""
@@ -17,7 +20,7 @@ def read(text: RecordText) -> list[Channel]:
     """Read the one component of the file.
 
     The count and the step stand behind their names (`NPTS= 5437, DT= .0050 SEC`), in either order,
-    on one line or two, or before them (`4096 0.0100 NPTS, DT`).
+    on one line or two, or both before or after the names (`4096 0.0100 NPTS, DT`).
 
     Raises:
         InvalidInput: the header cannot be read, tells of no acceleration, or the count is wrong.
@@ -36,9 +39,9 @@ def read(text: RecordText) -> list[Channel]:
 def _count_and_step(text: RecordText) -> tuple[int, float, int]:
     """Return NPTS, DT [s] and the index of the last header line."""
     for line, content in enumerate(text.lines[:_HEADER]):
-        before = re.match(rf"\s*(\d+)\s+({NUMBER})\s+NPTS\s*,?\s*DT\b", content, re.IGNORECASE)
-        if before:
-            return int(before[1]), float(before[2]), line
+        together = _BEFORE.match(content) or _AFTER.search(content)
+        if together:
+            return int(together[1]), float(together[2]), line
     count_line, count = text.find(r"\bNPTS\s*[=:]?\s*(\d+)\b(?!\.)", stop=len(text.lines[:_HEADER]))
     step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER})", stop=len(text.lines[:_HEADER]))
     return int(count[1]), float(step[1]), max(count_line, step_line)

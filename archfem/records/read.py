@@ -1,5 +1,6 @@
 """Which format a record file has, told by its content."""
 
+from numbers import Real
 from os import PathLike
 
 from archfem.errors import InvalidInput
@@ -35,6 +36,8 @@ def read_channels(
     text = RecordText.opened(path)
     if units is not None:
         unit_named(units)
+    if not (dt is None or isinstance(dt, Real)) or not (column is None or isinstance(column, int)):
+        raise InvalidInput(f"dt {dt!r} is a number in seconds and column {column!r} a whole number")
     form = next((form for form in _FORMATS if form.recognises(text)), None)
     if form is None:
         return columns.read(text, column=column, units=units, dt=dt)

@@ -24,10 +24,10 @@ _ALIKE = 0.97  # share of numbers printed alike from which on the rest count as 
 
 # The order matters: the longer unit is tried first and blotted out before the next is looked for.
 _UNITS = (
-    (r"mm\s*/\s*s(?:ec)?(?:\s*/\s*s(?:ec)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-    (r"cm\s*/\s*s(?:ec)?(?:\s*/\s*s(?:ec)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
+    (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
+    (r"cm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
     (r"\bgals?\b", 1e-2),
-    (r"\bm\s*/\s*s(?:ec)?(?:\s*/\s*s(?:ec)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
+    (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
     (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
 )
 _NAMES = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
@@ -54,12 +54,12 @@ class RecordText:
         Raises:
             InvalidInput: there is no such file, it cannot be read, or it is not text.
         """
-        place = Path(path)
         try:
+            place = Path(path)
             content = place.read_bytes().rstrip(b"\x1a")  # what ends a text under DOS
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError) as error:
             reason = getattr(error, "strerror", None) or str(error)
-            raise InvalidInput(f"cannot read the record {place}: {reason}") from error
+            raise InvalidInput(f"cannot read the record {path}: {reason}") from error
         if b"\0" in content or not content.strip():
             kind = "not a text file" if content.strip() else "empty"
             raise InvalidInput(f"{place} is {kind}: give an accelerogram as text")

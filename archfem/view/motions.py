@@ -12,6 +12,7 @@ from archfem.motion import Motion
 from archfem.spectra import response_spectrum
 from archfem.suite import Suite
 from archfem.units import STANDARD_GRAVITY
+from archfem.view.style import COLUMN, HINGE, INK, LINES, NORMAL, SMALL, dress
 
 PERIODS = np.geomspace(0.02, 3.0, 150)
 """Periods at which spectra are drawn [s]."""
@@ -20,7 +21,7 @@ PERIODS = np.geomspace(0.02, 3.0, 150)
 def accelerogram(motion: Motion) -> Figure:
     """Draw acceleration, velocity and displacement, a column for each component of the motion."""
     names = motion.components
-    figure = Figure(figsize=(4.5 * len(names) + 1.0, 6.0), layout="constrained")
+    figure = Figure(figsize=(COLUMN * (0.4 + 0.6 * len(names)), 5.5), layout="constrained")
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (
@@ -30,10 +31,9 @@ def accelerogram(motion: Motion) -> Figure:
         )
         for axis, (values, label) in zip(column, rows, strict=True):
             _trace(axis, motion.times(name), values)
-            axis.set_ylabel(label)
-        column[0].set_title(name, fontsize="medium")
-        column[-1].set_xlabel("time [s]")
-    figure.suptitle(motion.name)
+            dress(axis, "time [s]" if axis is column[-1] else "", label)
+        column[0].set_title(name, fontsize=NORMAL)
+    figure.suptitle(motion.name, fontsize=NORMAL)
     return figure
 
 
@@ -50,9 +50,10 @@ def spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
     panels = [(name, members) for name, members in panels if members]
     figure, axes = _panels(len(panels))
     for axis, (name, members) in zip(axes, panels, strict=True):
-        for motion in members:
+        for index, motion in enumerate(members):
             values = response_spectrum(motion, PERIODS, damping, component=name)
-            axis.plot(PERIODS, values / STANDARD_GRAVITY, lw=1.0, label=motion.name)
+            colour = LINES[index % len(LINES)]
+            axis.plot(PERIODS, values / STANDARD_GRAVITY, colour, lw=1.0, label=motion.name)
         _label(axis, name)
     return figure
 
@@ -72,33 +73,39 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     figure, axes = _panels(len(names))
     for axis, name in zip(axes, names, strict=True):
         values = suite.spectra(PERIODS, component=name) / STANDARD_GRAVITY
-        for pair, row in zip(suite.pairs, values, strict=True):
-            axis.plot(PERIODS, row, lw=0.8, alpha=0.8, label=pair.name)
-        axis.plot(PERIODS, values.mean(axis=0), "k", lw=2.0, label="mean")
+        for index, (pair, row) in enumerate(zip(suite.pairs, values, strict=True)):
+            axis.plot(PERIODS, row, LINES[index % len(LINES)], lw=0.7, label=pair.name)
+        axis.plot(PERIODS, values.mean(axis=0), INK, lw=1.8, label="mean")
         if target is not None:
             aim = target.vertical if name == "vertical" else target.horizontal
-            axis.plot(PERIODS, aim(PERIODS), "r--", lw=2.0, label="target")
+            axis.plot(PERIODS, aim(PERIODS), HINGE, ls="--", lw=1.8, label="target")
         _label(axis, name)
-    figure.suptitle(suite.name)
+    figure.suptitle(suite.name, fontsize=NORMAL)
     return figure
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure(figsize=(6.0 * count, 4.5), layout="constrained")
+    figure = Figure(figsize=(0.75 * COLUMN * count, 3.6), layout="constrained")
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
 def _trace(axis: Axes, times: np.ndarray, values: np.ndarray) -> None:
     """Draw a time history and mark its peak."""
-    axis.plot(times, values, lw=0.7)
+    axis.plot(times, values, LINES[0], lw=0.7)
     top = int(np.argmax(np.abs(values)))
-    axis.plot(times[top], values[top], "o", ms=4, color="tab:red")
-    axis.annotate(f"{values[top]:.3g}", (times[top], values[top]), fontsize="small")
-    axis.grid(alpha=0.3)
+    axis.plot(times[top], values[top], "o", ms=3.5, color=HINGE)
+    axis.annotate(
+        f"{values[top]:.3g}",
+        (times[top], values[top]),
+        xytext=(5, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=SMALL,
+    )
 
 
 def _label(axis: Axes, component: str) -> None:
-    axis.set(xlabel="period [s]", ylabel="spectral acceleration [g]", title=component)
+    dress(axis, "period [s]", "spectral acceleration [g]")
+    axis.set_title(component, fontsize=NORMAL)
     axis.set_ylim(bottom=0.0)
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize="x-small")
+    axis.legend(fontsize=SMALL, frameon=False)
