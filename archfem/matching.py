@@ -20,6 +20,7 @@ _CONTROLS = 100  # oscillators whose peaks are corrected, evenly spaced in log p
 _CHECKS = 150  # periods at which the misfit is taken, between the others
 _ROUNDS = 30  # of correction at most
 _DAMPED = 0.003  # weight of small corrections, relative to the largest singular value
+_PEAK = 0.25  # weight of the misfit of the peak acceleration: 10 % count as 2.5 % of the band
 _REACH = 4.5  # widths after which a wavelet has faded to 2e-9
 
 
@@ -58,7 +59,8 @@ def matched(
 
     with the target S_i. The wavelets are those of Al Atik and Abrahamson in width, but made as
     second differences of a displacement, a cosine under a Gauss bell that vanishes at the ends of
-    the record: velocity and displacement end where they did, to round-off. Horizontals go to the
+    the record: velocity and displacement end where they did, to round-off. Where the spectrum
+    begins at period zero, the peak acceleration is corrected with them. Horizontals go to the
     horizontal spectrum, the vertical to the vertical one.
 
     Args:
@@ -150,11 +152,31 @@ class _Goal:
     ) -> None:
         self.damping = damping
         self.enough = enough
-        self.periods = np.geomspace(*band, _CONTROLS)
+        controls = np.geomspace(*band, _CONTROLS)
+        self.periods = np.concatenate((_rigid(target), controls))
         self.values = target(self.periods) * STANDARD_GRAVITY
         self.checks = np.geomspace(*band, _CHECKS)
         self.check_values = target(self.checks) * STANDARD_GRAVITY
         self.lags = np.array([_lag(period, damping) for period in self.periods])
+        # The ground's own peak is corrected with the shortest wavelet of the band.
+        self.wave_periods = np.maximum(self.periods, band[0])
+
+    def distance(self, samples: np.ndarray, dt: float, peaks: np.ndarray) -> float:
+        """Return how far samples with these peaks are from the goal [-]."""
+        found = oscillator.peak_responses(samples, dt, self.checks, self.damping)[0]
+        apart = _apart(np.abs(found), self.check_values)
+        if self.periods[0] > 0.0:
+            return apart
+        return max(apart, _PEAK * abs(abs(peaks[0]) / self.values[0] - 1.0))
+
+
+def _rigid(target: Target) -> np.ndarray:
+    """Return period zero, or nothing where a spectrum is not defined there."""
+    try:
+        target(np.zeros(1))
+    except InvalidInput:
+        return np.zeros(0)
+    return np.zeros(1)
 
 
 def _fitted(samples: np.ndarray, dt: float, goal: _Goal) -> np.ndarray:
@@ -166,8 +188,7 @@ def _fitted(samples: np.ndarray, dt: float, goal: _Goal) -> np.ndarray:
         if round_ == 0:
             factor = np.exp(np.mean(np.log(goal.values / np.abs(peaks))))
             current, peaks = factor * current, factor * peaks
-        found = oscillator.peak_responses(current, dt, goal.checks, goal.damping)[0]
-        now = _apart(np.abs(found), goal.check_values)
+        now = goal.distance(current, dt, peaks)
         if now < least:
             best, least = current, now
         if least < goal.enough:
@@ -183,7 +204,7 @@ def _correction(
     waves = np.stack(
         [
             _wavelet(period, centre, dt, count)
-            for period, centre in zip(goal.periods, times - goal.lags, strict=True)
+            for period, centre in zip(goal.wave_periods, times - goal.lags, strict=True)
         ]
     )
     gains = np.stack(
@@ -220,6 +241,8 @@ def _wavelet(period: float, centre: float, dt: float, count: int) -> np.ndarray:
 
 def _memory(period: float, time: float, dt: float, count: int, damping: float) -> np.ndarray:
     """Return what the acceleration at each sample adds to an oscillator's response at a time."""
+    if period == 0.0:
+        return (np.arange(count) == round(time / dt)).astype(float)
     omega = 2.0 * np.pi / period
     damped = omega * np.sqrt(1.0 - damping**2)
     ago = time - np.arange(min(int(time / dt) + 1, count)) * dt
@@ -231,6 +254,8 @@ def _memory(period: float, time: float, dt: float, count: int, damping: float) -
 
 def _lag(period: float, damping: float) -> float:
     """Return the time from a wavelet's centre to the peak of its oscillator [s]."""
+    if period == 0.0:
+        return 0.0
     dt = period / 100.0
     centre = _REACH * 1.178 * period**0.93
     count = int(2.0 * centre / dt)
