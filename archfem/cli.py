@@ -12,6 +12,8 @@ from archfem.case import Case
 from archfem.errors import ArchfemError, DidNotConverge
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from archfem.history import History
     from archfem.statics import Equilibrium
 
@@ -192,9 +194,9 @@ def _draw_run(case: Case, run: "History", dead: "Equilibrium", folder: Path) -> 
         print(f"wrote {animate(dead.model, run, folder / 'hinges.mp4')}")
 
 
-def _gravest(run: "History"):  # type: ignore[no-untyped-def]
+def _gravest(run: "History") -> "xr.Dataset":
     """Joints at the instant of the first mechanism, or of the largest eccentricity."""
     if run.mechanism is not None:
         return run.joints.sel(time=run.mechanism.time, method="nearest")
     worst = abs(run.joints["eccentricity"]).max("joint")
-    return run.joints.isel(time=int(worst.argmax()))
+    return run.joints.isel(time=int(worst.argmax("time")))

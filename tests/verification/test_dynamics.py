@@ -1,6 +1,7 @@
 """Time stepping: order of accuracy, energy, damping, equivalence of formulations."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -109,7 +110,7 @@ def test_work_of_the_ground_balances_energy(ring, model, dead):
     weight = self_weight(model)
     states = [start] + [s.state for s in stepper.steps(start, 0.005, 0.49)]
     force = [-model.body @ motion.at(s.time)[0] for s in states]
-    moved = [b.q - a.q for a, b in zip(states[:-1], states[1:], strict=True)]
+    moved = [b.q - a.q for a, b in pairwise(states)]
     work = sum(0.5 * (a + b) @ d for a, b, d in zip(force[:-1], force[1:], moved, strict=True))
     kinetic = 0.5 * states[-1].velocity @ (model.mass @ states[-1].velocity)
     stored = model.energy(states[-1].q) - model.energy(dead.q) - weight @ (states[-1].q - dead.q)

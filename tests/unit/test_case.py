@@ -1,0 +1,146 @@
+"""Case files and the command line: what is understood, what is refused and how."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archfem.case import Case
+from archfem.cli import main
+from archfem.errors import InvalidInput, InvalidStructure
+from archfem.history import History
+from archfem.quantities import in_unit
+from archfem.schemes import HHT
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+
+
+def test_quantities():
+    assert in_unit("1.48 MPa/mm", "Pa/m", "k") == pytest.approx(1.48e9)
+    assert in_unit("20 kN/m^3", "N/m**3", "weight") == pytest.approx(20e3)
+    assert in_unit(159, "degree", "embrace") == 159.0
+    assert in_unit("0.5 g_0", "m/s**2", "pga") == pytest.approx(0.5 * 9.80665)
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        ("2 kg", "not in a unit like m"),
+        ("two", "not a quantity"),
+        ("2 furlonks", "not a quantity"),
+        ("(", "not a quantity"),
+        (float("nan"), "not finite"),
+        ("nan m", "not finite"),
+        (True, "not a number"),
+        ([1.0], "not a number"),
+    ],
+)
+def test_what_is_no_quantity(value, says):
+    with pytest.raises(InvalidInput, match=f"key = .*{says}"):
+        in_unit(value, "m", "key")
+
+
+def test_shipped_case():
+    case = Case.read(RING)
+    assert case.structure.joints[8].depth == pytest.approx(0.55)
+    assert case.structure.joints[0].contact.normal_stiffness == pytest.approx(1.48e9)
+    assert case.damping.frequencies == (8.0, 16.0)
+    assert case.ground_motion().pga == pytest.approx(5.5)
+    assert Case.of(tomllib.loads(case.text())).structure == case.structure
+
+
+def test_changes_from_the_command_line():
+    changes = ["structure.thickness=0.6", "analysis.scheme=hht", "motion.scale=0.5", "title=x y"]
+    case = Case.read(RING, changes)
+    assert case.structure.joints[0].depth == pytest.approx(0.6)
+    assert case.scheme == HHT()
+    assert case.title == "x y"
+    assert case.ground_motion().pga == pytest.approx(2.75)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("structure.radus=3", "unknown key 'structure.radus': did you mean 'radius'"),
+        ("structre.radius=3", "unknown key 'structre': did you mean 'structure'"),
+        ("structure.radius='3 s'", r"structure.radius = '3 s' is not in a unit like m"),
+        ("structure.voussoirs=1.5", "structure.voussoirs = 1.5 is not a whole number"),
+        ("structure.shape=cone", "structure.shape = 'cone' is not known"),
+        ("structure.material=jelly", "'jelly' is not among the materials"),
+        ("materials.jelly={young=1e9}", None),
+        ("model.cells=4", r"model.cells = 4 is not a list"),
+        ("analysis.damping={ratio=0.05}", "give a ratio and two frequencies"),
+        ("analysis.scheme=euler", "use 'newmark', or 'hht'"),
+        ("analysis.halt=maybe", "not true or false"),
+        ("structure=3", "structure = 3 is not a table"),
+        ("nonsense", "write section.key=value"),
+        ("title.x=3", "title is not a table"),
+    ],
+)
+def test_refusals_name_the_key(change, says):
+    if says is None:
+        Case.read(RING, [change])  # a material nobody uses is not looked at
+        return
+    with pytest.raises(InvalidInput, match=says):
+        Case.read(RING, [change])
+
+
+def test_geometry_errors_name_the_file():
+    with pytest.raises(InvalidStructure, match=r"ring.toml: thickness 9 m"):
+        Case.read(RING, ["structure.thickness=9"])
+
+
+def test_motion_must_be_one_thing():
+    with pytest.raises(InvalidInput, match="either a file, or synthetic"):
+        Case.read(RING, ["motion.file=x.AT2"]).ground_motion()
+    with pytest.raises(InvalidInput, match=r"x\.AT2"):
+        Case.of({**Case.read(RING).settings, "motion": {"file": "x.AT2"}}).ground_motion()
+
+
+def test_files_that_are_no_case(tmp_path):
+    with pytest.raises(InvalidInput, match="no case file"):
+        Case.read(tmp_path / "none.toml")
+    bad = tmp_path / "bad.toml"
+    bad.write_text("= 3")
+    with pytest.raises(InvalidInput, match="is not TOML"):
+        Case.read(bad)
+
+
+def test_check_command(capsys):
+    assert main(["check", str(RING), "--set", "model.fidelity=rigid"]) == 0
+    assert "ready" in capsys.readouterr().out
+    assert main(["check", str(RING), "--set", "structure.radus=3"]) == 1
+    assert "did you mean 'radius'" in capsys.readouterr().err
+
+
+def test_run_command(tmp_path, capsys):
+    changes = ["model.fidelity=rigid", "motion.end=2", "output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert main(["run", str(RING), "--out", str(tmp_path / "out"), *given]) == 0
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert made == {
+        "case.toml",
+        "dead.png",
+        "history.nc",
+        "summary.txt",
+        "gravest.png",
+        "envelope.png",
+        "joints.png",
+    }
+    run = History.read(tmp_path / "out" / "history.nc")
+    assert run.time[-1] == pytest.approx(2.0)
+    assert Case.of(tomllib.loads(run.dataset.attrs["case"])).model["fidelity"] == "rigid"
+    assert "joint 17" in capsys.readouterr().out
+
+
+def test_run_of_a_ring_that_falls(tmp_path, capsys):
+    given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
+    assert main(["run", str(RING), "--out", str(tmp_path), *given]) == 1
+    assert "no equilibrium" in capsys.readouterr().err
+
+
+def test_mesh_command(tmp_path):
+    path = tmp_path / "ring.msh"
+    assert main(["mesh", str(RING), "--out", str(path), "--set", "model.cells=[2, 2]"]) == 0
+    assert np.any(["voussoir 3" in line for line in path.read_text().splitlines()])

@@ -1,0 +1,185 @@
+"""Whole runs: what is recorded, events, interruption, restart, files."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+import xarray as xr
+
+from archfem.dynamics import Stepper
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.history import History
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.runs import CountedMechanism, Record, last_state, time_history
+from archfem.schemes import HHT, Rayleigh
+from archfem.statics import dead_load
+
+DAMPING = Rayleigh(0.05, (8.0, 16.0))
+
+
+@pytest.fixture(scope="module")
+def model(ring):
+    return build(ring, fidelity="rigid")
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return Motion.synthetic(duration=3.0, pga=6.0, seed=2)
+
+
+@pytest.fixture(scope="module")
+def run(model, motion):
+    return time_history(model, motion, damping=DAMPING, record=Record(fields_every=50))
+
+
+def test_what_is_recorded(run, model, motion):
+    assert run.joints["eccentricity"].dims == ("time", "joint")
+    assert run.joints.sizes == {"time": 601, "joint": 18}
+    assert run.time[-1] == pytest.approx(3.0)
+    assert run.dataset["q"].shape == (13, model.size)
+    assert run.dataset["ground"].values == pytest.approx(motion.at(run.time))
+    assert run.outcome == "reached the end of the motion"
+    assert "archfem" in run.dataset.attrs["versions"]
+    assert "extrados" in run.dataset.attrs["signs"]
+
+
+def test_the_first_record_is_the_dead_load(run, model):
+    dead = dead_load(model).joints
+    assert run.joints["N"][0].values == pytest.approx(dead["N"].values, rel=1e-9)
+
+
+def test_fields_are_kept_only_on_demand(model, motion):
+    short = time_history(model, motion.cut(0.0, 0.5), damping=DAMPING, record=Record(every=10))
+    assert "q" not in short.dataset
+    assert short.joints.sizes["time"] == 11
+
+
+def test_every_third_step_is_the_same_run(run, model, motion):
+    sparse = time_history(model, motion, damping=DAMPING, record=Record(every=3))
+    assert sparse.joints["M"].values == pytest.approx(run.joints["M"].values[::3], abs=1e-6)
+
+
+def test_an_event_ends_the_run(run, model, motion):
+    assert run.mechanism is not None
+    halted = time_history(model, motion, damping=DAMPING, until=CountedMechanism())
+    assert halted.time[-1] == pytest.approx(run.mechanism.time)
+    assert "a mechanism: joints" in halted.outcome
+    assert halted.mechanism == run.mechanism
+
+
+def test_a_run_goes_on_where_it_stopped(run, model, motion):
+    first = time_history(model, motion.cut(0.0, 1.5), damping=DAMPING)
+    second = time_history(model, motion, damping=DAMPING, start=last_state(first))
+    assert second.time[0] == pytest.approx(1.5)
+    whole = run.joints["M"].sel(time=slice(1.499, None)).values
+    assert second.joints["M"].values == pytest.approx(whole, rel=1e-6, abs=1e-3)
+
+
+def test_file_and_back(run, tmp_path):
+    path = run.save(tmp_path / "deep" / "run.nc")
+    again = History.read(path)
+    assert again.joints["eccentricity"].equals(run.joints["eccentricity"])
+    assert again.mechanism == run.mechanism
+    with xr.open_dataset(path) as plain:
+        assert plain["N"].attrs["units"] == "N"
+        assert plain.attrs["outcome"] == run.outcome
+    assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
+
+
+def test_a_failed_write_leaves_the_old_file(run, tmp_path, monkeypatch):
+    path = run.save(tmp_path / "run.nc")
+    before = path.read_bytes()
+
+    def fail(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OSError, match="disk full"):
+        run.save(path)
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_files_that_are_no_history(tmp_path):
+    with pytest.raises(InvalidInput, match="no history file"):
+        History.read(tmp_path / "none.nc")
+    bad = tmp_path / "bad.nc"
+    bad.write_text("nothing")
+    with pytest.raises(InvalidInput, match="not a NetCDF file"):
+        History.read(bad)
+    other = tmp_path / "other.nc"
+    xr.Dataset({"N": ("x", [1.0])}).to_netcdf(other)
+    with pytest.raises(InvalidInput, match="not a time history"):
+        History.read(other)
+
+
+def test_ctrl_c_keeps_what_was_computed():
+    script = textwrap.dedent("""
+        import os, signal, threading
+        import archfem as af
+        ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+        model = af.build(ring, fidelity="rigid")
+        motion = af.Motion.synthetic(duration=2000.0, pga=3.0, seed=2)
+        dead = af.dead_load(model)
+        threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+        run = af.time_history(model, motion, start=dead, damping=af.Rayleigh(0.05, (8.0, 16.0)))
+        assert "interrupted at" in run.outcome, run.outcome
+        assert 0.1 < run.time[-1] < 1999.0
+        assert run.joints["N"].notnull().all()
+    """)
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_failure_carries_the_history(model, motion, monkeypatch):
+    real = Stepper._try
+
+    def failing(self, state, dt):
+        if state.time > 0.2:
+            raise DidNotConverge("made to fail")
+        return real(self, state, dt)
+
+    monkeypatch.setattr(Stepper, "_try", failing)
+    with pytest.raises(DidNotConverge, match="made to fail") as caught:
+        time_history(model, motion, damping=DAMPING)
+    assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
+    assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
+    assert "failed at" in caught.value.history.outcome
+
+
+def test_a_step_that_fails_is_halved(model, motion, monkeypatch):
+    real = Stepper._try
+
+    def failing(self, state, dt):
+        if 0.2 < state.time < 0.21 and dt > 0.002:
+            raise DidNotConverge("made to fail")
+        return real(self, state, dt)
+
+    monkeypatch.setattr(Stepper, "_try", failing)
+    found = time_history(model, motion.cut(0.0, 0.4), damping=DAMPING)
+    smallest = found.dataset["smallest_step"].values
+    assert smallest.min() == pytest.approx(0.00125)
+    assert found.time[-1] == pytest.approx(0.4)
+
+
+def test_hht_damps_less_than_it_changes(model, motion):
+    """At α = -0.05 the largest eccentricity stays within 5 % of average acceleration's."""
+    weak = motion.scaled(0.3)
+    peaks = [
+        float(
+            abs(time_history(model, weak, damping=DAMPING, scheme=s).joints["eccentricity"]).max()
+        )
+        for s in (None, HHT(-0.05))
+    ]
+    assert peaks[0] == pytest.approx(peaks[1], rel=0.05)
+
+
+def test_refusals(model, motion):
+    with pytest.raises(InvalidInput, match=r"dt 0\.5 s"):
+        time_history(model, motion, dt=0.5)
+    with pytest.raises(InvalidInput, match="record every = 0"):
+        Record(every=0)
