@@ -1,0 +1,91 @@
+"""What the blocks in a film are coloured by, and on which scale."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.colors import Colormap, LinearSegmentedColormap
+
+from archfem.errors import InvalidInput
+from archfem.models.shape import Shape
+from archfem.structure import Array
+from archfem.units import MPa, mm
+from archfem.view.style import STONE
+
+COLOURS = ("displacement", "stress")
+"""What blocks can be coloured by."""
+
+CUT = 0.5
+"""Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
+take all of it."""
+
+LIGHT_TO_DARK = LinearSegmentedColormap.from_list(
+    "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
+)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """From a number to a colour.
+
+    Attributes:
+        colour: one of `COLOURS`.
+        label: of the colour bar, with its unit.
+        shades: from low to high.
+        low: end of the scale.
+        high: end of the scale.
+        extend: at which end values beyond the scale occur, as colour bars call it.
+    """
+
+    colour: str
+    label: str
+    shades: Colormap
+    low: float
+    high: float
+    extend: str
+
+
+def check_colour(shape: Shape, colour: str) -> None:
+    """Refuse what blocks cannot be coloured by.
+
+    Raises:
+        InvalidInput: the colour is not known, or rigid blocks are to show stress.
+    """
+    if colour not in COLOURS:
+        raise InvalidInput(f"colour '{colour}' is not known: use one of {COLOURS}")
+    if colour == "stress" and shape.stress is None:
+        raise InvalidInput(
+            "rigid blocks have no stress: use colour='displacement', or build and run the model "
+            "with fidelity='full'"
+        )
+
+
+def shade(shape: Shape, q: Array, colour: str) -> Array:
+    """What the blocks are coloured by.
+
+    Args:
+        shape: of the model.
+        q: coordinates (n,).
+        colour: "displacement", the length of it at every point [mm], or "stress", the least
+            principal one of every cell, compression negative [MPa].
+    """
+    if colour == "displacement":
+        return np.linalg.norm(shape.displacement(q), axis=1) / mm
+    across, up, shear = (shape.stress @ q).reshape(-1, 3).T / MPa
+    return 0.5 * (across + up) - np.hypot(0.5 * (across - up), shear)
+
+
+def scale_for(shape: Shape, fields: Array, colour: str) -> Scale:
+    """Choose a scale that suits a whole film.
+
+    Args:
+        shape: of the model.
+        fields: coordinates (frames, n).
+        colour: one of `COLOURS`.
+    """
+    found = np.array([shade(shape, q, colour) for q in fields])
+    if colour == "displacement":
+        highest = float(found.max()) or 1.0
+        return Scale(colour, "displacement [mm]", LIGHT_TO_DARK, 0.0, highest, "neither")
+    lowest = min(float(np.percentile(found, CUT)), -1e-6)
+    label, shades = "least principal stress [MPa]", LIGHT_TO_DARK.reversed()
+    return Scale(colour, label, shades, lowest, 0.0, "min")

@@ -1,0 +1,247 @@
+"""A structure in front of a camera: moved, photographed, and moved again."""
+
+import os
+import sys
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from archfem.models import Model
+from archfem.models.shape import Shape
+from archfem.structure import Array
+from archfem.view.marks import Marks
+from archfem.view.shades import Scale, scale_for, shade
+from archfem.view.style import EDGE, HINGE, SLIP, SUPPORT, THRUST
+
+Image = NDArray[np.uint8]
+
+SWING = 0.06
+"""Largest displacement in a picture, relative to the size of the structure."""
+
+DISC = 0.0125
+"""Radius of a hinge in a picture, relative to the size of the structure."""
+
+MARGIN = 0.02
+"""Room around the structure, relative to its size."""
+
+TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
+
+EDGES, PAST, HALO, LINE, ARROWS, RIMS, HINGES = range(1, 8)
+"""Layers of a picture, from the blocks upwards."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What stays the same over a whole film.
+
+    Attributes:
+        model: what is filmed.
+        magnification: of its displacements [-].
+        scale: from a number to a colour.
+        low: lower left corner of what is seen (2,) [m].
+        high: upper right corner of what is seen (2,) [m].
+    """
+
+    model: Model
+    magnification: float
+    scale: Scale
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
+        """Choose a scale, a magnification where none is given, and a view that fits all frames.
+
+        Args:
+            model: what is filmed.
+            fields: coordinates (frames, n).
+            colour: one of `COLOURS`.
+            magnification: of displacements, or None.
+        """
+        shape, structure = model.shape, model.structure
+        moves = np.array([shape.displacement(q) for q in fields])
+        by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
+        still = [block.drawn() for block in structure.blocks if block.fixed]
+        moved = shape.places + by * moves
+        points = np.concatenate([*still, shape.places, moved.min(axis=0), moved.max(axis=0)])
+        room = MARGIN * structure.size
+        scale = scale_for(shape, fields, colour)
+        return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
+
+
+def _magnification(displacement: float) -> float:
+    """One of 1, 2, 5, 10, … that brings a relative displacement nearest to `SWING`."""
+    if displacement * 1.5 >= SWING or displacement == 0.0:
+        return 1.0
+    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])
+
+
+class Stage:
+    """Blocks, supports and marks before a camera that looks along -z.
+
+    Use it as a context: leaving it frees what VTK holds.
+    """
+
+    def __init__(self, setting: Setting, size: tuple[int, int]) -> None:
+        _go_headless()
+        self._setting = setting
+        shape = setting.model.shape
+        self._height = 1e-3 * setting.model.structure.size
+        self._blocks = _surface(shape)
+        self._outlines = _lines(self._flat(shape.places, EDGES), _outlines(shape))
+        self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
+        self._plotter.set_background("white")
+        self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
+        self._paint(np.zeros(setting.model.size))
+        self._plotter.add_mesh(
+            self._blocks,
+            scalars="shade",
+            cmap=setting.scale.shades,
+            clim=(setting.scale.low, setting.scale.high),
+            lighting=False,
+            show_scalar_bar=False,
+        )
+        self._build()
+        self._aim(size)
+
+    def __enter__(self) -> Self:
+        """The stage itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Free the plotter."""
+        self._plotter.close()
+
+    def photograph(self, q: Array, marks: Marks, past: Array) -> Image:
+        """Move the structure and take a picture (height, width, 3).
+
+        Args:
+            q: coordinates (n,).
+            marks: of the joints, as moved.
+            past: where hinges have been, as moved (n, 2) [m].
+        """
+        setting, shape = self._setting, self._setting.model.shape
+        places = shape.places + setting.magnification * shape.displacement(q)
+        self._blocks.points = self._flat(places, 0)
+        self._outlines.points = self._flat(places, EDGES)
+        self._paint(q)
+        line = np.isfinite(marks.thrust[:, 0])
+        segments = np.flatnonzero(line[:-1] & line[1:])[:, None] + [0, 1]
+        points = np.nan_to_num(marks.thrust)
+        self._meshes["halo"].dataset = _lines(self._flat(points, HALO), segments)
+        self._meshes["thrust"].dataset = _lines(self._flat(points, LINE), segments)
+        self._meshes["dots"].dataset = self._discs(marks.thrust[line], LINE, 0.35)
+        self._meshes["past"].dataset = self._discs(past, PAST, 1.0)
+        self._meshes["slips"].dataset = self._polygons(marks.slips, ARROWS)
+        self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
+        self._meshes["hinges"].dataset = self._discs(marks.hinges, HINGES, 1.0)
+        self._plotter.render()
+        return self._plotter.screenshot(return_img=True)
+
+    def _build(self) -> None:
+        """Put everything on the stage, marks still empty."""
+        fixed = [block.drawn() for block in self._setting.model.structure.blocks if block.fixed]
+        for outline in fixed:
+            self._add(self._polygons(outline[None], 0).triangulate(), SUPPORT)
+            around = np.arange(len(outline))
+            edges = np.column_stack([around, np.roll(around, -1)])
+            self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
+        self._add(self._outlines, EDGE, 1.5)
+        self._meshes = {
+            "past": self._add(pv.PolyData(), HINGE, opacity=0.3),
+            "halo": self._add(pv.PolyData(), "white", 6.0),
+            "thrust": self._add(pv.PolyData(), THRUST, 3.0),
+            "dots": self._add(pv.PolyData(), THRUST),
+            "slips": self._add(pv.PolyData(), SLIP),
+            "rims": self._add(pv.PolyData(), "white"),
+            "hinges": self._add(pv.PolyData(), HINGE),
+        }
+
+    def _paint(self, q: Array) -> None:
+        """Give the blocks the values by which they are coloured."""
+        scale = self._setting.scale
+        shades = shade(self._setting.model.shape, q, scale.colour)
+        if scale.colour == "stress":
+            self._blocks.cell_data["shade"] = shades[self._blocks.cell_data["cell"]]
+        else:
+            self._blocks.point_data["shade"] = shades
+
+    def _add(
+        self, mesh: pv.PolyData, colour: str, width: float = 1.0, opacity: float = 1.0
+    ) -> pv.DataSetMapper:
+        """Add a mesh, which may be empty, in one flat colour."""
+        mapper = pv.DataSetMapper(mesh)
+        actor = pv.Actor(mapper=mapper)
+        actor.prop.color, actor.prop.opacity = colour, opacity
+        actor.prop.line_width, actor.prop.lighting = width, False
+        self._plotter.add_actor(actor, render=False)
+        return mapper
+
+    def _aim(self, size: tuple[int, int]) -> None:
+        """Look at all of the view, from the front, without perspective."""
+        low, high = self._setting.low, self._setting.high
+        middle, extent = 0.5 * (low + high), high - low
+        camera = self._plotter.camera
+        camera.focal_point = (*middle, 0.0)
+        camera.position = (*middle, 2.0 * self._setting.model.structure.size)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_projection = True
+        camera.parallel_scale = 0.5 * max(extent[1], extent[0] * size[1] / size[0])
+        self._plotter.reset_camera_clipping_range()
+
+    def _flat(self, points: Array, layer: float) -> Array:
+        """Points of the plane, in a layer of the picture (n, 3) [m]."""
+        return np.column_stack([points, np.full(len(points), layer * self._height)])
+
+    def _polygons(self, outlines: Array, layer: float) -> pv.PolyData:
+        """Polygons of equally many corners (n, corners, 2)."""
+        if not len(outlines):
+            return pv.PolyData()
+        count, corners = outlines.shape[:2]
+        numbers = np.arange(count * corners).reshape(count, corners)
+        points = self._flat(outlines.reshape(-1, 2), layer)
+        return pv.PolyData.from_regular_faces(points, numbers)
+
+    def _discs(self, centres: Array, layer: float, size: float) -> pv.PolyData:
+        """Discs about points (n, 2), of a size relative to a hinge's."""
+        radius = size * DISC * self._setting.model.structure.size
+        return self._polygons(centres[:, None] + radius * CIRCLE, layer)
+
+
+def _go_headless() -> None:
+    """Let VTK draw without a display where there is none."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def _surface(shape: Shape) -> pv.PolyData:
+    """The blocks' cells, cut into triangles that know the number of their cell."""
+    listed = np.concatenate([[len(cell), *cell] for cell in shape.cells])
+    places = np.column_stack([shape.places, np.zeros(len(shape.places))])
+    surface = pv.PolyData(places, faces=listed)
+    surface.cell_data["cell"] = np.arange(len(shape.cells))
+    return surface.triangulate()
+
+
+def _outlines(shape: Shape) -> Array:
+    """Edges around each block: those of one of its cells only (n, 2)."""
+    edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in shape.cells])
+    edges, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return edges[count == 1]
+
+
+def _lines(points: Array, pairs: Array) -> pv.PolyData:
+    """Straight lines between pairs of points (n, 3)."""
+    twos = np.full(len(pairs), 2)
+    return pv.PolyData(points, lines=np.column_stack([twos, pairs]).ravel())
