@@ -94,7 +94,7 @@ def matched(
         fine = oscillator.interpolated(samples, parts)
         changed[component] = _fitted(fine, motion.dt / parts, goal)
     result = replace(motion, dt=motion.dt / parts, **changed)
-    match = _compared(motion, result, spectrum, band, damping)
+    match = _compared(motion, result, spectrum, band=band, damping=damping)
     worst = max(match.misfit.values())
     if worst > tolerance:
         raise DidNotConverge(
@@ -128,6 +128,7 @@ def _compared(
     before: Motion,
     after: Motion,
     spectrum: DesignSpectrum,
+    *,
     band: tuple[float, float],
     damping: float,
 ) -> Match:
@@ -193,12 +194,12 @@ def _fitted(samples: np.ndarray, dt: float, goal: _Goal) -> np.ndarray:
             best, least = current, now
         if least < goal.enough:
             break
-        current = current + _correction(peaks, times, dt, len(current), goal)
+        current = current + _correction(peaks, times, goal, dt=dt, count=len(current))
     return best
 
 
 def _correction(
-    peaks: np.ndarray, times: np.ndarray, dt: float, count: int, goal: _Goal
+    peaks: np.ndarray, times: np.ndarray, goal: _Goal, *, dt: float, count: int
 ) -> np.ndarray:
     """Return the sum of wavelets (count,) [m/s²] that brings the peaks to the goal."""
     waves = np.stack(
@@ -209,7 +210,7 @@ def _correction(
     )
     gains = np.stack(
         [
-            _memory(period, time, dt, count, goal.damping)
+            _memory(period, time, goal.damping, dt=dt, count=count)
             for period, time in zip(goal.periods, times, strict=True)
         ]
     )
@@ -239,7 +240,7 @@ def _wavelet(period: float, centre: float, dt: float, count: int) -> np.ndarray:
     return wave / np.abs(wave).max()
 
 
-def _memory(period: float, time: float, dt: float, count: int, damping: float) -> np.ndarray:
+def _memory(period: float, time: float, damping: float, *, dt: float, count: int) -> np.ndarray:
     """Return what the acceleration at each sample adds to an oscillator's response at a time."""
     if period == 0.0:
         return (np.arange(count) == round(time / dt)).astype(float)

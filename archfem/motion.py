@@ -1,7 +1,7 @@
 """`Motion`: a ground acceleration, read, cut, filtered, rotated and scaled."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from os import PathLike
 from pathlib import Path
@@ -45,7 +45,7 @@ class Motion:
     dt: float
     vertical: np.ndarray | None = None
     name: str = ""
-    transverse: np.ndarray | None = None
+    transverse: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
@@ -209,10 +209,7 @@ class Motion:
         return self.scaled(pga / self.pga)
 
     def cut(self, start: float, end: float | None = None) -> "Motion":
-        """Keep the samples from start to end [s], by default to the last; start becomes time zero.
-
-        A component that ended before keeps one sample of zero.
-        """
+        """Keep the samples from start to end [s]; a component that ended before keeps one zero."""
         stop = self.duration if end is None else end
         first = int(np.ceil(round(start / self.dt, 6)))
         last = int(np.floor(round(stop / self.dt, 6))) + 1
@@ -229,10 +226,7 @@ class Motion:
         return self.cut(*signals.significant_window(self.horizontal, self.dt, low, high))
 
     def resampled(self, dt: float) -> "Motion":
-        """Sample anew at a step dt [s] by straight lines, keeping all peaks (see `signals`).
-
-        A coarser step does not filter: take out what it cannot carry with `band_passed` before.
-        """
+        """Sample anew at a step dt [s] by straight lines, keeping all peaks; it does not filter."""
         if not dt > 0.0:
             raise InvalidInput(f"dt {dt!r} s: the time between samples is a positive number")
         return replace(self._each(lambda samples: signals.resampled(samples, self.dt, dt)), dt=dt)
@@ -243,7 +237,9 @@ class Motion:
 
     def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
         """Keep the frequencies from low to high [Hz], without shift in time (Butterworth)."""
-        return self._each(lambda samples: signals.band_passed(samples, self.dt, low, high, order))
+        return self._each(
+            lambda samples: signals.band_passed(samples, self.dt, low, high, order=order)
+        )
 
     def rotated(self, angle: float) -> "Motion":
         """Turn the horizontal axes by an angle [rad] from the horizontal towards the transverse."""

@@ -77,7 +77,7 @@ def baseline_corrected(samples: np.ndarray, dt: float, degree: int = 6) -> np.nd
 
 
 def band_passed(
-    samples: np.ndarray, dt: float, low: float, high: float, order: int = 4
+    samples: np.ndarray, dt: float, low: float, high: float, *, order: int = 4
 ) -> np.ndarray:
     """Keep the frequencies between two corners, without shift in time.
 

@@ -1,7 +1,7 @@
 """`Suite`: the motions of one study, matched and scaled alike."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,9 +29,9 @@ class Suite:
 
     name: str
     pairs: tuple[Motion, ...]
-    scale: float = 1.0
-    reduction: float = 1.0
-    matches: tuple[Match, ...] = ()
+    scale: float = field(default=1.0, kw_only=True)
+    reduction: float = field(default=1.0, kw_only=True)
+    matches: tuple[Match, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pairs", tuple(self.pairs))
@@ -67,7 +67,7 @@ class Suite:
             level.with_vertical(verticals[index // share])
             for index, level in enumerate(horizontals)
         )
-        return cls(name, tuple(pairs), scale, reduction)
+        return cls(name, tuple(pairs), scale=scale, reduction=reduction)
 
     @classmethod
     def synthetic(

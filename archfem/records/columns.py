@@ -7,7 +7,14 @@ import numpy as np
 from archfem.records.channel import Channel
 from archfem.records.text import NUMBER, RecordText, unit_named, units_written
 
-_STEP = rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER})"
+_STEP = re.compile(
+    rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER})\s*(ms)?",
+    re.IGNORECASE,
+)
+_RATE = re.compile(
+    rf"\bsampl\w*\s+(?:rate|freq\w*)\b[^\d+\-.\n]{{0,12}}({NUMBER})\s*(?:Hz|sps)\b",
+    re.IGNORECASE,
+)
 _DIRECTIONS = re.compile(r"\b(N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", re.IGNORECASE)
 _JITTER = 0.25  # of a step: what rounding in print does to a time column
 
@@ -30,9 +37,9 @@ def read(
     Raises:
         InvalidInput: a row, the units, the step or the choice of column is missing or in doubt.
     """
-    rows, comments = _rows(text)
+    rows, lines, comments = _rows(text)
     unit = _unit(text, comments, units)
-    step = _step(text, rows, comments, dt)
+    step = _step(text, rows, lines, _told(comments, dt))
     first = 1 if _is_time(rows) else 0
     if column is None:
         chosen = list(range(first, rows.shape[1]))
@@ -53,16 +60,17 @@ def read(
     return [Channel.directed(rows[:, index] * unit, step, name) for index, name in pairs]
 
 
-def _rows(text: RecordText) -> tuple[np.ndarray, str]:
-    """Return the table of numbers (n, columns) and all comments in one string."""
+def _rows(text: RecordText) -> tuple[np.ndarray, list[int], str]:
+    """Return the table of numbers (n, columns), its lines, and all comments in one string."""
     start = text.header_length()
-    comments, table = list(text.lines[:start]), []
+    comments, table, lines = list(text.lines[:start]), [], []
     for line in range(start, len(text.lines)):
         content = text.lines[line].strip()
         if content.startswith(("#", "%", "!", "*")):
             comments.append(content)
         elif content:
             table.append(text.row(line))
+            lines.append(line)
             if len(table[-1]) != len(table[0]):
                 raise text.error(
                     f"{len(table[-1])} columns where the first row has {len(table[0])}", line
@@ -70,7 +78,9 @@ def _rows(text: RecordText) -> tuple[np.ndarray, str]:
     if "." not in "".join(text.lines[start:]) and text.holds(r"\d,\d", len(text.lines), start):
         raise text.error("these look like decimal commas: write points", start)
     text.check_end()
-    return np.array(table), "\n".join(comments)
+    if len(table) < 2:
+        raise text.error("one row is no accelerogram", start)
+    return np.array(table), lines, "\n".join(comments)
 
 
 def _is_time(rows: np.ndarray) -> bool:
@@ -94,12 +104,18 @@ def _unit(text: RecordText, comments: str, units: str | None) -> float:
     return written.pop()
 
 
-def _step(text: RecordText, rows: np.ndarray, comments: str, dt: float | None) -> float:
-    """Return the time between samples [s], the same by all that tells it."""
+def _told(comments: str, dt: float | None) -> list[float]:
+    """Return the steps told by keyword and by the comments [s]."""
     told = [] if dt is None else [float(dt)]
-    told += [float(match) for match in re.findall(_STEP, comments, re.IGNORECASE)]
+    told += [float(value) * (1e-3 if milli else 1.0) for value, milli in _STEP.findall(comments)]
+    told += [1.0 / max(float(rate), 1e-9) for rate in _RATE.findall(comments)]
+    return told
+
+
+def _step(text: RecordText, rows: np.ndarray, lines: list[int], told: list[float]) -> float:
+    """Return the time between samples [s], the same by all that tells it."""
     if _is_time(rows):
-        told.append(_step_of(text, rows[:, 0]))
+        told = [*told, _step_of(text, rows[:, 0], lines)]
     if not told:
         raise text.error("neither a time column nor a stated step: give dt= in seconds")
     if max(told) - min(told) > 0.01 * max(told):
@@ -107,7 +123,7 @@ def _step(text: RecordText, rows: np.ndarray, comments: str, dt: float | None) -
     return text.step(told[0])
 
 
-def _step_of(text: RecordText, times: np.ndarray) -> float:
+def _step_of(text: RecordText, times: np.ndarray, lines: list[int]) -> float:
     """Return the constant step of a time column [s]."""
     count = np.arange(len(times))
     step, begin = np.polyfit(count, times, 1)
@@ -115,7 +131,8 @@ def _step_of(text: RecordText, times: np.ndarray) -> float:
     if step <= 0.0 or max(apart, np.abs(np.diff(times) - step).max()) > _JITTER * step:
         jump = int(np.argmax(np.abs(np.diff(times) - np.median(np.diff(times)))))
         raise text.error(
-            f"time is not uniform: {times[jump]:g} to {times[jump + 1]:g} s in row {jump + 2}, "
-            f"elsewhere {np.median(np.diff(times)):g} s; bring the record to a constant step"
+            f"time is not uniform: {times[jump]:g} to {times[jump + 1]:g} s, elsewhere steps of "
+            f"{np.median(np.diff(times)):g} s; bring the record to a constant step",
+            lines[jump + 1],
         )
     return float(f"{step:.6g}")

@@ -232,6 +232,15 @@ def test_time_and_acceleration_in_columns(write):
         assert len(motion.horizontal) == 50
 
 
+@pytest.mark.parametrize(
+    "told", ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"]
+)
+def test_the_step_told_in_a_comment(write, told):
+    motion = Motion.read(write(f"% gal, {told}\n1\n-2\n3\n"))
+    assert motion.dt == pytest.approx(0.005)
+    assert motion.pga == pytest.approx(0.03)
+
+
 def test_rounded_times_still_tell_the_step(write):
     rows = "".join(f"{0.0066 * i:.3f} {i % 7}\n" for i in range(200))
     # Times are rounded to 0.0005 s, over 199 steps: 4e-4 of the step.
@@ -246,12 +255,13 @@ def test_rounded_times_still_tell_the_step(write):
         ("1\n2\n3\n", {"units": "furlong", "dt": 0.01}, "units 'furlong' are unknown"),
         ("# in g\n1\n2\n", {"units": "gal", "dt": 0.01}, "contradicts the unit"),
         ("# dt = 0.02 s\n1\n2\n", {"units": "gal", "dt": 0.01}, "told twice"),
-        ("0 1\n.01 2\n.02 3\n.04 2\n.05 1\n.06 0\n", {"units": "gal"}, "0.02 to 0.04 s in row 4"),
+        ("0 1\n.01 2\n.02 3\n.04 2\n.05 1\n.06 0\n", {"units": "gal"}, "line 4: .*0.02 to 0.04 s"),
         ("1 2\n3 4\n1 5\n", {"units": "gal", "dt": 0.01}, "2 columns could be"),
         ("0.00 1 2\n0.01 4 1\n0.02 5 1\n", {"units": "gal"}, "2 columns could be"),
         ("0.00 1\n0.01 4\n0.02 5\n", {"units": "gal", "column": 1}, "choose from 2 to 2"),
         ("1 2\n3\n1 5\n", {"units": "gal", "dt": 0.01, "column": 1}, "line 2: 1 columns"),
         ("0,1\n0,2\n", {"units": "gal", "dt": 0.01, "column": 1}, "decimal commas"),
+        ("5\n", {"units": "gal", "dt": 0.01}, "one row is no accelerogram"),
         ("1\n2\n", {"units": "gal", "dt": "fast"}, "a number in seconds"),
         ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),
         ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s"),
