@@ -62,7 +62,7 @@ def joint_marks(
     slipping = np.flatnonzero(sliding(joints).values)
     arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
     return Marks(
-        thrust=thrust_line(structure, joints).values + carried,
+        thrust=carried + thrust_line(structure, joints).values,
         hinges=ends[failed, (side[failed] > 0).astype(int)],
         slips=np.array(arrows).reshape(-1, *ARROW.shape),
         gaps=ends[opened(joints).values],

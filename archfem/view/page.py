@@ -1,5 +1,7 @@
 """What surrounds a photographed structure: title, colour bar, legend, and the ground's motion."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -8,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from archfem.criteria import hinged, opened, sliding
 from archfem.history import History
@@ -45,7 +48,7 @@ class Page:
         )
         self._window = (slice(top, top + self.room[1]), slice(left, left + self.room[0]))
         self._still(setting, run, below)
-        self._said = self._write(0.985, "", LARGE, ha="right", animated=True)
+        self._said = self._write(0.985, "", ha="right", animated=True)
         self._cursor = self._strip(run) if run else None
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
@@ -63,7 +66,7 @@ class Page:
         if self._cursor is not None:
             now = float(joints["time"])
             self._cursor.set_xdata([now, now])
-            self._cursor.axes.draw_artist(self._cursor)
+            self._figure.draw_artist(self._cursor)
         page = np.array(self._canvas.buffer_rgba())[..., :3]
         page[self._window] = photograph
         return page
@@ -71,7 +74,7 @@ class Page:
     def _still(self, setting: Setting, run: History | None, below: float) -> None:
         """Draw title, colour bar and legend."""
         name = run.dataset.attrs["title"] if run else setting.model.structure.name
-        self._write(0.02, name[:1].upper() + name[1:], LARGE, ha="left")
+        self._write(0.02, name[:1].upper() + name[1:], ha="left")
         self._colour_bar(setting.scale, below)
         by = f"displacements × {setting.magnification:g}"
         middle = (below - 0.5 * FOOT) / self._inches[1]
@@ -81,11 +84,11 @@ class Page:
         )  # fmt: skip
         self._figure.text(0.985, middle, by, fontsize=TYPE, ha="right", va="center", color=INK)
 
-    def _write(self, x: float, words: str, size: float, *, ha: str, animated: bool = False):
+    def _write(self, x: float, words: str, *, ha: str, animated: bool = False) -> Text:
         """Write into the header."""
         y = 1.0 - 0.5 * HEAD / self._inches[1]
         return self._figure.text(
-            x, y, words, fontsize=size, ha=ha, va="center", color=INK, animated=animated
+            x, y, words, fontsize=LARGE, ha=ha, va="center", color=INK, animated=animated
         )
 
     def _colour_bar(self, scale: Scale, below: float) -> None:
@@ -110,11 +113,11 @@ class Page:
         axes.plot(run.time, ground[:, 0], color=INK, lw=0.9, label="horizontal")
         axes.set_xlim(run.time[0], max(run.time[-1], run.time[0] + 1e-9))
         axes.tick_params(labelsize=TYPE)
-        axes.xaxis.label.set_size(TYPE)
-        axes.yaxis.label.set_size(TYPE)
+        axes.xaxis.label.set_fontsize(TYPE)
+        axes.yaxis.label.set_fontsize(TYPE)
         if len(axes.lines) > 1:
             axes.legend(loc="upper right", ncols=2, frameon=False, fontsize=TYPE)
-        if run.mechanism is not None:
+        if run.mechanism is not None and run.mechanism.time is not None:
             _flag(axes, run.mechanism.time)
         return axes.axvline(run.time[0], color=HINGE, lw=1.8, animated=True)
 
@@ -126,10 +129,14 @@ class Page:
 def _flag(axes: Axes, time: float) -> None:
     """Mark the instant of the first mechanism."""
     axes.axvline(time, color=FAINT, lw=1.0, ls="--")
-    axes.annotate(
-        "mechanism", (time, 1.0), (4, -2), xycoords=("data", "axes fraction"), va="top",
-        textcoords="offset points", fontsize=TYPE, color=EDGE,
-    )  # fmt: skip
+    where: dict[str, Any] = {
+        "xytext": (0, 1),
+        "textcoords": "offset points",
+        "ha": "center",
+        "va": "bottom",
+    }
+    place = ("data", "axes fraction")
+    axes.annotate("mechanism", (time, 1.0), xycoords=place, fontsize=TYPE, color=EDGE, **where)
 
 
 def _sentence(joints: xr.Dataset) -> str:

@@ -1,6 +1,7 @@
 """Pictures on paper: a structure at an instant, envelopes of eccentricity, histories of joints."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -61,18 +62,17 @@ def draw_structure(
     Raises:
         InvalidInput: `joints` has several instants, or those of another structure.
     """
-    alone = axes is None
-    axes = axes or canvas(structure).add_subplot()
+    axes = canvas(structure).add_subplot() if axes is None else axes
     dress(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
     _blocks(axes, structure)
     if joints is not None:
         _check_instant(structure, joints)
         _marks(axes, joint_marks(structure, joints, limit=limit))
-        legend(axes, alone=alone)
+        legend(axes)
     axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
     axes.autoscale_view()
-    return axes.figure
+    return cast(Figure, axes.figure)
 
 
 def draw_envelope(
@@ -97,22 +97,24 @@ def draw_envelope(
     """
     if not 1 <= len(runs) <= len(LINES):
         raise InvalidInput(f"{len(runs)} runs in one picture: give 1 to {len(LINES)}")
-    alone = axes is None
-    axes = axes or Figure(figsize=(COLUMN, 3.4), layout="constrained").add_subplot()
+    page = Figure(figsize=(COLUMN, 3.4), layout="constrained")
+    axes = page.add_subplot() if axes is None else axes
     dress(axes, "joint [-]", "eccentricity e = M / (N h) [-]")
     _faces(axes, limit)
+    apart = [np.flatnonzero(opened(run.joints).any("time")) for run in runs.values()]
     for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
         _band(axes, run.joints, label, colour)
-        apart = np.flatnonzero(opened(run.joints).any("time"))
-        axes.plot(apart, np.full(len(apart), 0.56 + 0.05 * row), "x", ms=4, color=colour)
+        height = np.full(len(apart[row]), 0.56 + 0.05 * row)
+        axes.plot(apart[row], height, "x", ms=4, color=colour)
+    if any(map(len, apart)):
+        axes.plot([], [], "x", ms=4, color=FAINT, label="came apart")
     if dead is not None:
         axes.plot(dead["joint"], dead["eccentricity"], ":", color=INK, lw=1.4, label="dead load")
-    axes.plot([], [], "x", ms=4, color=FAINT, label="came apart")
     axes.set_ylim(-0.56, 0.56 + 0.05 * len(runs))
     axes.set_yticks(np.linspace(-0.5, 0.5, 5))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    legend(axes, alone=alone)
-    return axes.figure
+    legend(axes)
+    return cast(Figure, axes.figure)
 
 
 def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = HINGE) -> Figure:
@@ -181,22 +183,29 @@ def _blocks(axes: Axes, structure: Structure) -> None:
 def _marks(axes: Axes, marks: Marks) -> None:
     """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
     halo = withStroke(linewidth=3.4, foreground="white")
-    line = {"color": THRUST, "label": "thrust line", "gid": "thrust", "zorder": 5}
+    line: dict[str, Any] = {"color": THRUST, "label": "thrust line", "gid": "thrust", "zorder": 5}
     axes.plot(*marks.thrust.T, lw=1.7, path_effects=[halo], **line)
     axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5)
     if len(marks.hinges):
-        disc = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
+        disc: dict[str, Any] = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
     if len(marks.slips):
-        arrows = PolyCollection(marks.slips, facecolors=SLIP, edgecolors="white", linewidths=0.4)
+        arrows = PolyCollection(
+            list(marks.slips), facecolors=SLIP, edgecolors="white", linewidths=0.4
+        )
         arrows.set(zorder=6, gid="slips")
         axes.add_collection(arrows)
-        symbol = {"marker": r"$\rightleftharpoons$", "ms": 12, "color": SLIP, "mew": 0.5}
+        symbol: dict[str, Any] = {
+            "marker": r"$\rightleftharpoons$",
+            "ms": 12,
+            "color": SLIP,
+            "mew": 0.5,
+        }
         axes.plot([], [], ls="", label="sliding joint", **symbol)
     if len(marks.gaps):
         apart = np.insert(marks.gaps, 2, np.nan, axis=1).reshape(-1, 2)
         edge = [withStroke(linewidth=3.8, foreground=EDGE)]
-        style = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4}
+        style: dict[str, Any] = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4}
         axes.plot(*apart.T, label="open joint", gid="gaps", solid_capstyle="butt", **style)
 
 
@@ -213,7 +222,7 @@ def _band(axes: Axes, joints: xr.Dataset, label: str, colour: str) -> None:
     """Fill between the least and the largest eccentricity of each joint."""
     span, number = envelope(joints), joints["joint"].values
     axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=0.15, lw=0)
-    style = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
+    style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
     axes.plot(number, span["highest"], **style, label=label)
     axes.plot(number, span["lowest"], **style)
 

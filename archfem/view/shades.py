@@ -70,6 +70,7 @@ def shade(shape: Shape, q: Array, colour: str) -> Array:
     """
     if colour == "displacement":
         return np.linalg.norm(shape.displacement(q), axis=1) / mm
+    assert shape.stress is not None, "checked by check_colour"
     across, up, shear = (shape.stress @ q).reshape(-1, 3).T / MPa
     return 0.5 * (across + up) - np.hypot(0.5 * (across - up), shear)
 

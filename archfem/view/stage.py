@@ -15,9 +15,10 @@ from archfem.models.shape import Shape
 from archfem.structure import Array
 from archfem.view.marks import Marks
 from archfem.view.shades import Scale, scale_for, shade
-from archfem.view.style import EDGE, HINGE, SLIP, SUPPORT, THRUST
+from archfem.view.style import EDGE, GHOST, HINGE, SLIP, SUPPORT, THRUST
 
 Image = NDArray[np.uint8]
+Numbers = NDArray[np.intp]
 
 SWING = 0.06
 """Largest displacement in a picture, relative to the size of the structure."""
@@ -31,7 +32,7 @@ MARGIN = 0.02
 TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 
-EDGES, PAST, HALO, LINE, ARROWS, RIMS, HINGES = range(1, 8)
+REST, EDGES, PAST, HALO, LINE, ARROWS, RIMS, HINGES = -1, *range(1, 8)
 """Layers of a picture, from the blocks upwards."""
 
 
@@ -94,9 +95,10 @@ class Stage:
         shape = setting.model.shape
         self._height = 1e-3 * setting.model.structure.size
         self._blocks = _surface(shape)
-        self._outlines = _lines(self._flat(shape.places, EDGES), _outlines(shape))
+        self._edges = _outlines(shape)
+        self._outlines = _lines(self._flat(shape.places, EDGES), self._edges)
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
-        self._plotter.set_background("white")
+        self._plotter.background_color = "white"
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
         self._paint(np.zeros(setting.model.size))
         self._plotter.add_mesh(
@@ -147,16 +149,18 @@ class Stage:
         self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
         self._meshes["hinges"].dataset = self._discs(marks.hinges, HINGES, 1.0)
         self._plotter.render()
-        return self._plotter.screenshot(return_img=True)
+        return np.asarray(self._plotter.screenshot(return_img=True), dtype=np.uint8)
 
     def _build(self) -> None:
         """Put everything on the stage, marks still empty."""
         fixed = [block.drawn() for block in self._setting.model.structure.blocks if block.fixed]
         for outline in fixed:
-            self._add(self._polygons(outline[None], 0).triangulate(), SUPPORT)
+            self._add(self._polygons(outline[None], 0), SUPPORT)
             around = np.arange(len(outline))
             edges = np.column_stack([around, np.roll(around, -1)])
             self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
+        rest = _lines(self._flat(self._setting.model.shape.places, REST), self._edges)
+        self._add(rest, GHOST)
         self._add(self._outlines, EDGE, 1.5)
         self._meshes = {
             "past": self._add(pv.PolyData(), HINGE, opacity=0.3),
@@ -210,8 +214,8 @@ class Stage:
             return pv.PolyData()
         count, corners = outlines.shape[:2]
         numbers = np.arange(count * corners).reshape(count, corners)
-        points = self._flat(outlines.reshape(-1, 2), layer)
-        return pv.PolyData.from_regular_faces(points, numbers)
+        faces = np.insert(numbers, 0, corners, axis=1).ravel()
+        return pv.PolyData(self._flat(outlines.reshape(-1, 2), layer), faces=faces).triangulate()
 
     def _discs(self, centres: Array, layer: float, size: float) -> pv.PolyData:
         """Discs about points (n, 2), of a size relative to a hinge's."""
@@ -234,14 +238,14 @@ def _surface(shape: Shape) -> pv.PolyData:
     return surface.triangulate()
 
 
-def _outlines(shape: Shape) -> Array:
+def _outlines(shape: Shape) -> Numbers:
     """Edges around each block: those of one of its cells only (n, 2)."""
     edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in shape.cells])
     edges, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     return edges[count == 1]
 
 
-def _lines(points: Array, pairs: Array) -> pv.PolyData:
+def _lines(points: Array, pairs: Numbers) -> pv.PolyData:
     """Straight lines between pairs of points (n, 3)."""
     twos = np.full(len(pairs), 2)
     return pv.PolyData(points, lines=np.column_stack([twos, pairs]).ravel())

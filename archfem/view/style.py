@@ -12,7 +12,7 @@ from archfem.errors import InvalidInput
 from archfem.structure import Structure
 
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
-INK, FAINT = "#1b1b1b", "#8d8d8d"
+INK, FAINT, GHOST = "#1b1b1b", "#8d8d8d", "#cfcac0"
 THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
 LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 """Colours of lines that share axes; they stay apart for all common kinds of colour blindness."""
@@ -39,10 +39,11 @@ def dress(axes: Axes, x: str = "", y: str = "") -> None:
     axes.tick_params(labelsize=SMALL, color=EDGE, width=0.8, length=3.0)
 
 
-def legend(axes: Axes, *, alone: bool) -> None:
-    """Explain what is labelled: below axes that are alone on their page, else among the lines."""
-    if alone:
-        axes.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
+def legend(axes: Axes) -> None:
+    """Explain what is labelled: below axes that have a page to themselves, else among the lines."""
+    page = axes.figure
+    if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
+        page.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
     else:
         axes.legend(frameon=False, fontsize=SMALL)
 
