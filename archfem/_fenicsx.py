@@ -23,7 +23,7 @@ if "dolfinx" not in sys.modules:
     # DOLFINx 0.5 makes every library loaded after it global and never undoes it, which breaks
     # the wheels of HDF5 and VTK. Importing it with the switch disarmed avoids that.
     _setdlopenflags = sys.setdlopenflags
-    sys.setdlopenflags = lambda flags: None  # type: ignore[assignment]
+    sys.setdlopenflags = lambda flags: None
     try:
         import dolfinx
     finally:
@@ -36,7 +36,7 @@ from dolfinx import cpp, fem  # noqa: E402
 try:
     from dolfinx.io import gmshio as _gmsh_io
 except ImportError:
-    from dolfinx.io import gmsh as _gmsh_io
+    from dolfinx.io import gmsh as _gmsh_io  # type: ignore[attr-defined, no-redef]
 
 COMM = MPI.COMM_SELF
 Numbers = NDArray[np.int32]

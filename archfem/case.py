@@ -6,7 +6,7 @@ not known, a wrong unit or an impossible geometry is an error that names the key
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,10 @@ RING = {
     "gravity": "m/s**2",
 }
 COLUMN = {"breadth": "m", "heights": ["m"], "width": "m", "gravity": "m/s**2"}
-SHAPES = {"circular_arch": (circular_arch, RING), "column": (column, COLUMN)}
+SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
+    "circular_arch": (circular_arch, RING),
+    "column": (column, COLUMN),
+}
 MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
 CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
 MODEL = {

@@ -73,8 +73,8 @@ def _mesh(given: argparse.Namespace) -> None:
     from archfem.mesh import Meshing, write_mesh
 
     case = Case.read(given.case, given.changes)
-    cells = case.model.get("cells", [4, 4])
-    meshing = Meshing(*cells, case.model.get("cell", "quadrilateral"))
+    through, along = case.model.get("cells", [4, 4])
+    meshing = Meshing(through, along, case.model.get("cell", "quadrilateral"))
     write_mesh(case.structure, given.out, meshing)
     print(f"wrote {given.out}")
 

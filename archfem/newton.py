@@ -163,6 +163,7 @@ class Solver:
             return True
         if rest > ROUGHLY * self._scale:
             return False
+        assert self._loaded is not None
         rounding = np.linalg.norm(abs(self._loaded) @ abs(self._solution.array_r))
         return bool(rest <= 8.0 * np.finfo(float).eps * rounding)
 

@@ -85,9 +85,8 @@ def joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
         order = np.argsort(arms[:, 0])
         arms, nodes = arms[order], nodes[order]
         breaks = np.append(arms[:, 0], arms[-1, -1])
-        points, lengths = rule.on_joint(breaks, space.degree)
-        rules.append((points, lengths))
-        entries.append(_interpolation(points, arms, nodes))
+        rules.append(rule.on_joint(breaks, space.degree))
+        entries.append(_interpolation(rules[-1][0], arms, nodes))
     points = JointPoints.on(structure, rules)
     jumps = _jumps(entries, len(space.places))
     tangents = np.array([joint.tangent for joint in structure.joints])[points.joint]

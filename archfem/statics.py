@@ -9,7 +9,7 @@ import xarray as xr
 from archfem.actions import BodyForce
 from archfem.errors import DidNotConverge
 from archfem.models import Model
-from archfem.newton import Newton, Solver, magnitude
+from archfem.newton import Newton, Solved, Solver, magnitude
 from archfem.resultants import joint_dataset
 from archfem.structure import Array
 
@@ -78,12 +78,7 @@ def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equi
     while factor < 1.0:
         target = min(1.0, factor + step)
         try:
-            solved = solver.solve(
-                lambda q, part=target: model.force(q) - part * load,
-                model.tangent,
-                found.q,
-                magnitude(load),
-            )
+            solved = _solve(solver, model, target * load, found.q)
         except DidNotConverge as error:
             step /= 2.0
             if step >= SMALLEST_STEP:
@@ -93,8 +88,10 @@ def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equi
                 "carry it; make it thicker, or check the outline, the supports and the load",
                 last=found,
             ) from error
-        found = Equilibrium(
-            model, solved.q, found.iterations + solved.iterations, found.steps + 1
-        )
+        found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
         factor = target
     return found
+
+
+def _solve(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
+    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))

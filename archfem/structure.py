@@ -238,7 +238,7 @@ class Structure:
                 f"{joint.intrados}-{joint.extrados} within {near:.1e} m: check which blocks it "
                 "joins and where its ends are"
             )
-        return sides[0] * np.array([joint.tangent[1], -joint.tangent[0]])
+        return float(sides[0]) * np.array([joint.tangent[1], -joint.tangent[0]])
 
     def _check_support(self) -> None:
         """Every block must be joined, through others, to one that is fixed."""

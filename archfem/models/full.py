@@ -1,6 +1,7 @@
 """The rung with all nodes: elastic blocks meshed by gmsh, assembled by DOLFINx."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.forms import Forms
@@ -8,7 +9,6 @@ from archfem.models.jointed import Jointed
 from archfem.models.shape import Shape
 from archfem.quadrature import Quadrature
 from archfem.space import BrokenSpace, joint_operator
-from archfem.structure import Array
 
 
 def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
@@ -37,7 +37,7 @@ def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
     )
 
 
-def _shape(space: BrokenSpace, forms: Forms, free: Array) -> Shape:
+def _shape(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Shape:
     """The cells of the free blocks, as polygons around their corners."""
     moving = np.isin(space.mesh.blocks, space.mesh.structure.free)
     nodes = free[0::2] // 2
