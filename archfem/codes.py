@@ -60,7 +60,7 @@ class Tbec2018:
 
     ss: float
     s1: float
-    site: str = "ZC"
+    site: str
 
     def __post_init__(self) -> None:
         if not (0.0 < self.ss < np.inf and 0.0 < self.s1 < np.inf):
@@ -140,7 +140,7 @@ class Eurocode8:
     """
 
     ag: float
-    ground: str = "A"
+    ground: str
     type: int = 1
     damping: float = 0.05
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText, units_written
 
 _DIRECTION = r"[NSEWUD]-[NSEWUD]"
 _RAW_PEAK = 0.5  # the header's peaks are those before AFAD took the offset out
@@ -22,7 +22,7 @@ def read(text: RecordText) -> list[Channel]:
     Raises:
         InvalidInput: count, step, unit or directions are missing, or the samples contradict them.
     """
-    count_line, count = text.find(r"^\s*NUMBER OF DATA\s*:\s*(\d+)\s*$", stop=40)
+    count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT})\s*$", stop=40)
     step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER})\s*$", stop=40)
     peak_line, peaks = text.find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=40)
     names_line, names = text.find(

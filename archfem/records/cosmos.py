@@ -3,10 +3,10 @@
 import re
 
 from archfem.records.channel import Channel
-from archfem.records.text import RecordText, stated_width, units_written
+from archfem.records.text import COUNT, RecordText, stated_width, units_written
 
-_BLOCK = r"^\s*(\d+)\s+acceleration\s+pts\b(.*)$"
-_HEADER = r"^\s*(\d+)\s+{kind}-header values follow"
+_BLOCK = rf"^\s*({COUNT})\s+acceleration\s+pts\b(.*)$"
+_HEADER = rf"^\s*({COUNT})\s+%s-header values follow"
 _END = r"^\s*End-of-data for\s+Chan\s*(\S*)\s+acceleration"
 
 # Positions in the headers, counted from 0, and the codes of the sensor's direction.
@@ -28,7 +28,7 @@ def read(text: RecordText) -> list[Channel]:
     """
     channels: list[Channel] = []
     start = 0
-    while not channels or text.holds(_HEADER.format(kind="Integer"), len(text.lines), start):
+    while not channels or text.holds(_HEADER % "Integer", len(text.lines), start):
         channel, start = _channel(text, start)
         channels.append(channel)
     return channels
@@ -59,7 +59,7 @@ def _channel(text: RecordText, start: int) -> tuple[Channel, int]:
 
 def _header(text: RecordText, kind: str, start: int) -> tuple[list[float], int]:
     """Return the numbers of a header and the line after it."""
-    line, stated = text.find(_HEADER.format(kind=kind), start)
+    line, stated = text.find(_HEADER % kind, start)
     numbers, after = text.block(line + 1, int(stated[1]))
     if len(numbers) <= max(_AZIMUTH, _PEAK):
         raise text.error(f"{len(numbers)} values in a header of 100", line)

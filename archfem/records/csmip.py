@@ -1,9 +1,9 @@
 """CSMIP/CDMG volume 2 files: channels of corrected acceleration, velocity and displacement."""
 
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, RecordText, stated_width, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText, stated_width, units_written
 
-_BLOCK = rf"^\s*(\d+)\s+POINTS OF ACCEL DATA EQUALLY SPACED AT\s+({NUMBER})\s*SEC(.*)$"
+_BLOCK = rf"^\s*({COUNT})\s+POINTS OF ACCEL DATA EQUALLY SPACED AT\s+({NUMBER})\s*SEC(.*)$"
 _CHANNEL = r"\bCHAN\s+\d+:\s*(\S+(?: DEG)?)"
 _PEAK = rf"PEAK ACCELERATION\s*=\s*({NUMBER})"
 _END = r"END OF DATA FOR CHAN"

@@ -1,7 +1,7 @@
 """ESM, ITACA and AFAD-TADAS files (DYNA 1.x): a header of `KEY: value`, one sample a line."""
 
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText, units_written
 
 _HEADER = 80  # lines
 
@@ -22,7 +22,7 @@ def read(text: RecordText) -> list[Channel]:
     kind = _value(text, "DATA_TYPE")
     if kind.upper() != "ACCELERATION":
         raise text.error(f"DATA_TYPE is {kind!r}, expected ACCELERATION")
-    line, count = text.find(r"^\s*NDATA\s*:\s*(\d+)\s*$", stop=_HEADER)
+    line, count = text.find(rf"^\s*NDATA\s*:\s*({COUNT})\s*$", stop=_HEADER)
     step_line, step = text.find(rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER})\s*$", stop=_HEADER)
     dt = text.step(float(step[1]), step_line)
     duration = _value(text, "DURATION_S")

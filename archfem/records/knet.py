@@ -30,9 +30,10 @@ def read(text: RecordText) -> list[Channel]:
     memo = text.find(r"^\s*Memo", stop=_HEADER)[0]
     direction = text.find(r"^\s*Dir\.\s+(\S+)", stop=_HEADER)[1][1]
     frequency = float(rate[1])
-    if frequency <= 0.0 or float(scale[2]) == 0.0:
-        raise text.error("sampling frequency and scale factor are positive", rate_line)
-    counts = text.last_block(memo + 1, round(frequency * float(duration[1])))
+    count = frequency * float(duration[1])
+    if not 0.0 < count < 1e9 or float(scale[2]) == 0.0:
+        raise text.error("frequency, duration and scale factor are positive numbers", rate_line)
+    counts = text.last_block(memo + 1, round(count))
     samples = (counts - counts.mean()) * (0.01 * float(scale[1]) / float(scale[2]))
     peak = text.find(rf"^\s*Max\. Acc\. \(gal\)\s+({NUMBER})\s*$", stop=_HEADER)[1]
     text.check_peak(samples, 0.01 * float(peak[1]), tolerance=_OFFSET)

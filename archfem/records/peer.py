@@ -3,12 +3,12 @@
 import re
 
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText, units_written
 
 _HEADER = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
-_BEFORE = re.compile(rf"\s*(\d+)[\s,]+({NUMBER})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE)
-_AFTER = re.compile(rf"\bNPTS[\s,]+DT\s*[=:]?\s*(\d+)[\s,]+({NUMBER})", re.IGNORECASE)
+_BEFORE = re.compile(rf"\s*({COUNT})[\s,]+({NUMBER})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE)
+_AFTER = re.compile(rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT})[\s,]+({NUMBER})", re.IGNORECASE)
 
 
 def recognises(text: RecordText) -> bool:
@@ -42,8 +42,8 @@ def _count_and_step(text: RecordText) -> tuple[int, float, int]:
         together = _BEFORE.match(content) or _AFTER.search(content)
         if together:
             return int(together[1]), float(together[2]), line
-    count_line, count = text.find(r"\bNPTS\s*[=:]?\s*(\d+)\b(?!\.)", stop=len(text.lines[:_HEADER]))
-    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER})", stop=len(text.lines[:_HEADER]))
+    count_line, count = text.find(rf"\bNPTS\s*[=:]?\s*({COUNT})\b(?!\.)", stop=_HEADER)
+    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER})", stop=_HEADER)
     return int(count[1]), float(step[1]), max(count_line, step_line)
 
 

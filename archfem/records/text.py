@@ -18,7 +18,11 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 LONGEST_STEP = 0.1
 """Sampling slower than 10 Hz [s] cannot hold the shaking of a structure: a misread header."""
 
-_NUMERIC = re.compile(r"[\s\d+\-.,;EeDd]*\d[\s\d+\-.,;EeDd]*")
+COUNT = r"\d{1,9}"
+"""Pattern of a number of samples."""
+
+_NUMERIC = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
+_DIGIT = re.compile(r"[0-9]")
 _RUN_TOGETHER = re.compile(r"(?<=[\d.])(?=[-+])")
 _ALIKE = 0.97  # share of numbers printed alike from which on the rest count as damaged
 
@@ -78,7 +82,8 @@ class RecordText:
 
     def is_numeric(self, line: int) -> bool:
         """Tell whether a line holds numbers and nothing else."""
-        return bool(_NUMERIC.fullmatch(self.lines[line]))
+        content = self.lines[line]
+        return bool(_NUMERIC.fullmatch(content) and _DIGIT.search(content))
 
     def row(self, line: int, width: int | None = None) -> list[float]:
         """Return the numbers of one line; numbers run together are parted at their signs.
@@ -223,7 +228,8 @@ class RecordText:
             InvalidInput: they differ: samples, units or header are damaged.
         """
         peak = np.abs(samples).max()
-        if abs(peak - abs(stated)) > tolerance * max(peak, abs(stated)):
+        apart = abs(peak - abs(stated))
+        if not (isfinite(apart) and apart <= tolerance * max(peak, abs(stated))):
             raise self.error(
                 f"the header states a peak of {abs(stated):g}, the samples reach {peak:g}: "
                 "one of them is damaged"

@@ -65,10 +65,12 @@ def test_eurocode_vertical_at_its_corners(type_, ratio):
 
 
 def test_eurocode_damping_lowers_all_but_the_start():
-    spectrum = Eurocode8(ag=0.2, damping=0.15)
+    spectrum = Eurocode8(ag=0.2, ground="A", damping=0.15)
     reduction = np.sqrt(10.0 / 20.0)
     assert spectrum.horizontal([0.0, 0.3]) == pytest.approx([0.2, 0.5 * reduction], rel=ROUND_OFF)
-    assert Eurocode8(ag=0.2, damping=0.5).horizontal(0.3) == pytest.approx(0.2 * 2.5 * 0.55)
+    assert Eurocode8(ag=0.2, ground="A", damping=0.5).horizontal(0.3) == pytest.approx(
+        0.2 * 2.5 * 0.55
+    )
 
 
 def test_table_is_straight_between_its_points():
@@ -82,13 +84,13 @@ def test_table_is_straight_between_its_points():
     [
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZF"), "needs a site study"),
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="C"), "ground class 'C' is unknown"),
-        (lambda: Tbec2018(ss=-1.0, s1=0.3), "both are > 0"),
-        (lambda: Tbec2018(ss=1.0, s1=0.3).vertical(3.01), "defined up to 3 s"),
-        (lambda: Tbec2018(ss=1.0, s1=0.3).horizontal(-0.1), "from 0 s upwards"),
+        (lambda: Tbec2018(ss=-1.0, s1=0.3, site="ZC"), "both are > 0"),
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").vertical(3.01), "defined up to 3 s"),
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").horizontal(-0.1), "from 0 s upwards"),
         (lambda: Eurocode8(ag=0.2, ground="S1"), "expected type 1 or 2 on ground A"),
-        (lambda: Eurocode8(ag=0.2, type=3), "expected type 1 or 2"),
-        (lambda: Eurocode8(ag=0.0), "expected more than 0"),
-        (lambda: Eurocode8(ag=0.2).horizontal(4.5), "defined up to 4 s"),
+        (lambda: Eurocode8(ag=0.2, ground="A", type=3), "expected type 1 or 2"),
+        (lambda: Eurocode8(ag=0.0, ground="A"), "expected more than 0"),
+        (lambda: Eurocode8(ag=0.2, ground="A").horizontal(4.5), "defined up to 4 s"),
         (lambda: TableSpectrum([0.0, 0.0], [1.0, 1.0]), "a row that grows"),
         (lambda: TableSpectrum([0.0, 1.0], [1.0, -1.0]), "2 positive values"),
         (lambda: TableSpectrum([0.0, 1.0], [1.0, 1.0]).vertical(0.5), "has no vertical"),
