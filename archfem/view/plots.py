@@ -33,7 +33,6 @@ from archfem.view.style import (
     legend,
 )
 from archfem.view.style import HINGE as RED
-from archfem.view.style import save as save
 
 LOOSE = 2.0
 """Mobilised friction at which its axis ends, relative to the largest coefficient: a joint about

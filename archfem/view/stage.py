@@ -98,7 +98,7 @@ class Stage:
         self._edges = _outlines(shape)
         self._outlines = _lines(self._flat(shape.places, EDGES), self._edges)
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
-        self._plotter.background_color = "white"
+        self._plotter.background_color = pv.Color("white")
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
         self._paint(np.zeros(setting.model.size))
         self._plotter.add_mesh(

@@ -1,0 +1,29 @@
+"""Every notebook runs, and arrives at its number."""
+
+import os
+import runpy
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "notebooks"
+
+EXPECTED = {
+    "01_an_arch_stands": ("crown", 0.2853, 5e-4),  # converged; 8 cells are within 3e-4
+    "02_how_thin_can_it_be": ("checked", 0.1075, 1e-4),  # Milankovitch (1907), four digits
+}
+"""Variable that a notebook ends with, its value, and how far off it may be."""
+
+
+def test_every_notebook_has_a_number():
+    assert {path.stem for path in FOLDER.glob("*.py")} == set(EXPECTED)
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_notebook_arrives_at_its_number(name, monkeypatch, tmp_path):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    variable, value, tolerance = EXPECTED[name]
+    found = runpy.run_path(str(FOLDER / f"{name}.py"))
+    assert found[variable] == pytest.approx(value, abs=tolerance)
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,203 @@
+"""Pictures on paper show what the criteria say, where the joints are, with units."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from archfem.criteria import hinged, opened, sliding
+from archfem.errors import InvalidInput
+from archfem.history import History
+from archfem.resultants import joint_dataset, thrust_line
+from archfem.view.marks import joint_ends, joint_marks
+from archfem.view.plots import draw_envelope, draw_joint_histories, draw_structure
+from archfem.view.style import save
+
+WEIGHT = 1e4  # normal force in every joint [N]: only signs and ratios matter
+HINGES = {0: -0.5, 6: 0.48, 12: -0.46}
+SLIDING = {3: 0.7, 9: -0.9}  # V / N beyond the coefficient 0.6
+APART = [4, 15]
+
+
+@pytest.fixture
+def joints(ring):
+    """Three hinges, two sliding joints and two open ones at one instant."""
+    return joint_dataset(ring, resultants(ring)).assign_coords(time=3.66)
+
+
+def resultants(ring):
+    found = np.zeros((len(ring.joints), 3))
+    found[:, 0] = WEIGHT
+    for number, e in HINGES.items():
+        found[number, 2] = e * WEIGHT * ring.joints[number].depth
+    for number, ratio in SLIDING.items():
+        found[number, 1] = ratio * WEIGHT
+    found[APART] = 0.0
+    return found
+
+
+@pytest.fixture
+def run(ring):
+    """A second in which three joints hinge half-way, and two come apart at the end."""
+    time = np.linspace(0.0, 1.0, 11)
+    found = np.zeros((11, len(ring.joints), 3))
+    found[..., 0] = WEIGHT
+    found[5] = found[10] = resultants(ring)
+    found[5, APART, 0] = WEIGHT
+    dataset = joint_dataset(ring, found, time)
+    dataset["ground"] = (("time", "axis"), np.column_stack([np.sin(9 * time), np.cos(9 * time)]))
+    return History(dataset)
+
+
+def drawn(figure, name):
+    """The one thing of a figure that is called so."""
+    found = figure.findobj(lambda artist: artist.get_gid() == name)
+    return found[0] if found else None
+
+
+def units(axes):
+    """Whether every label of axes has a unit."""
+    return all("[" in label for label in (axes.get_xlabel(), axes.get_ylabel()) if label)
+
+
+def test_each_hinge_is_a_circle_at_the_face_in_contact(ring, joints):
+    circles = drawn(draw_structure(ring, joints), "hinges").get_xydata()
+    assert len(circles) == int((hinged(joints) != 0).sum()) == 3
+    ends = [
+        ring.joints[n].extrados if e > 0 else ring.joints[n].intrados for n, e in HINGES.items()
+    ]
+    assert circles == pytest.approx(np.array(ends))
+
+
+def test_thrust_line_is_drawn_where_it_is_and_interrupted_at_open_joints(ring, joints):
+    line = drawn(draw_structure(ring, joints), "thrust").get_xydata()
+    assert line == pytest.approx(thrust_line(ring, joints).values, nan_ok=True)
+    assert np.flatnonzero(np.isnan(line[:, 0])).tolist() == APART
+
+
+def test_sliding_and_open_joints_have_their_own_marks(ring, joints):
+    figure = draw_structure(ring, joints)
+    assert len(drawn(figure, "slips").get_paths()) == 2 * int(sliding(joints).sum()) == 4
+    gaps = drawn(figure, "gaps").get_xydata().reshape(-1, 3, 2)[:, :2]
+    assert int(opened(joints).sum()) == len(gaps) == 2
+    assert gaps == pytest.approx(np.array([ring.joints[number].ends for number in APART]))
+
+
+def test_arrows_say_which_way_a_joint_slips(ring, joints):
+    """V > 0: the higher block, on the side of the normal, moves toward the extrados."""
+    arrows = joint_marks(ring, joints).slips.reshape(-1, 2, 7, 2)
+    for number, pair in zip(SLIDING, arrows, strict=True):
+        joint, normal = ring.joints[number], ring.normals[number]
+        tip, tail = pair[0, 3], pair[0, [0, 6]].mean(axis=0)
+        assert (pair[0].mean(axis=0) - joint.middle) @ normal > 0.0
+        assert np.sign((tip - tail) @ joint.tangent) == np.sign(SLIDING[number])
+        assert pair.mean(axis=(0, 1)) == pytest.approx(joint.middle)
+
+
+def test_nothing_failed_leaves_only_the_thrust_line(ring):
+    still = joint_dataset(ring, np.tile([WEIGHT, 0.0, 0.0], (len(ring.joints), 1)))
+    figure = draw_structure(ring, still)
+    assert [drawn(figure, name) for name in ("hinges", "slips", "gaps")] == [None] * 3
+    assert figure.axes[0].get_title() == ring.name
+
+
+def test_structure_is_drawn_true_to_scale_with_units_and_time(ring, joints):
+    figure = draw_structure(ring, joints)
+    axes = figure.axes[0]
+    assert len(drawn(figure, "blocks").get_paths()) == len(ring.blocks)
+    assert axes.get_aspect() == 1.0
+    assert "[m]" in axes.get_xlabel()
+    assert "[m]" in axes.get_ylabel()
+    assert "3.660 s" in axes.get_title()
+
+
+def test_drawing_into_given_axes_returns_their_figure(ring, joints):
+    page = Figure()
+    left, right = page.subplots(1, 2)
+    assert draw_structure(ring, joints, axes=left) is page
+    assert len(right.lines) == 0
+
+
+def test_several_instants_are_refused(ring, run):
+    with pytest.raises(InvalidInput, match=r"give one instant of the 18 joints"):
+        draw_structure(ring, run.joints)
+
+
+def test_envelope_shows_extremes_faces_and_dead_load(run):
+    axes = draw_envelope({"quake": run}, dead=run.joints.isel(time=0)).axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    highest = lines["quake"].get_ydata()
+    assert highest[[6, 0, 3]] == pytest.approx([0.48, 0.0, 0.0])
+    assert lines["dead load"].get_linestyle() == ":"
+    assert {-0.5, -0.46, 0.46, 0.5} <= {float(line.get_ydata()[0]) for line in axes.lines[:5]}
+    assert units(axes)
+    crosses = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    assert crosses[0].get_xdata().tolist() == APART
+
+
+def test_envelopes_of_runs_have_their_own_colours(run):
+    figure = draw_envelope({"one": run, "other": run})
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["one", "other", "came apart"]
+    lines = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
+    assert lines["one"] != lines["other"]
+
+
+@pytest.mark.parametrize("count", [0, 7])
+def test_too_few_or_many_runs_are_refused(run, count):
+    with pytest.raises(InvalidInput, match=rf"{count} runs in one picture: give 1 to 6"):
+        draw_envelope({str(k): run for k in range(count)})
+
+
+def test_joint_histories_show_the_recorded_values_and_limits(run):
+    figure = draw_joint_histories(run, [6, 3])
+    panels = np.array(figure.axes).reshape(3, 2)
+    assert all(units(axes) for axes in figure.axes)
+    for row, number in zip(panels[1:], (6, 3), strict=True):
+        for axes, name in zip(row, ("eccentricity", "friction"), strict=True):
+            shown = axes.lines[-1].get_ydata()
+            assert shown == pytest.approx(run.joints[name].sel(joint=number).values)
+        assert f"joint {number}" in row[0].get_ylabel()
+        assert row[1].lines[0].get_ydata()[0] == pytest.approx(0.6)
+    ground = {line.get_label(): line.get_ydata() for line in panels[0, 0].lines}
+    assert ground["horizontal"] == pytest.approx(run.dataset["ground"].values[:, 0])
+    assert ground["vertical"] == pytest.approx(run.dataset["ground"].values[:, 1])
+
+
+@pytest.mark.parametrize(("numbers", "said"), [([0, 18], r"\[18\]"), ([], "none")])
+def test_joints_that_do_not_exist_are_refused(run, numbers, said):
+    with pytest.raises(InvalidInput, match=rf"joints {said} cannot be drawn: .* 0 to 17"):
+        draw_joint_histories(run, numbers)
+
+
+@pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
+def test_a_figure_is_saved_whole(ring, tmp_path, suffix, start):
+    path = save(draw_structure(ring), tmp_path / "new" / f"ring{suffix}")
+    assert path.read_bytes().startswith(start)
+    assert [each.name for each in path.parent.iterdir()] == [path.name]
+
+
+def test_an_unknown_suffix_is_refused(ring, tmp_path):
+    with pytest.raises(InvalidInput, match=r"suffix '\.xyz': use one of .*'png'"):
+        save(draw_structure(ring), tmp_path / "ring.xyz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_marks_follow_the_blocks(ring):
+    """A rigid body displacement of all blocks carries every mark along."""
+    still = joint_dataset(ring, resultants(ring))
+    shift = np.tile([0.3, -0.2], (len(ring.joints), 2, 1))
+    rest, moved = joint_marks(ring, still), joint_marks(ring, still, shift=shift)
+    for name in ("thrust", "hinges", "slips", "gaps"):
+        expected = getattr(rest, name) + np.array([0.3, -0.2])
+        assert getattr(moved, name) == pytest.approx(expected, nan_ok=True)
+
+
+def test_ends_of_joints_move_as_the_mean_of_their_blocks(ring):
+    """Translated free blocks: an inner joint goes all the way, a springing half of it."""
+    from archfem.models.rigid import rigid
+
+    model = rigid(ring)
+    q = np.tile([0.01, 0.02, 0.0], len(ring.free))
+    moved = (joint_ends(model) @ q).reshape(-1, 2, 2)
+    assert moved[1:-1] == pytest.approx(np.broadcast_to([0.01, 0.02], (16, 2, 2)))
+    assert moved[[0, -1]] == pytest.approx(np.broadcast_to([0.005, 0.01], (2, 2, 2)))
