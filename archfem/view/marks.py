@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.criteria import HINGE, hinged, opened, sliding
@@ -25,6 +26,8 @@ class Marks:
 
     Attributes:
         thrust: points of the thrust line (n_joints, 2) [m]; NaN in an open joint.
+        links: pieces of the thrust line, through the blocks between two closed joints
+            (n_links, 2, 2) [m].
         hinges: points where hinged joints stay in contact (n_hinges, 2) [m].
         slips: outlines of two opposite arrows beside each sliding joint: the higher block's,
             then the lower's (2 n_sliding, 7, 2) [m].
@@ -32,6 +35,7 @@ class Marks:
     """
 
     thrust: Array
+    links: Array
     hinges: Array
     slips: Array
     gaps: Array
@@ -61,12 +65,25 @@ def joint_marks(
     failed = np.flatnonzero(side)
     slipping = np.flatnonzero(sliding(joints).values)
     arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
+    thrust = carried + thrust_line(structure, joints).values
+    links = thrust[_neighbours(structure)]
     return Marks(
-        thrust=carried + thrust_line(structure, joints).values,
+        thrust=thrust,
+        links=links[np.isfinite(links).all(axis=(1, 2))],
         hinges=ends[failed, (side[failed] > 0).astype(int)],
         slips=np.array(arrows).reshape(-1, *ARROW.shape),
         gaps=ends[opened(joints).values],
     )
+
+
+def _neighbours(structure: Structure) -> NDArray[np.intp]:
+    """Pairs of joints with a block between them that has no other joint (n_links, 2)."""
+    touching: list[list[int]] = [[] for _ in structure.blocks]
+    for number, joint in enumerate(structure.joints):
+        for block in joint.blocks:
+            touching[block].append(number)
+    pairs = [numbers for numbers in touching if len(numbers) == 2]
+    return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
 def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Array:

@@ -105,18 +105,19 @@ class Page:
 
     def _strip(self, run: History) -> Line2D:
         """Draw the acceleration of the ground, and make the cursor that will move over it."""
-        axes = self._axes(0.85, 0.55, self._inches[0] - 1.1, STRIP - 0.6)
+        axes = self._axes(0.85, 0.55, self._inches[0] - 1.1, STRIP - 0.75)
         ground = run.dataset["ground"].values
         dress(axes, "time [s]", "ground [m/s²]")
+        axes.plot(run.time, ground[:, 0], color=INK, lw=0.9, label="horizontal", zorder=3)
         if ground[:, 1].any():
             axes.plot(run.time, ground[:, 1], color=LINES[4], lw=0.8, label="vertical")
-        axes.plot(run.time, ground[:, 0], color=INK, lw=0.9, label="horizontal")
+            axes.legend(
+                loc="lower right", bbox_to_anchor=(1.0, 0.94), ncols=2, frameon=False, fontsize=TYPE
+            )
         axes.set_xlim(run.time[0], max(run.time[-1], run.time[0] + 1e-9))
         axes.tick_params(labelsize=TYPE)
         axes.xaxis.label.set_fontsize(TYPE)
         axes.yaxis.label.set_fontsize(TYPE)
-        if len(axes.lines) > 1:
-            axes.legend(loc="upper right", ncols=2, frameon=False, fontsize=TYPE)
         if run.mechanism is not None and run.mechanism.time is not None:
             _flag(axes, run.mechanism.time)
         return axes.axvline(run.time[0], color=HINGE, lw=1.8, animated=True)

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from archfem.criteria import HINGE, envelope, opened
 from archfem.errors import InvalidInput
 from archfem.history import History
-from archfem.structure import Structure
+from archfem.structure import Array, Structure
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     COLUMN,
@@ -135,6 +135,8 @@ def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = 
     panels = figure.subplots(rows, 2, sharex=True)
     for axes in panels[0]:
         _ground(axes, run)
+    if len(panels[0, 1].lines) > 1:
+        panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, loc="upper right")
     for (left, right), number in zip(panels[1:], joints, strict=True):
         _eccentricity(left, run.joints.sel(joint=number), limit)
         _friction(right, run.joints.sel(joint=number))
@@ -182,9 +184,9 @@ def _blocks(axes: Axes, structure: Structure) -> None:
 def _marks(axes: Axes, marks: Marks) -> None:
     """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
     halo = withStroke(linewidth=3.4, foreground="white")
-    line: dict[str, Any] = {"color": THRUST, "label": "thrust line", "gid": "thrust", "zorder": 5}
-    axes.plot(*marks.thrust.T, lw=1.7, path_effects=[halo], **line)
-    axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5)
+    line: dict[str, Any] = {"color": THRUST, "lw": 1.7, "zorder": 5, "path_effects": [halo]}
+    axes.plot(*_broken(marks.links).T, label="thrust line", gid="links", **line)
+    axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5, gid="thrust")
     if len(marks.hinges):
         disc: dict[str, Any] = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
@@ -202,10 +204,16 @@ def _marks(axes: Axes, marks: Marks) -> None:
         }
         axes.plot([], [], ls="", label="sliding joint", **symbol)
     if len(marks.gaps):
-        apart = np.insert(marks.gaps, 2, np.nan, axis=1).reshape(-1, 2)
         edge = [withStroke(linewidth=3.8, foreground=EDGE)]
         style: dict[str, Any] = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4}
-        axes.plot(*apart.T, label="open joint", gid="gaps", solid_capstyle="butt", **style)
+        axes.plot(
+            *_broken(marks.gaps).T, label="open joint", gid="gaps", solid_capstyle="butt", **style
+        )
+
+
+def _broken(pieces: Array) -> Array:
+    """Pieces of a line (n, 2, 2), one after another, with a break after each (3 n, 2)."""
+    return np.insert(pieces, 2, np.nan, axis=1).reshape(-1, 2)
 
 
 def _faces(axes: Axes, limit: float) -> None:

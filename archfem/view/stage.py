@@ -26,6 +26,9 @@ SWING = 0.06
 DISC = 0.0125
 """Radius of a hinge in a picture, relative to the size of the structure."""
 
+FULL = 1100.0
+"""Width of a photograph at which lines are as wide as given [pixels]."""
+
 MARGIN = 0.02
 """Room around the structure, relative to its size."""
 
@@ -93,6 +96,7 @@ class Stage:
         _go_headless()
         self._setting = setting
         shape = setting.model.shape
+        self._pen = max(0.6, size[0] / FULL)
         self._height = 1e-3 * setting.model.structure.size
         self._blocks = _surface(shape)
         self._edges = _outlines(shape)
@@ -138,12 +142,12 @@ class Stage:
         self._blocks.points = self._flat(places, 0)
         self._outlines.points = self._flat(places, EDGES)
         self._paint(q)
-        line = np.isfinite(marks.thrust[:, 0])
-        segments = np.flatnonzero(line[:-1] & line[1:])[:, None] + [0, 1]
-        points = np.nan_to_num(marks.thrust)
-        self._meshes["halo"].dataset = _lines(self._flat(points, HALO), segments)
-        self._meshes["thrust"].dataset = _lines(self._flat(points, LINE), segments)
-        self._meshes["dots"].dataset = self._discs(marks.thrust[line], LINE, 0.35)
+        pairs = np.arange(2 * len(marks.links)).reshape(-1, 2)
+        for name, layer in (("halo", HALO), ("thrust", LINE)):
+            points = self._flat(marks.links.reshape(-1, 2), layer)
+            self._meshes[name].dataset = _lines(points, pairs)
+        dots = marks.thrust[np.isfinite(marks.thrust[:, 0])]
+        self._meshes["dots"].dataset = self._discs(dots, LINE, 0.35)
         self._meshes["past"].dataset = self._discs(past, PAST, 1.0)
         self._meshes["slips"].dataset = self._polygons(marks.slips, ARROWS)
         self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
@@ -188,7 +192,7 @@ class Stage:
         mapper = pv.DataSetMapper(mesh)
         actor = pv.Actor(mapper=mapper)
         actor.prop.color, actor.prop.opacity = colour, opacity
-        actor.prop.line_width, actor.prop.lighting = width, False
+        actor.prop.line_width, actor.prop.lighting = width * self._pen, False
         self._plotter.add_actor(actor, render=False)
         return mapper
 

@@ -20,8 +20,8 @@ LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 SMALL, NORMAL = 8.0, 9.5
 """Sizes of type [points]: ticks, legends and labels; titles."""
 
-COLUMN = 6.4
-"""Width of a picture [inch]."""
+COLUMN, TALL = 6.4, 6.8
+"""Width and largest height of a picture [inch]."""
 
 
 def dress(axes: Axes, x: str = "", y: str = "") -> None:
@@ -52,8 +52,9 @@ def canvas(structure: Structure) -> Figure:
     """An empty page that fits a structure."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
-    height = float(np.clip(0.9 * COLUMN * high / wide + 1.1, 2.4, 8.0))
-    return Figure(figsize=(COLUMN, height), layout="constrained")
+    scale = min((COLUMN - 0.8) / wide, (TALL - 1.2) / high)
+    size = max(0.5 * COLUMN, scale * wide + 0.8), max(0.35 * COLUMN, scale * high + 1.2)
+    return Figure(figsize=size, layout="constrained")
 
 
 def save(figure: Figure, path: str | Path) -> Path:

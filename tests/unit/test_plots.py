@@ -72,6 +72,9 @@ def test_thrust_line_is_drawn_where_it_is_and_interrupted_at_open_joints(ring, j
     line = drawn(draw_structure(ring, joints), "thrust").get_xydata()
     assert line == pytest.approx(thrust_line(ring, joints).values, nan_ok=True)
     assert np.flatnonzero(np.isnan(line[:, 0])).tolist() == APART
+    pieces = drawn(draw_structure(ring, joints), "links").get_xydata().reshape(-1, 3, 2)[:, :2]
+    joined = [k for k in range(17) if k not in APART and k + 1 not in APART]
+    assert pieces == pytest.approx(np.array([line[[k, k + 1]] for k in joined]))
 
 
 def test_sliding_and_open_joints_have_their_own_marks(ring, joints):
@@ -187,7 +190,7 @@ def test_marks_follow_the_blocks(ring):
     still = joint_dataset(ring, resultants(ring))
     shift = np.tile([0.3, -0.2], (len(ring.joints), 2, 1))
     rest, moved = joint_marks(ring, still), joint_marks(ring, still, shift=shift)
-    for name in ("thrust", "hinges", "slips", "gaps"):
+    for name in ("thrust", "links", "hinges", "slips", "gaps"):
         expected = getattr(rest, name) + np.array([0.3, -0.2])
         assert getattr(moved, name) == pytest.approx(expected, nan_ok=True)
 
