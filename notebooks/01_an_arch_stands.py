@@ -15,6 +15,7 @@
 # go?** And how fine must a model be before we may believe its answer?
 
 # %%
+# %matplotlib inline
 import numpy as np
 import pandas as pd
 

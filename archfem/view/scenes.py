@@ -64,15 +64,12 @@ def animate(
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
     frames, fps = _frames(run.dataset["frame_time"].values, fps, seconds)
-    fields = run.dataset["q"].values[frames]
-    setting = Setting.of(model, fields, colour, magnification)
-    page = Page(setting, size, run)
+    setting = Setting.of(model, run.dataset["q"].values[frames], colour, magnification)
     target.parent.mkdir(parents=True, exist_ok=True)
     draft = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
-        with Stage(setting, page.room) as stage, _writer(draft, fps) as film:
-            shots = _shots(setting, run, stage, page, frames)
-            for shot in tqdm(shots, total=len(frames), unit="frame", disable=None, leave=False):
+        with _writer(draft, fps) as film:
+            for shot in _shots(setting, run, frames, size):
                 film.append_data(shot)
         os.replace(draft, target)
     finally:
@@ -114,20 +111,22 @@ def picture(
         return page.compose(stage.photograph(q, marks, np.zeros((0, 2))), joints)
 
 
-def _shots(
-    setting: Setting, run: History, stage: Stage, page: Page, frames: Array
-) -> Iterator[Image]:
-    """Every frame of a film, one after another."""
+def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
+    """Every frame of a film, one after another; on a terminal a bar shows progress."""
     structure, carriers = setting.model.structure, joint_ends(setting.model)
     times = run.dataset["frame_time"].values[frames]
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
     been = _been(run.joints)
     still = np.array([joint.ends for joint in structure.joints])
-    for step, q in zip(steps, run.dataset["q"].values[frames], strict=True):
-        joints = run.joints.isel(time=int(step))
-        shift = _shift(setting, carriers, q)
-        marks = joint_marks(structure, joints, shift=shift)
-        yield page.compose(stage.photograph(q, marks, (still + shift)[been[step]]), joints)
+    page = Page(setting, size, run)
+    shown = zip(steps, run.dataset["q"].values[frames], strict=True)
+    with Stage(setting, page.room) as stage:
+        for step, q in tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False):
+            joints = run.joints.isel(time=int(step))
+            shift = _shift(setting, carriers, q)
+            marks = joint_marks(structure, joints, shift=shift)
+            past = (still + shift)[been[step]]
+            yield page.compose(stage.photograph(q, marks, past), joints)
 
 
 def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
