@@ -1,8 +1,10 @@
 """The joint operator: from coordinates to opening and slip at points, and back to forces.
 
-With G the sparse operator that takes generalised coordinates q to (opening, slip) at the joint
-quadrature points and W their weights, the forces of all joints are Gᵀ W t(G q), their tangent is
-Gᵀ W D G. Whatever the coordinates are (nodes, rigid motions, modes), the rest is the same.
+With G the sparse operator that takes generalised coordinates q to (opening, slip) at points along
+the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G. Whatever the
+coordinates are (nodes, rigid motions, modes), the rest is the same. How the traction between and
+at the points becomes the forces f is the law's: springs at quadrature points, f = W t, or the exact
+integral over facets along which opening and slip are linear.
 """
 
 from dataclasses import dataclass, replace
@@ -12,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.laws import is_closed, normal_traction, shear_traction
+from archfem.laws import is_closed, normal_traction
+from archfem.quadrature import Quadrature
+from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
 
+Numbers = NDArray[np.intp]
 Status = NDArray[np.bool_]
 
 
@@ -31,7 +36,7 @@ class JointPoints:
         count: number of joints.
     """
 
-    joint: NDArray[np.intp]
+    joint: Numbers
     arm: Array
     weight: Array
     normal_stiffness: Array
@@ -53,89 +58,192 @@ class JointPoints:
             len(rules),
         )
 
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """The traction integrated by a quadrature rule: each point is a spring of its own.
+
+    The stiffness of the points is all or nothing, so the tangent changes only with the status.
+
+    Attributes:
+        points: where the springs are.
+    """
+
+    points: JointPoints
+
+    @property
+    def entries(self) -> tuple[Numbers, Numbers]:
+        """Pairs of points whose forces and openings are coupled."""
+        number = np.arange(len(self.points.arm))
+        return number, number
+
     @cached_property
-    def sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Matrices (n_joints, p) that sum tractions over each joint to a force, and a moment."""
-        points = np.arange(len(self.joint))
-        shape = (self.count, len(points))
-        force = sparse.csr_matrix((self.weight, (self.joint, points)), shape)
-        moment = sparse.csr_matrix((self.weight * self.arm, (self.joint, points)), shape)
-        return force, moment
+    def _normal(self) -> Array:
+        return self.points.weight * self.points.normal_stiffness
 
-    def resultants(self, normal: Array, shear: Array) -> Array:
-        """Resultants N, V, M of the tractions at the points.
+    @cached_property
+    def shear(self) -> sparse.csr_matrix:
+        """Shear forces at the points from slips (p, p) [N/m]."""
+        return sparse.diags(self.points.weight * self.points.shear_stiffness).tocsr()
 
-            N = -∫ w t_n,   V = ∫ w t_s,   M = -∫ w t_n r
+    def forces(self, opening: Array) -> Array:
+        """Normal forces at the points, positive where they pull (p,) [N]."""
+        return normal_traction(opening, self._normal)
 
-        Args:
-            normal: t_n (p,) or (p, steps) [Pa].
-            shear: t_s, the same shape [Pa].
+    def stiffness(self, opening: Array) -> Array:
+        """Derivative of `forces`, one number for each of `entries` [N/m]."""
+        return np.where(is_closed(opening), self._normal, 0.0)
 
-        Returns:
-            (n_joints, 3) or (n_joints, 3, steps) [N, N, N m].
-        """
-        force, moment = self.sums
-        return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """The traction integrated exactly over facets along which the opening is linear.
+
+    With φ the two linear functions of a facet and c the part of it that is closed,
+
+        f_i = K_ij g_j,   K_ij = ∫_c w k_n φ_i φ_j,
+
+    and because the traction vanishes at the end of c, K is the derivative of f as well.
+
+    Attributes:
+        points: two to a facet, its ends, in turn.
+    """
+
+    points: JointPoints
+
+    @property
+    def _starts(self) -> Numbers:
+        return np.arange(0, len(self.points.arm), 2)
+
+    @property
+    def entries(self) -> tuple[Numbers, Numbers]:
+        """Pairs of points whose forces and openings are coupled."""
+        a, b = self._starts, self._starts + 1
+        return np.concatenate([a, a, b, b]), np.concatenate([a, b, a, b])
+
+    @cached_property
+    def _normal(self) -> Array:
+        both = self.points.weight * self.points.normal_stiffness
+        return both[0::2] + both[1::2]
+
+    @cached_property
+    def shear(self) -> sparse.csr_matrix:
+        """Shear forces at the ends from slips, exact for linear slip (p, p) [N/m]."""
+        both = self.points.weight * self.points.shear_stiffness
+        whole = sparse.diags((both[0::2] + both[1::2]) / 6.0)
+        return sparse.kron(whole, [[2.0, 1.0], [1.0, 2.0]]).tocsr()
+
+    def _closed(self, opening: Array) -> tuple[Array, Array, Array]:
+        """∫_c φ_i φ_j over a facet of unit length, for (1, 1), (1, 2) and (2, 2)."""
+        a, b = opening[0::2], opening[1::2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zero = np.where(a != b, np.clip(a / (a - b), 0.0, 1.0), 0.0)
+        start = np.where(is_closed(a), 0.0, zero)
+        end = np.where(is_closed(b), 1.0, zero)
+        closed = is_closed(a) | is_closed(b)
+        start, end = np.where(closed, start, 0.0), np.where(closed, end, 0.0)
+        squares, cubes = (end**2 - start**2) / 2.0, (end**3 - start**3) / 3.0
+        return (end - start) - 2.0 * squares + cubes, squares - cubes, cubes
+
+    def forces(self, opening: Array) -> Array:
+        """Normal forces at the ends of the facets, positive where they pull (p,) [N]."""
+        first, mixed, second = self._closed(opening)
+        a, b = opening[0::2], opening[1::2]
+        ends = self._normal * np.stack([first * a + mixed * b, mixed * a + second * b])
+        return ends.T.ravel()
+
+    def stiffness(self, opening: Array) -> Array:
+        """Derivative of `forces`, one number for each of `entries` [N/m]."""
+        first, mixed, second = self._closed(opening)
+        return np.concatenate([self._normal * k for k in (first, mixed, mixed, second)])
+
+
+Law = Springs | Facets
 
 
 @dataclass(frozen=True, eq=False)
 class JointOperator:
-    """Opening and slip at the joint points as linear functions of coordinates.
+    """Opening and slip along the joints as linear functions of coordinates, and their forces.
 
     Attributes:
-        points: where, and how stiff.
+        law: forces from openings and slips, and the points at which those are taken.
         opening: rows of G for the opening, positive open (p, n).
         slip: rows of G for the slip, of the higher block toward the extrados (p, n).
     """
 
-    points: JointPoints
+    law: Law
     opening: sparse.csr_matrix
     slip: sparse.csr_matrix
 
-    @cached_property
-    def _transposed(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        weight = sparse.diags(self.points.weight)
-        return (weight @ self.opening).T.tocsr(), (weight @ self.slip).T.tocsr()
+    @property
+    def points(self) -> JointPoints:
+        """Where openings and slips are taken."""
+        return self.law.points
 
-    def tractions(self, q: Array) -> tuple[Array, Array]:
-        """Normal and shear traction at the points (p,), (p,) [Pa]."""
-        return (
-            normal_traction(self.opening @ q, self.points.normal_stiffness),
-            shear_traction(self.slip @ q, self.points.shear_stiffness),
-        )
+    @cached_property
+    def _back(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        return self.opening.T.tocsr(), (self.slip.T @ self.law.shear).tocsr()
+
+    @cached_property
+    def _sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Matrices (n_joints, p) that sum forces over each joint, and their moments."""
+        points = self.points
+        shape = (points.count, len(points.arm))
+        places = (points.joint, np.arange(len(points.arm)))
+        force = sparse.csr_matrix((np.ones(shape[1]), places), shape)
+        return force, sparse.csr_matrix((points.arm, places), shape)
 
     def force(self, q: Array) -> Array:
         """Generalised forces that the joints exert, as internal forces (n,)."""
-        normal, shear = self.tractions(q)
-        opening, slip = self._transposed
-        return opening @ normal + slip @ shear
+        normal, shear = self._back
+        return normal @ self.law.forces(self.opening @ q) + shear @ (self.slip @ q)
 
     def energy(self, q: Array) -> float:
-        """Energy stored in the joints [J]."""
-        normal, shear = self.tractions(q)
-        stored = normal**2 / self.points.normal_stiffness + shear**2 / self.points.shear_stiffness
-        return 0.5 * float(self.points.weight @ stored)
+        """Energy stored in the joints [J]; forces are homogeneous, so it is half of f·g."""
+        opening, slip = self.opening @ q, self.slip @ q
+        return 0.5 * float(opening @ self.law.forces(opening) + slip @ (self.law.shear @ slip))
 
     def status(self, q: Array) -> Status:
         """Which points are closed (p,)."""
         return is_closed(self.opening @ q)
 
-    def stiffness(self, closed: Status) -> sparse.csr_matrix:
-        """Tangent of `force` with these points closed (n, n)."""
-        opening, slip = self._transposed
-        normal = sparse.diags(np.where(closed, self.points.normal_stiffness, 0.0))
-        shear = sparse.diags(self.points.shear_stiffness)
-        return (opening @ normal @ self.opening + slip @ shear @ self.slip).tocsr()
+    def stiffness(self, q: Array) -> Array:
+        """The numbers on which the tangent depends, for `normal_stiffness` (entries,) [N/m]."""
+        return self.law.stiffness(self.opening @ q)
+
+    def normal_stiffness(self, pattern: Pattern) -> sparse.csr_matrix:
+        """Linear map from `stiffness` to the entries of the tangent on a pattern (nnz, entries)."""
+        first, second = self.law.entries
+        return pattern.outer(self.opening[first], self.opening[second])
+
+    def shear_stiffness(self) -> sparse.csr_matrix:
+        """The part of the tangent that never changes (n, n)."""
+        return (self._back[1] @ self.slip).tocsr()
 
     def couplings(self) -> sparse.csr_matrix:
-        """A matrix with an entry wherever `stiffness` may have one, whatever cancels (n, n)."""
+        """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
+        first, second = self.law.entries
         opening, slip = abs(self.opening), abs(self.slip)
-        return (opening.T @ opening + slip.T @ slip).tocsr()
+        across = opening[first].T @ opening[second]
+        return (across + slip.T @ self.law.shear @ slip).tocsr()
 
     def resultants(self, q: Array) -> Array:
-        """N, V, M of every joint (n_joints, 3) [N, N, N m]."""
-        return self.points.resultants(*self.tractions(q))
+        """N, V, M of every joint (n_joints, 3) [N, N, N m].
+
+        N = -∫ w t_n,   V = ∫ w t_s,   M = -∫ w t_n r
+        """
+        normal = self.law.forces(self.opening @ q)
+        shear = self.law.shear @ (self.slip @ q)
+        force, moment = self._sums
+        return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
 
     def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
         """Express the same joints in the coordinates of a basis (n, m): G B."""
-        return replace(self, opening=self.opening @ basis, slip=self.slip @ basis)
+        return replace(
+            self, opening=(self.opening @ basis).tocsr(), slip=(self.slip @ basis).tocsr()
+        )
+
+
+def law_of(rule: Quadrature, points: JointPoints) -> Law:
+    """The law that a quadrature rule asks for."""
+    return Facets(points) if rule.rule == "exact" else Springs(points)

@@ -3,13 +3,13 @@
 import numpy as np
 from scipy import sparse
 
-from archfem.joints import JointOperator, JointPoints
+from archfem.joints import JointOperator, JointPoints, law_of
 from archfem.quadrature import Quadrature
 from archfem.structure import Array, Structure
 
 
 def motion_of(points: Array, centroid: Array) -> Array:
-    """Displacement of points of a block per unit rigid motion (p, 2, 3).
+    """Displacement of points per unit rigid motion about a centroid, or one for each (p, 2, 3).
 
     For small motions (u, v, θ), anticlockwise θ, a point moves by u - θ (y - y_c) along x and by
     v + θ (x - x_c) along y.
@@ -51,22 +51,25 @@ def rigid_joints(structure: Structure, cells: int, rule: Quadrature) -> JointOpe
     places = middles + points.arm[:, None] * tangents
     jump = _jump(structure, points, places, size)
     normals = structure.normals[points.joint]
-    return JointOperator(points, _along(normals, jump), _along(tangents, jump))
+    return JointOperator(law_of(rule, points), _along(normals, jump), _along(tangents, jump))
 
 
 def _jump(structure: Structure, points: JointPoints, places: Array, size: int) -> list[Array]:
     """Displacement of the higher block less that of the lower, x and y: two (p, n) matrices."""
-    start = first_coordinate(structure)
-    jump = [sparse.lil_matrix((len(places), size)) for _ in range(2)]
-    for number, joint in enumerate(structure.joints):
-        rows = np.flatnonzero(points.joint == number)
-        for block, sign in ((joint.higher, 1.0), (joint.lower, -1.0)):
-            if block in start:
-                motion = motion_of(places[rows], structure.blocks[block].centroid)
-                columns = slice(start[block], start[block] + 3)
-                for axis in range(2):
-                    jump[axis][rows[0] : rows[-1] + 1, columns] = sign * motion[:, axis]
-    return [matrix.tocsr() for matrix in jump]
+    start = np.full(len(structure.blocks), -1)
+    start[list(structure.free)] = 3 * np.arange(len(structure.free))
+    centroids = np.array([block.centroid for block in structure.blocks])
+    jump = [sparse.csr_matrix((len(places), size)) for _ in range(2)]
+    for side, sign in (("higher", 1.0), ("lower", -1.0)):
+        block = np.array([getattr(joint, side) for joint in structure.joints])[points.joint]
+        rows = np.flatnonzero(start[block] >= 0)
+        motion = sign * motion_of(places[rows], centroids[block[rows]])
+        columns = start[block[rows], None] + np.arange(3)
+        where = (np.repeat(rows, 3), columns.ravel())
+        for axis in range(2):
+            values = motion[:, axis].ravel()
+            jump[axis] = jump[axis] + sparse.csr_matrix((values, where), jump[axis].shape)
+    return jump
 
 
 def _along(directions: Array, jump: list[Array]) -> sparse.csr_matrix:

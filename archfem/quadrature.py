@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from archfem.errors import InvalidInput
 
 Array = NDArray[np.float64]
-RULES = ("lobatto", "nodal", "gauss")
+RULES = ("lobatto", "nodal", "gauss", "exact")
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,11 @@ class Quadrature:
     joint (Lobatto, nodal) can reach |e| = 0.5 and a Gauss rule cannot.
 
     Attributes:
-        rule: "lobatto", "gauss", or "nodal": springs at the nodes, weighted by the trapezoidal
-            rule (degree 1) or Simpson's (degree 2), as in Demirel and Aldemir (2021).
-        points: points on a facet; None takes 3, and for "nodal" those of the element.
+        rule: "lobatto" or "gauss"; "nodal": springs at the nodes, weighted by the trapezoidal
+            rule (degree 1) or Simpson's (degree 2), as in Demirel and Aldemir (2021); "exact":
+            the traction integrated in closed form, for facets along which the opening is linear.
+        points: points on a facet; None takes 3, for "nodal" those of the element, for "exact"
+            the two ends, which neighbouring facets then do not share.
     """
 
     rule: str = "lobatto"
@@ -32,9 +34,9 @@ class Quadrature:
         """Refuse unknown rules and impossible numbers of points."""
         if self.rule not in RULES:
             raise InvalidInput(f"quadrature '{self.rule}' is not known: use one of {RULES}")
-        if self.rule == "nodal" and self.points is not None:
+        if self.rule in ("nodal", "exact") and self.points is not None:
             raise InvalidInput(
-                f"nodal quadrature has the nodes as its points, not {self.points}: leave points out"
+                f"{self.rule} quadrature has points of its own, not {self.points}: leave points out"
             )
         least = 1 if self.rule == "gauss" else 2
         if self.points is not None and not least <= self.points <= 64:
@@ -44,6 +46,8 @@ class Quadrature:
 
     def count(self, degree: int) -> int:
         """Points on one facet of an element of this degree."""
+        if self.rule == "exact":
+            return 2
         if self.rule == "nodal":
             return degree + 1
         return self.points or 3
@@ -68,7 +72,7 @@ class Quadrature:
         """
         unit, share = self.on_facet(degree)
         lengths = np.diff(breaks)[:, None]
-        stride = len(unit) - (self.rule != "gauss")  # all but Gauss share their end points
+        stride = len(unit) - (self.rule in ("lobatto", "nodal"))  # these share their end points
         number = stride * np.arange(len(lengths))[:, None] + np.arange(len(unit))
         points = np.empty(number[-1, -1] + 1)
         weights = np.zeros_like(points)

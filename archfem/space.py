@@ -14,7 +14,7 @@ from scipy import sparse
 
 from archfem import _fenicsx
 from archfem.errors import InvalidInput
-from archfem.joints import JointOperator, JointPoints
+from archfem.joints import JointOperator, JointPoints, law_of
 from archfem.mesh import Mesh
 from archfem.quadrature import Quadrature
 from archfem.structure import Array
@@ -94,7 +94,7 @@ def joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
         _component(jumps, directions)[:, space.free].tocsr()
         for directions in (structure.normals[points.joint], tangents)
     )
-    return JointOperator(points, opening, slip)
+    return JointOperator(law_of(rule, points), opening, slip)
 
 
 def _joint_nodes(space: BrokenSpace) -> list[Nodes]:

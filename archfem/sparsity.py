@@ -56,18 +56,19 @@ class Pattern:
         np.add.at(data, self._places(entries.row, entries.col), entries.data)
         return self.matrix(data)
 
-    def outer(self, rows: sparse.csr_matrix, weights: Array) -> sparse.csr_matrix:
-        """Linear map (nnz, p) from factors d to the entries of Σ_i d_i w_i r_i r_iᵀ.
+    def outer(self, left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
+        """Linear map (nnz, m) from factors d to the entries of Σ_k d_k l_k r_kᵀ.
 
         Args:
-            rows: r_i (p, n).
-            weights: w_i (p,).
+            left: l_k (m, n).
+            right: r_k (m, n).
         """
-        length = np.diff(rows.indptr)
-        point = np.repeat(np.arange(rows.shape[0]), length**2)
-        within = np.arange(len(point)) - np.repeat(np.cumsum(length**2) - length**2, length**2)
-        first = rows.indptr[point] + within // length[point]
-        second = rows.indptr[point] + within % length[point]
-        values = rows.data[first] * rows.data[second] * weights[point]
-        place = self._places(rows.indices[first], rows.indices[second])
-        return sparse.csr_matrix((values, (place, point)), (len(self.indices), rows.shape[0]))
+        across, down = np.diff(right.indptr), np.diff(left.indptr)
+        size = down * across
+        which = np.repeat(np.arange(left.shape[0]), size)
+        within = np.arange(len(which)) - np.repeat(np.cumsum(size) - size, size)
+        first = left.indptr[which] + within // across[which]
+        second = right.indptr[which] + within % across[which]
+        places = self._places(left.indices[first], right.indices[second])
+        values = left.data[first] * right.data[second]
+        return sparse.csr_matrix((values, (places, which)), (len(self.indices), left.shape[0]))

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem.actions import Action, BodyForce
-from archfem.joints import JointOperator, Status
+from archfem.joints import JointOperator
 from archfem.models.shape import Shape
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
@@ -29,7 +29,6 @@ class Jointed:
         shape: Shape,
     ) -> None:
         pattern = Pattern.of(mass, blocks, joints.couplings())
-        none = joints.stiffness(np.zeros(len(joints.points.arm), dtype=bool))
         self.structure = structure
         self.fidelity = fidelity
         self.size = mass.shape[0]
@@ -39,11 +38,9 @@ class Jointed:
         self.joints = joints
         self.shape = shape
         self._pattern = pattern
-        self._always = self.blocks.data + pattern.spread(none).data
-        self._closing = pattern.outer(
-            joints.opening, joints.points.weight * joints.points.normal_stiffness
-        )
-        self._last: tuple[Status, sparse.csr_matrix] | None = None
+        self._always = self.blocks.data + pattern.spread(joints.shear_stiffness()).data
+        self._across = joints.normal_stiffness(pattern)
+        self._last: tuple[Array, sparse.csr_matrix] | None = None
 
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""
@@ -51,10 +48,10 @@ class Jointed:
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Derivative of `force`; the same object as before while no point opens or closes."""
-        closed = self.joints.status(q)
-        if self._last is None or not np.array_equal(closed, self._last[0]):
-            matrix = self._pattern.matrix(self._always + self._closing @ closed)
-            self._last = (closed, matrix)
+        stiffness = self.joints.stiffness(q)
+        if self._last is None or not np.array_equal(stiffness, self._last[0]):
+            matrix = self._pattern.matrix(self._always + self._across @ stiffness)
+            self._last = (stiffness, matrix)
         return self._last[1]
 
     def energy(self, q: Array) -> float:
