@@ -74,11 +74,12 @@ class Motion:
 
         Args:
             path: PEER AT2, AFAD, ESM/ITACA, COSMOS V2, CSMIP/CDMG V2, USGS SMC, K-NET, or columns.
-            vertical: second file, that holds the vertical component.
-            transverse: another file, that holds the other horizontal.
-            column: take this component or plain column only, counted from 1.
-            units: unit of plain columns: g, m/s2, cm/s2 or gal.
-            dt: time between samples of plain columns [s].
+            vertical: second file, with the vertical component and its own unit and step; one that
+                states neither is read by itself, and added by `with_vertical`.
+            transverse: another file, that holds the other horizontal, likewise.
+            column: take this component or plain column of `path` only, counted from 1.
+            units: unit of the plain columns of `path`: g, m/s2, cm/s2 or gal.
+            dt: time between samples of the plain columns of `path` [s].
 
         Raises:
             InvalidInput: what cannot be read without doubt, with file and line.
@@ -86,9 +87,9 @@ class Motion:
         channels = read_channels(path, column=column, units=units, dt=dt)
         motion = cls._from_channels(channels, Path(path))
         if vertical is not None:
-            motion = motion.with_vertical(cls.read(vertical, units=units, dt=dt))
+            motion = motion.with_vertical(cls.read(vertical))
         if transverse is not None:
-            motion = motion.with_transverse(cls.read(transverse, units=units, dt=dt))
+            motion = motion.with_transverse(cls.read(transverse))
         return motion
 
     @classmethod

@@ -1,7 +1,8 @@
 """A damped oscillator under a ground acceleration that runs straight from sample to sample."""
 
 import numpy as np
-from scipy import linalg, signal
+import scipy  # loads scipy.signal, which is slow, when it is first used
+from scipy import linalg
 
 from archfem.errors import InvalidInput
 
@@ -79,7 +80,7 @@ def displacement(samples: np.ndarray, dt: float, period: float, damping: float) 
     determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
     # At rest at the first sample, whatever the acceleration there.
     rest = samples[0] * np.array([-numerator[0], now[0] - numerator[1]])
-    return signal.lfilter(numerator, [1.0, -trace, determinant], samples, zi=rest)[0]
+    return scipy.signal.lfilter(numerator, [1.0, -trace, determinant], samples, zi=rest)[0]
 
 
 def interpolated(samples: np.ndarray, parts: int) -> np.ndarray:

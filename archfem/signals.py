@@ -1,7 +1,8 @@
 """What is done to one sampled acceleration: integrals, filters, base line, resampling, energy."""
 
 import numpy as np
-from scipy import integrate, signal
+import scipy  # loads scipy.signal, which is slow, when it is first used
+from scipy import integrate
 
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
@@ -106,9 +107,9 @@ def band_passed(
             f"0 < low < high < {0.5 / dt:g} Hz"
         )
     pad = int(np.ceil(1.5 * order / low / dt))
-    filter_ = signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
+    filter_ = scipy.signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
     padded = np.pad(samples, pad)
-    return signal.sosfiltfilt(filter_, padded, padlen=0)[pad:-pad]
+    return scipy.signal.sosfiltfilt(filter_, padded, padlen=0)[pad:-pad]
 
 
 def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:

@@ -183,3 +183,20 @@ def test_synthetic_motion_repeats_and_ends_at_rest():
         assert first.displacement(component)[-1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InvalidInput, match="50 samples or more"):
         Motion.synthetic(duration=0.1)
+
+
+def test_each_file_is_read_by_its_own_units_and_step(tmp_path):
+    plain = tmp_path / "level.txt"
+    plain.write_text("\n".join(f"{value} 0.0" for value in (0, 98.1, -49.05, 0)))
+    upright = tmp_path / "upright.AT2"
+    header = ("RECORD OF A TEST", "TEST, STATION, UP", "ACCELERATION IN UNITS OF G")
+    upright.write_text("\n".join((*header, "NPTS= 3, DT= .0050 SEC", "0.0 0.02 -0.01\n")))
+    keywords = {"column": 1, "units": "cm/s2", "dt": 0.005}
+    motion = Motion.read(plain, vertical=upright, transverse=upright, **keywords)
+    assert motion.horizontal == pytest.approx([0.0, 0.981, -0.4905, 0.0])
+    assert motion.vertical == pytest.approx(np.array([0.0, 0.02, -0.01]) * STANDARD_GRAVITY)
+    assert motion.transverse == pytest.approx(motion.vertical)
+    with pytest.raises(InvalidInput, match=r"upright\.AT2.*states its units"):
+        Motion.read(upright, units="g")
+    with pytest.raises(InvalidInput, match=r"level\.txt"):  # states no unit itself
+        Motion.read(upright, vertical=plain)
