@@ -10,10 +10,11 @@ t_n = k_n <g + β ġ>_-: a continuous law, whose energy stays convex. Damping on
 (the initial stiffness, or that of the blocks alone) enters through C.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
@@ -47,6 +48,37 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
+class Batch:
+    """Some steps of a run, one after another.
+
+    Attributes:
+        times: at their ends (steps,) [s].
+        resultants: N, V, M of every joint (steps, n_joints, 3) [N, N, N m].
+        iterations: of Newton's method, or passes over the open points (steps,).
+        smallest: the smallest step that was needed to get there (steps,) [s].
+        state: gives the state at the end of step k.
+    """
+
+    times: Array
+    resultants: Array
+    iterations: NDArray[np.int64]
+    smallest: Array
+    state: Callable[[int], State]
+
+    def cut(self, steps: int) -> "Batch":
+        """The first steps of the batch."""
+        if steps == len(self.times):
+            return self
+        return Batch(
+            self.times[:steps],
+            self.resultants[:steps],
+            self.iterations[:steps],
+            self.smallest[:steps],
+            self.state,
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run.
 
@@ -64,7 +96,9 @@ class Step:
 
 
 class Stepper:
-    """Advances a model under a ground motion."""
+    """Advances a model under a ground motion, each step solved by SNES."""
+
+    name = "snes"
 
     def __init__(
         self,
@@ -80,8 +114,8 @@ class Stepper:
         self.scheme = scheme or Newmark()
         self.lag = damping.stiffness if damping and damping.joints == "closed" else 0.0
         self._damping = _damping_matrix(model, damping)
-        self._weight = self_weight(model)
-        self._scale = magnitude(self._weight)
+        self.weight = self_weight(model)
+        self._scale = magnitude(self.weight)
         self._solver = Solver(model.size, newton)
         self._kept: tuple[float, sparse.csr_matrix, sparse.csr_matrix] | None = None
 
@@ -120,8 +154,19 @@ class Stepper:
             state, iterations, smallest = self._advance(state, target, 0)
             yield Step(state, self.contact(state), iterations, smallest)
 
+    def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
+        """Yield the same steps with their resultants, in batches of one."""
+        for step in self.steps(start, dt, end):
+            yield Batch(
+                np.array([step.state.time]),
+                self.model.resultants(step.contact)[None],
+                np.array([step.iterations]),
+                np.array([step.smallest]),
+                lambda _, state=step.state: state,
+            )
+
     def _load(self, time: float) -> Array:
-        return self._weight - self.model.body @ self.motion.at(time)[0]
+        return self.weight - self.model.body @ self.motion.at(time)[0]
 
     def _advance(self, state: State, target: float, halvings: int) -> tuple[State, int, float]:
         """Reach a time in one step, or in halves of it where that fails."""

@@ -63,18 +63,23 @@ class Forms:
         dx = _fenicsx.cell_measure(
             mesh.grid, _fenicsx.tags(mesh.grid, 2, cells, of_block[mesh.blocks])
         )
-        points = self.rule.count(self.space.degree)
-        gauss = self.rule.rule == "gauss"
         dS = _fenicsx.jump_measure(
             mesh.grid,
             _fenicsx.tags(mesh.grid, 1, facets, of_joint[numbers]),
-            "default" if gauss else "GLL",
-            2 * points - 1 if gauss else 2 * points - 3,
+            *self._scheme,
         )
         return (
             [(material, dx(k)) for k, material in enumerate(materials)],
             [(contact, dS(k)) for k, contact in enumerate(contacts)],
         )
+
+    @property
+    def _scheme(self) -> tuple[str, int]:
+        """Quadrature along joints as FFCx knows it, by the degree it integrates exactly."""
+        points = self.rule.count(self.space.degree)
+        if self.rule.rule == "gauss":
+            return "default", 2 * points - 1
+        return "GLL", 2 * points - 3
 
     def _number(self, value: float) -> Any:
         return _fenicsx.constant(self.space.mesh.grid, value)
@@ -151,6 +156,50 @@ class Forms:
         u, _, tangent = self._nonlinear
         u.x.array[:] = displacement
         return _fenicsx.assembled_matrix(tangent)
+
+    @cached_property
+    def _energy(self) -> Any:
+        """Half of the work of internal forces on the displacement: forces are homogeneous."""
+        u = self._nonlinear[0]
+        return fem.form(0.5 * (self._bodies(u, u) + self._joints(u, u)))
+
+    def energy(self, displacement: Array) -> float:
+        """Potential energy of blocks and joints [J]."""
+        self._nonlinear[0].x.array[:] = displacement
+        return float(fem.assemble_scalar(self._energy))
+
+    @cached_property
+    def _resultants(self) -> list[tuple[Any, Any, Any]]:
+        """Compiled integrals of N, V and M, for each joint."""
+        mesh, structure = self.space.mesh, self.space.mesh.structure
+        u = self._nonlinear[0]
+        number = fem.Function(_fenicsx.space(mesh.grid, "DG", 0, 1))
+        number.x.array[_fenicsx.cell_dofs(number.function_space)[:, 0]] = mesh.blocks
+        higher = ufl.conditional(ufl.gt(number("+")[0], number("-")[0]), 1.0, -1.0)
+        jump = higher * (u("+") - u("-"))
+        facets, of_joint = mesh.joints
+        found = []
+        for k, joint in enumerate(structure.joints):
+            own = facets[of_joint == k]
+            tags = _fenicsx.tags(mesh.grid, 1, own, np.ones_like(own))
+            dS = _fenicsx.jump_measure(mesh.grid, tags, *self._scheme)(1)
+            along = _fenicsx.constant(mesh.grid, joint.tangent)
+            arm = ufl.dot(
+                ufl.SpatialCoordinate(mesh.grid) - _fenicsx.constant(mesh.grid, joint.middle), along
+            )
+            width = self._number(structure.width)
+            opening = ufl.dot(jump, _fenicsx.constant(mesh.grid, structure.normals[k]))
+            pull = width * normal_traction(opening, self._number(joint.contact.normal_stiffness))
+            shear = width * shear_traction(
+                ufl.dot(jump, along), self._number(joint.contact.shear_stiffness)
+            )
+            found.append(tuple(fem.form(f * dS) for f in (-pull, shear, -pull * arm("+"))))
+        return found
+
+    def resultants(self, displacement: Array) -> Array:
+        """N, V, M of every joint, integrated from the tractions (n_joints, 3) [N, N, N m]."""
+        self._nonlinear[0].x.array[:] = displacement
+        return np.array([[fem.assemble_scalar(f) for f in joint] for joint in self._resultants])
 
     def stress(self) -> sparse.csr_matrix:
         """Mean stress of each cell, (σ_xx, σ_yy, σ_xy), from nodal displacements (3 cells, 2 m)."""

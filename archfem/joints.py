@@ -7,6 +7,7 @@ at the points becomes the forces f is the law's: springs at quadrature points, f
 integral over facets along which opening and slip are linear.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -185,7 +186,7 @@ class JointOperator:
         return self.opening.T.tocsr(), (self.slip.T @ self.law.shear).tocsr()
 
     @cached_property
-    def _sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Matrices (n_joints, p) that sum forces over each joint, and their moments."""
         points = self.points
         shape = (points.count, len(points.arm))
@@ -234,7 +235,7 @@ class JointOperator:
         """
         normal = self.law.forces(self.opening @ q)
         shear = self.law.shear @ (self.slip @ q)
-        force, moment = self._sums
+        force, moment = self.sums
         return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
 
     def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
@@ -242,6 +243,32 @@ class JointOperator:
         return replace(
             self, opening=(self.opening @ basis).tocsr(), slip=(self.slip @ basis).tocsr()
         )
+
+    def spanned(self, whole: Sequence[bool]) -> "JointOperator":
+        """One facet instead of several on each joint that moves as a plane (n_joints,).
+
+        Only for `Facets`: the first and the last point of the joint become the facet's ends.
+        """
+        points = self.points
+        first = np.searchsorted(points.joint, np.arange(points.count))
+        last = np.append(first[1:], len(points.joint)) - 1
+        rows, weight = [], points.weight.copy()
+        for joint, plane in enumerate(whole):
+            own = np.arange(first[joint], last[joint] + 1)
+            if plane:
+                weight[[own[0], own[-1]]] = points.weight[own].sum() / 2.0
+                own = own[[0, -1]]
+            rows.append(own)
+        kept = np.concatenate(rows)
+        chosen = JointPoints(
+            points.joint[kept],
+            points.arm[kept],
+            weight[kept],
+            points.normal_stiffness[kept],
+            points.shear_stiffness[kept],
+            points.count,
+        )
+        return JointOperator(Facets(chosen), self.opening[kept], self.slip[kept])
 
 
 def law_of(rule: Quadrature, points: JointPoints) -> Law:

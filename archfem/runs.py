@@ -8,8 +8,9 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from tqdm import tqdm
 
+from archfem.contact import LARGEST, ContactStepper, applies
 from archfem.criteria import FAILURES, HINGE, counted_mechanism
-from archfem.dynamics import State, Step, Stepper
+from archfem.dynamics import Batch, State, Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import SIGNS, History
 from archfem.models import Model
@@ -25,8 +26,7 @@ logger = logging.getLogger("archfem")
 Event = Callable[[Structure, Array], str | None]
 """Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
 
-DRIFT = 0.05
-"""Energy out of balance, relative to the work done, from which a run is called in question."""
+METHODS = ("auto", "contact", "snes")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,21 +81,23 @@ class _Tape:
 
     model: Model
     record: Record
+    method: str
     times: list[float] = field(default_factory=list)
     resultants: list[Array] = field(default_factory=list)
     effort: list[tuple[int, float]] = field(default_factory=list)
     frames: list[float] = field(default_factory=list)
     fields: list[Array] = field(default_factory=list)
 
-    def add(self, number: int, step: Step, resultants: Array) -> None:
-        """Keep of a step what was asked for."""
-        if number % self.record.every == 0:
-            self.times.append(step.state.time)
-            self.resultants.append(resultants)
-            self.effort.append((step.iterations, step.smallest))
-        if self.record.fields_every and number % self.record.fields_every == 0:
-            self.frames.append(step.state.time)
-            self.fields.append(step.state.q)
+    def add(self, first: int, batch: Batch) -> None:
+        """Keep of a batch, whose steps count from `first`, what was asked for."""
+        for k, number in enumerate(range(first, first + len(batch.times))):
+            if number % self.record.every == 0:
+                self.times.append(batch.times[k])
+                self.resultants.append(batch.resultants[k])
+                self.effort.append((batch.iterations[k], batch.smallest[k]))
+            if self.record.fields_every and number % self.record.fields_every == 0:
+                self.frames.append(batch.times[k])
+                self.fields.append(batch.state(k).q)
 
     def history(self, motion: Motion, state: State, outcome: str) -> History:
         """Everything as one dataset."""
@@ -120,6 +122,7 @@ class _Tape:
             "title": f"time history of {self.model.structure.name} under {motion.name or 'motion'}",
             "outcome": outcome,
             "fidelity": self.model.fidelity,
+            "method": self.method,
             "last_time": state.time,
             "signs": SIGNS,
             "versions": versions(),
@@ -138,6 +141,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     record: Record | None = None,
     until: Event | None = None,
     newton: Newton | None = None,
+    method: str = "auto",
 ) -> History:
     """Shake a structure and record what its joints do.
 
@@ -156,6 +160,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         record: what is kept; by default the resultants of every step.
         until: event that ends the run; by default only the end of the motion does.
         newton: settings of the solves.
+        method: "snes" solves each step through PETSc; "contact" works in the modes of the closed
+            structure and gives the same history many times faster, where it applies; "auto"
+            takes that where it applies.
 
     Returns:
         The history; its `outcome` says how the run ended.
@@ -166,22 +173,24 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     """
     if not 0.0 < dt <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
-    stepper = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+    stepper = _stepper(method, model, motion, damping, scheme, newton)
     if not isinstance(start, State):
         start = stepper.at_rest((start or dead_load(model, newton)).q)
-    tape = _Tape(model, record or Record())
-    first = Step(start, stepper.contact(start), 0, dt)
-    tape.add(0, first, model.resultants(first.contact))
-    state, outcome = start, "reached the end of the motion"
-    steps = max(0, round((motion.duration - start.time) / dt))
+    tape = _Tape(model, record or Record(), stepper.name)
+    lag = damping.stiffness if damping and damping.joints == "closed" else 0.0
+    contact = start.q + lag * start.velocity
+    tape.add(0, _first(start, model.resultants(contact), dt))
+    number, state, outcome = 0, start, "reached the end of the motion"
     try:
-        with tqdm(total=steps, unit="step", disable=None, leave=False) as bar:
-            for number, step in enumerate(stepper.steps(start, dt, motion.duration), start=1):
-                state = step.state
-                resultants = model.resultants(step.contact)
-                tape.add(number, step, resultants)
-                bar.update()
-                if until is not None and (reason := until(model.structure, resultants)):
+        with _bar(start, motion, dt) as bar:
+            for batch in stepper.batches(start, dt, motion.duration):
+                reason, size = _reason(until, model, batch)
+                batch = batch.cut(size)
+                tape.add(number + 1, batch)
+                number += size
+                state = batch.state(size - 1)
+                bar.update(size)
+                if reason:
                     outcome = f"ended at {state.time:.4g} s by {reason}"
                     break
     except KeyboardInterrupt:
@@ -191,6 +200,53 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         error.history = tape.history(motion, state, f"failed at {state.time:.4g} s: {error}")
         raise
     return tape.history(motion, state, outcome)
+
+
+def _stepper(
+    method: str,
+    model: Model,
+    motion: Motion,
+    damping: Rayleigh | None,
+    scheme: Scheme | None,
+    newton: Newton | None,
+) -> Stepper | ContactStepper:
+    """The stepper that was asked for; "auto" takes the contact stepper where it applies."""
+    if method not in METHODS:
+        raise InvalidInput(f"method '{method}' is not known: use one of {METHODS}")
+    fits = applies(model, damping)
+    if method == "contact" and not fits:
+        raise InvalidInput(
+            f"the contact stepper needs blocks between joints, at most {LARGEST} coordinates "
+            f"(here {model.size}), and damping on closed or initial joints: use method='snes'"
+        )
+    if method == "snes" or not fits:
+        return Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+    return ContactStepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+
+
+def _first(start: State, resultants: Array, dt: float) -> Batch:
+    """The start, as a batch of one."""
+    return Batch(
+        np.array([start.time]),
+        resultants[None],
+        np.zeros(1, dtype=np.int64),
+        np.array([dt]),
+        lambda _: start,
+    )
+
+
+def _bar(start: State, motion: Motion, dt: float) -> tqdm:
+    steps = max(0, round((motion.duration - start.time) / dt))
+    return tqdm(total=steps, unit="step", disable=None, leave=False)
+
+
+def _reason(until: Event | None, model: Model, batch: Batch) -> tuple[str | None, int]:
+    """Why the run ends within a batch, if it does, and after how many of its steps."""
+    if until is not None:
+        for k, resultants in enumerate(batch.resultants):
+            if reason := until(model.structure, resultants):
+                return reason, k + 1
+    return None, len(batch.times)
 
 
 def versions() -> str:

@@ -47,8 +47,8 @@ def _shape(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Shape:
     rows = (3 * np.flatnonzero(moving)[:, None] + np.arange(3)).ravel()
     return Shape(
         places=space.places[nodes],
+        block=space.owner[nodes].astype(int),
         cells=tuple(number[space.cells[moving][:, corners]]),
-        owner=space.mesh.blocks[moving].astype(int),
         lift=sparse.identity(len(free), format="csr"),
         stress=forms.stress()[rows][:, free].tocsr(),
     )

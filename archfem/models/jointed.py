@@ -42,6 +42,18 @@ class Jointed:
         self._across = joints.normal_stiffness(pattern)
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
+    def with_joints(self, joints: JointOperator) -> "Jointed":
+        """The same blocks between joints taken in another way."""
+        return Jointed(
+            self.structure,
+            self.fidelity,
+            mass=self.mass,
+            blocks=self.blocks,
+            body=self.body,
+            joints=joints,
+            shape=self.shape,
+        )
+
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""
         return self.blocks @ q + self.joints.force(q)

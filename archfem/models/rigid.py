@@ -22,6 +22,8 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
         cells: facets on each joint.
         rule: quadrature on each facet.
     """
+    rule = rule or Quadrature()
+    facets = 1 if rule.rule == "exact" else cells  # the gap between rigid faces is linear
     free = [structure.blocks[number] for number in structure.free]
     density = np.array([structure.density(block) * structure.width for block in free])
     mass = density * [block.area for block in free]
@@ -36,7 +38,7 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
         mass=sparse.diags(diagonal).tocsr(),
         blocks=sparse.csr_matrix((size, size)),
         body=body,
-        joints=rigid_joints(structure, cells, rule or Quadrature()),
+        joints=rigid_joints(structure, facets, rule),
         shape=_shape(structure),
     )
 
@@ -51,7 +53,7 @@ def _shape(structure: Structure) -> Shape:
     ]
     return Shape(
         places=np.concatenate(outlines),
+        block=np.repeat(structure.free, [len(outline) for outline in outlines]),
         cells=tuple(np.arange(a, b) for a, b in pairwise(starts)),
-        owner=np.array(structure.free),
         lift=sparse.block_diag(motions, format="csr"),
     )

@@ -16,18 +16,23 @@ class Shape:
 
     Attributes:
         places: points at rest (m, 2) [m].
+        block: number of the block each point belongs to (m,).
         cells: polygons, each the numbers of its corners in order.
-        owner: block of each polygon (n_cells,).
         lift: displacements of the points, x and y in turn, from coordinates (2 m, n).
         stress: mean stress of each polygon, (σ_xx, σ_yy, σ_xy) in turn, from coordinates
             (3 n_cells, n) [Pa]; None where blocks are rigid.
     """
 
     places: Array
+    block: NDArray[np.intp]
     cells: tuple[NDArray[np.intp], ...]
-    owner: NDArray[np.intp]
     lift: sparse.csr_matrix
     stress: sparse.csr_matrix | None = None
+
+    @cached_property
+    def owner(self) -> NDArray[np.intp]:
+        """Block of each polygon (n_cells,)."""
+        return self.block[[cell[0] for cell in self.cells]]
 
     def displacement(self, q: Array) -> Array:
         """Displacement of every point (m, 2) [m]."""

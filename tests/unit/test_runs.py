@@ -145,7 +145,7 @@ def test_a_failure_carries_the_history(model, motion, monkeypatch):
 
     monkeypatch.setattr(Stepper, "_try", failing)
     with pytest.raises(DidNotConverge, match="made to fail") as caught:
-        time_history(model, motion, damping=DAMPING)
+        time_history(model, motion, damping=DAMPING, method="snes")
     assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
     assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
     assert "failed at" in caught.value.history.outcome
@@ -160,7 +160,7 @@ def test_a_step_that_fails_is_halved(model, motion, monkeypatch):
         return real(self, state, dt)
 
     monkeypatch.setattr(Stepper, "_try", failing)
-    found = time_history(model, motion.cut(0.0, 0.4), damping=DAMPING)
+    found = time_history(model, motion.cut(0.0, 0.4), damping=DAMPING, method="snes")
     smallest = found.dataset["smallest_step"].values
     assert smallest.min() == pytest.approx(0.00125)
     assert found.time[-1] == pytest.approx(0.4)

@@ -1,0 +1,56 @@
+"""The slow reference: weak forms assembled at every iteration, sharing no shortcut."""
+
+import numpy as np
+from scipy import sparse
+
+from archfem.forms import Forms
+from archfem.models.full import full
+from archfem.quadrature import Quadrature
+from archfem.space import BrokenSpace
+from archfem.sparsity import Pattern
+from archfem.structure import Array
+
+
+class Monolithic:
+    """A model that asks the compiled UFL forms for everything that depends on displacement."""
+
+    fidelity = "monolithic"
+
+    def __init__(self, space: BrokenSpace, rule: Quadrature) -> None:
+        linear = full(space, rule)
+        self.structure = linear.structure
+        self.size = linear.size
+        self.body = linear.body
+        self.shape = linear.shape
+        self.load = linear.load
+        self._forms = Forms(space, rule)
+        self._free = space.free
+        self._everywhere = np.zeros(2 * len(space.places))
+        # The forms' pattern couples all nodes of the two cells at a facet, even where it is zero.
+        self._pattern = Pattern.of(linear.mass, self._assembled(np.zeros(self.size)))
+        self.mass = self._pattern.spread(linear.mass)
+        self.blocks = self._pattern.spread(linear.blocks)
+
+    def _spread(self, q: Array) -> Array:
+        """Displacements of all nodes, those of fixed blocks included."""
+        self._everywhere[self._free] = q
+        return self._everywhere
+
+    def force(self, q: Array) -> Array:
+        """Internal forces of blocks and joints (n,)."""
+        return self._forms.force(self._spread(q))[self._free]
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Derivative of `force`."""
+        return self._pattern.spread(self._assembled(q))
+
+    def _assembled(self, q: Array) -> sparse.csr_matrix:
+        return self._forms.tangent(self._spread(q))[self._free][:, self._free]
+
+    def energy(self, q: Array) -> float:
+        """Potential energy of blocks and joints [J]."""
+        return self._forms.energy(self._spread(q))
+
+    def resultants(self, q: Array) -> Array:
+        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        return self._forms.resultants(self._spread(q))

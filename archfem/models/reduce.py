@@ -1,0 +1,188 @@
+"""Lower rungs of the ladder: a Galerkin basis turns a model into a smaller one.
+
+Between joints everything is linear, so a basis B for each block gives every fidelity by the one
+formula M → BᵀMB, K → BᵀKB, G → GB. Displacements and stresses inside the blocks are recovered by
+the same basis. References: Guyan, AIAA J. 3 (1965) 380, for static condensation; Wilson, Three-
+dimensional static and dynamic analysis of structures (2002), chapter 18, for `modal`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import eigh
+from scipy.sparse.linalg import eigsh, splu
+
+from archfem.errors import InvalidInput
+from archfem.joints import Facets
+from archfem.kinematics import motion_of
+from archfem.models.jointed import Jointed
+from archfem.structure import Array
+
+Numbers = NDArray[np.intp]
+
+RUNGS = ("rigid", "faces", "condensed", "full")
+"""What a block of a meshed model may be reduced to, the lowest first."""
+
+
+def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointed:
+    """Express a model in the coordinates of a basis (n, m)."""
+    shape = model.shape
+    return Jointed(
+        model.structure,
+        fidelity,
+        mass=(basis.T @ model.mass @ basis).tocsr(),
+        blocks=(basis.T @ model.blocks @ basis).tocsr(),
+        body=basis.T @ model.body,
+        joints=model.joints.projected(basis),
+        shape=replace(
+            shape,
+            lift=(shape.lift @ basis).tocsr(),
+            stress=None if shape.stress is None else (shape.stress @ basis).tocsr(),
+        ),
+    )
+
+
+def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
+    """Reduce the blocks of a model with all nodes, each to a rung of its own.
+
+    "rigid" keeps three motions of a block; "faces" three of each joint face, which moves as a
+    plane, and condenses the rest statically; "condensed" keeps all nodes on joints and condenses
+    the others; "full" keeps all. Faces that share a node cannot move as planes independently:
+    there "faces" keeps the nodes, as "condensed" does.
+
+    Args:
+        model: with all nodes.
+        rungs: of each block of the structure (n_blocks,).
+        fidelity: what to call the result.
+    """
+    unknown = sorted(set(rungs) - set(RUNGS))
+    if unknown:
+        raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
+    joints = _faces(model)
+    pieces, order = [], []
+    plane = {number for number, block in enumerate(model.structure.blocks) if block.fixed}
+    for number in model.structure.free:
+        nodes = np.flatnonzero(model.shape.block == number)
+        faces = [own for face in joints if len(own := np.intersect1d(face, nodes))]
+        rung = rungs[number]
+        if rung == "faces" and sum(map(len, faces)) > len(np.unique(np.concatenate(faces))):
+            rung = "condensed"
+        if rung in ("rigid", "faces"):
+            plane.add(number)
+        pieces.append(_basis(model, nodes, faces, rung))
+        order.append(_dofs(nodes))
+    stacked = sparse.block_diag(pieces, format="csr")
+    basis = stacked[np.argsort(np.concatenate(order))]
+    return projected(_spanned(model, plane), basis, fidelity)
+
+
+def _dofs(nodes: Numbers) -> Numbers:
+    """Degrees of freedom of nodes, x and y in turn."""
+    return (2 * nodes[:, None] + np.arange(2)).ravel()
+
+
+def _faces(model: Jointed) -> list[Numbers]:
+    """Nodes on each joint, of both its sides."""
+    rows = abs(model.joints.opening) + abs(model.joints.slip)
+    joint = model.joints.points.joint
+    return [
+        np.unique(rows[np.flatnonzero(joint == number)].indices // 2)
+        for number in range(model.joints.points.count)
+    ]
+
+
+def _basis(model: Jointed, nodes: Numbers, faces: list[Numbers], rung: str) -> sparse.csr_matrix:
+    """Basis of one block (2 nodes, m), its nodes in ascending order."""
+    if rung == "full":
+        return sparse.identity(2 * len(nodes), format="csr")
+    places = model.shape.places
+    if rung == "rigid":
+        motion = motion_of(places[nodes], places[nodes].mean(axis=0))
+        return sparse.csr_matrix(motion.reshape(-1, 3))
+    held = np.unique(np.concatenate(faces))
+    if rung == "faces":
+        motions = [motion_of(places[face], places[face].mean(axis=0)) for face in faces]
+        columns = sparse.block_diag([motion.reshape(-1, 3) for motion in motions])
+        on_joints = columns.tocsr()[np.argsort(_dofs(np.concatenate(faces)))]
+    else:
+        on_joints = sparse.identity(2 * len(held), format="csr")
+    return _condensed(model, nodes, held, on_joints)
+
+
+def _condensed(
+    model: Jointed, nodes: Numbers, held: Numbers, on_joints: sparse.csr_matrix
+) -> sparse.csr_matrix:
+    """Motions of the held nodes, and what the others do under them when no force acts there."""
+    inner = np.setdiff1d(nodes, held)
+    basis = sparse.lil_matrix((2 * len(nodes), on_joints.shape[1]))
+    position = np.searchsorted(nodes, held)
+    basis[_dofs(position)] = on_joints
+    if len(inner):
+        stiffness = model.blocks[_dofs(inner)]
+        coupled = (stiffness[:, _dofs(held)] @ on_joints).toarray()
+        solved = splu(stiffness[:, _dofs(inner)].tocsc()).solve(coupled)
+        basis[_dofs(np.searchsorted(nodes, inner))] = -solved
+    return basis.tocsr()
+
+
+def _spanned(model: Jointed, plane: set[int]) -> Jointed:
+    """With exact facets, let one facet span each joint between blocks with plane faces."""
+    if not isinstance(model.joints.law, Facets):
+        return model
+    whole = [set(joint.blocks) <= plane for joint in model.structure.joints]
+    return model.with_joints(model.joints.spanned(whole))
+
+
+def modal(model: Jointed, below: float) -> Jointed:
+    """Reduce a whole structure to modes of its closed state and the static rest at its joints.
+
+    Wilson's fast nonlinear analysis: the modes below a frequency, and, for the residual
+    flexibility, the static displacements under a unit of each joint's resultants and of gravity
+    along x and y. Together they are made into vibration shapes, in which mass and closed
+    stiffness are diagonal.
+
+    Args:
+        model: any rung.
+        below: modes up to this frequency are kept [Hz].
+    """
+    closed = model.tangent(np.zeros(model.size)).tocsc()
+    solve = splu(closed).solve
+    attachments = solve(np.column_stack([_joint_loads(model), model.body]))
+    vectors = np.column_stack([_modes(model, closed, below), attachments])
+    vectors /= np.sqrt(np.sum(vectors * (model.mass @ vectors), axis=0))
+    squares, turn = eigh(vectors.T @ (model.mass @ vectors))
+    kept = squares > 1e-10 * squares[-1]  # what is left of vectors that nearly coincide
+    vectors = vectors @ (turn[:, kept] / np.sqrt(squares[kept]))
+    _, shapes = eigh(vectors.T @ (closed @ vectors))
+    return projected(model, sparse.csr_matrix(vectors @ shapes), "modal")
+
+
+def _joint_loads(model: Jointed) -> Array:
+    """Generalised forces of a unit N, V and M of each joint, spread linearly (n, 3 joints)."""
+    points = model.joints.points
+    columns = []
+    for number in range(points.count):
+        own = (points.joint == number) * points.weight
+        columns += [
+            model.joints.opening.T @ own,
+            model.joints.slip.T @ own,
+            model.joints.opening.T @ (own * points.arm),
+        ]
+    return np.column_stack(columns)
+
+
+def _modes(model: Jointed, closed: sparse.csc_matrix, below: float) -> Array:
+    """Modes of the closed structure up to a frequency (n, modes)."""
+    limit = (2.0 * np.pi * below) ** 2
+    count = 8
+    while True:
+        if count >= model.size // 2:
+            squares, shapes = eigh(closed.toarray(), model.mass.toarray())
+            return shapes[:, squares <= limit]
+        squares, shapes = eigsh(closed, count, model.mass.tocsc(), sigma=0.0)
+        if squares.max() > limit:
+            return shapes[:, squares <= limit]
+        count *= 2
