@@ -8,8 +8,8 @@
     run = af.time_history(model, af.Motion.read("file.AT2"), start=dead)
 
 SI units throughout. N > 0 is compression, eccentricity > 0 toward the extrados, gravity along -y.
-Names that need PETSc or FEniCSx are loaded when first used, so that the masonry side (structures,
-motions, limit analysis) works without them.
+Names that are slow to import, or need PETSc or FEniCSx, are loaded when first used, so that the
+masonry side (structures, motions, limit analysis) works without them.
 """
 
 from importlib import import_module
@@ -17,13 +17,15 @@ from typing import TYPE_CHECKING, Any
 
 from archfem.actions import BodyForce as BodyForce
 from archfem.actions import PointLoad as PointLoad
+from archfem.actions import Settlement as Settlement
+from archfem.codes import Eurocode8 as Eurocode8
+from archfem.codes import TableSpectrum as TableSpectrum
+from archfem.codes import Tbec2018 as Tbec2018
 from archfem.criteria import Mechanism as Mechanism
 from archfem.errors import ArchfemError as ArchfemError
 from archfem.errors import DidNotConverge as DidNotConverge
 from archfem.errors import InvalidInput as InvalidInput
 from archfem.errors import InvalidStructure as InvalidStructure
-from archfem.materials import BACKFILL as BACKFILL
-from archfem.materials import SOIL_TO_STONE as SOIL_TO_STONE
 from archfem.materials import STONE as STONE
 from archfem.materials import STONE_TO_STONE as STONE_TO_STONE
 from archfem.materials import Contact as Contact
@@ -33,36 +35,52 @@ from archfem.resultants import thrust_line as thrust_line
 from archfem.schemes import HHT as HHT
 from archfem.schemes import Newmark as Newmark
 from archfem.schemes import Rayleigh as Rayleigh
+from archfem.shapes import arch_on_piers as arch_on_piers
 from archfem.shapes import circular_arch as circular_arch
 from archfem.shapes import column as column
+from archfem.spectra import response_spectrum as response_spectrum
 from archfem.structure import Block as Block
 from archfem.structure import Joint as Joint
 from archfem.structure import Structure as Structure
 
 if TYPE_CHECKING:
+    from archfem.capacity import minimum_thickness as minimum_thickness
     from archfem.history import History as History
+    from archfem.limit import collapse_factor as collapse_factor
+    from archfem.limit import stands as stands
+    from archfem.matching import matched as matched
+    from archfem.mechanism import verified_mechanism as verified_mechanism
     from archfem.models.build import build as build
     from archfem.newton import Newton as Newton
+    from archfem.push import pushover as pushover
     from archfem.runs import CountedMechanism as CountedMechanism
     from archfem.runs import Record as Record
     from archfem.runs import time_history as time_history
     from archfem.statics import dead_load as dead_load
+    from archfem.suite import Suite as Suite
 
 __version__ = "0.1.0"
 
 _LATER = {
+    "minimum_thickness": "capacity",
     "History": "history",
+    "collapse_factor": "limit",
+    "stands": "limit",
+    "matched": "matching",
+    "verified_mechanism": "mechanism",
     "build": "models.build",
     "Newton": "newton",
+    "pushover": "push",
     "CountedMechanism": "runs",
     "Record": "runs",
     "time_history": "runs",
     "dead_load": "statics",
+    "Suite": "suite",
 }
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name that needs PETSc or FEniCSx when it is first used."""
+    """Load a name when it is first used."""
     if name not in _LATER:
         raise AttributeError(f"module 'archfem' has no attribute {name!r}")
     return getattr(import_module(f"archfem.{_LATER[name]}"), name)

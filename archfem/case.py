@@ -4,26 +4,25 @@ Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/
 not known, a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
-import difflib
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from archfem import ground
+from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.materials import CONTACTS, MATERIALS, Contact, Material
 from archfem.motion import Motion
-from archfem.quantities import in_unit
 from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
+from archfem.settings import Table, change, checked, refuse_unknown
 from archfem.shapes import circular_arch, column
 from archfem.structure import Structure
+from archfem.suite import Suite
 
-Table = Mapping[str, Any]
-
-# What a key may hold: a unit for a number, a Python type, or [unit] for a list of numbers.
 RING = {
     "radius": "m",
     "embrace": "degree",
@@ -50,14 +49,20 @@ MODEL = {
     "quadrature": str,
     "points": int,
 }
-SYNTHETIC = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
-RECORD = {"file": str, "vertical": str, "column": int, "units": str, "dt": "s"}
-CHANGES = {"scale": "1", "start": "s", "end": "s"}
-MOTION = {"synthetic": dict, **RECORD, **CHANGES}
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 OUTPUT = {"every": int, "fields_every": int, "joints": [int], "animation": bool}
-SECTIONS = ("title", "structure", "materials", "contacts", "model", "motion", "analysis", "output")
+SECTIONS = (
+    "title",
+    "structure",
+    "materials",
+    "contacts",
+    "model",
+    "motion",
+    "suite",
+    "analysis",
+    "output",
+)
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,8 @@ class Case:
         title: in words.
         structure: what stands.
         model: keywords of `build`.
-        motion: what the file says of the ground motion, or None for dead load alone.
+        motion: what the file says of one ground motion, or None.
+        suite: what it says of a suite of them, or None; without either there is dead load alone.
         analysis: what it says of the time history.
         output: what it says of what to keep and draw.
         settings: the whole case as it was understood, to be written again.
@@ -79,6 +85,7 @@ class Case:
     structure: Structure
     model: dict[str, Any]
     motion: dict[str, Any] | None
+    suite: dict[str, Any] | None
     analysis: dict[str, Any]
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
@@ -103,8 +110,8 @@ class Case:
             settings = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InvalidInput(f"{path} is not TOML: {error}") from error
-        for change in changes:
-            _change(settings, change)
+        for text in changes:
+            change(settings, text)
         try:
             return cls.of(settings, path.parent)
         except ArchfemError as error:
@@ -113,21 +120,24 @@ class Case:
     @classmethod
     def of(cls, settings: Table, folder: Path = Path()) -> "Case":
         """Make a case of tables such as a TOML file holds."""
-        _known(settings, SECTIONS, "")
+        refuse_unknown(settings, SECTIONS)
         for key in set(SECTIONS) - {"title"}:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        analysis = _values(settings.get("analysis", {}), ANALYSIS, "analysis")
+        analysis = checked(settings.get("analysis", {}), ANALYSIS, "analysis")
         if "damping" in analysis:
-            analysis["damping"] = _values(analysis["damping"], DAMPING, "analysis.damping")
-        motion = settings.get("motion")
+            analysis["damping"] = checked(analysis["damping"], DAMPING, "analysis.damping")
+        if "motion" in settings and "suite" in settings:
+            raise InvalidInput("a case has either one motion or a suite: take out one of the two")
+        motion, suite = settings.get("motion"), settings.get("suite")
         case = cls(
             title=str(settings.get("title", "case")),
             structure=_structure(settings),
-            model=_values(settings.get("model", {}), MODEL, "model"),
-            motion=None if motion is None else _values(motion, MOTION, "motion"),
+            model=checked(settings.get("model", {}), MODEL, "model"),
+            motion=None if motion is None else ground.motion_settings(motion),
+            suite=None if suite is None else ground.suite_settings(suite),
             analysis=analysis,
-            output=_values(settings.get("output", {}), OUTPUT, "output"),
+            output=checked(settings.get("output", {}), OUTPUT, "output"),
             settings=dict(settings),
             folder=folder,
         )
@@ -164,24 +174,33 @@ class Case:
         """Read or make the ground motion.
 
         Raises:
-            InvalidInput: there is none, it is given twice, or its file cannot be read.
+            InvalidInput: there is none, or its file cannot be read.
         """
-        given = self.motion or {}
-        if ("synthetic" in given) == ("file" in given):
-            raise InvalidInput(
-                "motion needs either a file, or synthetic = { seed = 1, … } to make one"
-            )
-        if "synthetic" in given:
-            options = _values(given["synthetic"], SYNTHETIC, "motion.synthetic")
-            motion = Motion.synthetic(**options)
-        else:
-            keys = set(RECORD) - {"file", "vertical"}
-            options = {key: given[key] for key in keys & set(given)}
-            upright = self.folder / given["vertical"] if "vertical" in given else None
-            motion = Motion.read(self.folder / given["file"], vertical=upright, **options)
-        if "start" in given or "end" in given:
-            motion = motion.cut(given.get("start", 0.0), given.get("end"))
-        return motion.scaled(given.get("scale", 1.0))
+        if self.motion is None:
+            raise InvalidInput("the case has no [motion]: give a file, or synthetic = { seed = 1 }")
+        return ground.ground_motion(self.motion, self.folder)
+
+    def ground_suite(self) -> Suite:
+        """Read or make the suite of ground motions, matched where the case says so.
+
+        Raises:
+            InvalidInput: there is none, or a pair cannot be read or matched.
+            DidNotConverge: a pair did not come near the target.
+        """
+        if self.suite is None:
+            raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
+        return ground.ground_suite(self.suite, self.folder)
+
+    @property
+    def target(self) -> DesignSpectrum | None:
+        """Target spectrum of the suite, or None."""
+        return ground.target_spectrum(self.suite or {})
+
+    def alone(self, pair: str) -> "Case":
+        """Return the case with this one pair of its suite."""
+        suite = self.settings["suite"]
+        kept = {**suite, "pairs": {pair: suite["pairs"][pair]}}
+        return self.of({**self.settings, "suite": kept}, self.folder)
 
     def text(self) -> str:
         """The case as TOML, changes included."""
@@ -198,7 +217,7 @@ def _structure(settings: Table) -> Structure:
     stone = _material(settings, given.pop("material", "stone"))
     contact = _contact(settings, given.pop("contact", "stone to stone"))
     try:
-        return shape(material=stone, contact=contact, **_values(given, keys, "structure"))
+        return shape(material=stone, contact=contact, **checked(given, keys, "structure"))
     except TypeError as error:
         raise InvalidInput(f"structure of shape {name!r}: {error}") from error
 
@@ -222,57 +241,8 @@ def _named(settings: Table, section: str, name: str, keys: Table, kind: tuple[An
             f'name one of them or write a table [{section}."{name}"]'
         )
     base = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
-    values = {**base, **_values(own.get(name, {}), keys, f"{section}.{name}")}
+    values = {**base, **checked(own.get(name, {}), keys, f"{section}.{name}")}
     try:
         return make(**values, name=name)
     except TypeError as error:
         raise InvalidInput(f"{section}.{name}: {error}") from error
-
-
-def _values(given: Any, keys: Table, section: str) -> dict[str, Any]:
-    """Check the keys of a table and turn its values into what they must hold."""
-    if not isinstance(given, Mapping):
-        raise InvalidInput(f"{section} = {given!r} is not a table")
-    _known(given, keys, section)
-    return {key: _value(value, keys[key], f"{section}.{key}") for key, value in given.items()}
-
-
-def _known(given: Table, keys: Any, section: str) -> None:
-    """Refuse keys that nothing would read."""
-    for key in given:
-        if key not in keys:
-            near = difflib.get_close_matches(key, list(keys), 1)
-            hint = f"did you mean '{near[0]}'?" if near else f"the keys are {sorted(keys)}"
-            raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
-
-
-def _value(value: Any, kind: Any, key: str) -> Any:
-    """Turn one value into what its key must hold."""
-    if isinstance(kind, str):
-        return in_unit(value, kind, key)
-    if isinstance(kind, list):
-        if not isinstance(value, list):
-            raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
-        return [_value(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        names = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
-        raise InvalidInput(f"{key} = {value!r} is not {names[kind]}")
-    return value
-
-
-def _change(settings: dict[str, Any], change: str) -> None:
-    """Set one value from "section.key=value", read as TOML, or as a word."""
-    path, equals, text = change.partition("=")
-    if not equals or not path.strip():
-        raise InvalidInput(f"'{change}' is not a change: write section.key=value")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    *parents, last = path.strip().split(".")
-    table: Any = settings
-    for parent in parents:
-        table = table.setdefault(parent, {})
-        if not isinstance(table, dict):
-            raise InvalidInput(f"'{change}': {parent} is not a table")
-    table[last] = value

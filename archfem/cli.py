@@ -1,4 +1,4 @@
-"""The command line: `archfem run CASE.toml --out DIR`."""
+"""The command line: `archfem run CASE.toml --out DIR`, `archfem motion FILE...`."""
 
 import argparse
 import logging
@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING
 
 from archfem.case import Case
 from archfem.errors import ArchfemError, DidNotConverge
+from archfem.motion import Motion
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from archfem.history import History
     from archfem.statics import Equilibrium
+    from archfem.suite import Suite
+
+INTERRUPTED = 130
+"""What a shell expects of a command that Ctrl-C has ended."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 is success, 1 an error of the case, 2 of the command itself."""
+    """Run a command; 0 is success, 1 an error of the case, 2 of the command, 130 after Ctrl-C."""
     given = _parser().parse_args(arguments)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     try:
@@ -27,6 +30,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ArchfemError as error:
         print(f"archfem: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("archfem: interrupted", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 
@@ -49,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
         )
         return command
 
-    run = case_command("run", "dead load, time history, tables and pictures")
+    run = case_command("run", "dead load, time histories, tables and pictures")
     run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     run.set_defaults(command=_run)
     check = case_command("check", "read a case, build its model and find its dead load")
@@ -57,16 +63,44 @@ def _parser() -> argparse.ArgumentParser:
     mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
     mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
     mesh.set_defaults(command=_mesh)
+    _motion_command(commands.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
+
+
+def _motion_command(command: argparse.ArgumentParser) -> None:
+    command.description = "Print the measures of records, draw them, their integrals and spectra."
+    command.add_argument("files", nargs="+", metavar="FILE", help="a record")
+    command.add_argument("--column", type=int, help="component or plain column, counted from 1")
+    command.add_argument("--units", help="of plain columns: g, m/s2, cm/s2 or gal")
+    command.add_argument("--dt", type=float, help="time between samples of plain columns [s]")
+    command.add_argument(
+        "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
+    )
+    command.set_defaults(command=_motion)
 
 
 def _check(given: argparse.Namespace) -> None:
     case = Case.read(given.case, given.changes)
     dead = _dead_load(case)
-    motion = case.ground_motion() if case.motion is not None else None
-    if motion is not None:
+    if case.suite is not None:
+        _tell_motions(case.ground_suite())
+    elif case.motion is not None:
+        motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, peak {motion.pga:.3f} m/s²")
     print(f"{given.case}: ready; dead load in {dead.iterations} iterations")
+
+
+def _motion(given: argparse.Namespace) -> None:
+    from archfem.summary import motion_table
+    from archfem.view.results import named_apart, write_motions
+
+    options = {"column": given.column, "units": given.units, "dt": given.dt}
+    motions = named_apart(
+        [Motion.read(path, **options) for path in given.files],
+        [Path(path).name for path in given.files],
+    )
+    print(motion_table(motions))
+    _tell_written(write_motions(motions, Path(given.out)))
 
 
 def _mesh(given: argparse.Namespace) -> None:
@@ -80,40 +114,92 @@ def _mesh(given: argparse.Namespace) -> None:
 
 
 def _run(given: argparse.Namespace) -> None:
+    from archfem.view.results import write_dead, write_run
+
     case, folder = Case.read(given.case, given.changes), Path(given.out)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     dead = _dead_load(case)
-    _draw_dead(dead, folder)
-    if case.motion is None:
-        return
-    try:
-        run = _shake(case, dead)
-    except DidNotConverge as error:
-        if error.history is not None:
-            error.history.save(folder / "history.nc")
-            print(f"what was computed is kept in {folder / 'history.nc'}", file=sys.stderr)
-        raise
-    run.dataset.attrs["case"] = case.text()
-    print(f"wrote {run.save(folder / 'history.nc')}")
+    _tell_written([write_dead(dead, folder)])
+    if case.suite is not None:
+        _run_suite(case, dead, folder)
+    elif case.motion is not None:
+        run = _shake(case, case.ground_motion(), dead, folder=folder)
+        _tell(run, dead, folder)
+        _tell_written(write_run(case, run, dead, folder))
+
+
+def _run_suite(case: Case, dead: "Equilibrium", folder: Path) -> None:
+    """Run all pairs of a suite, each to its own folder; those finished before are kept."""
+    from archfem.analysis import complete
+    from archfem.summary import pair_table
+    from archfem.view.results import write_envelopes, write_suite
+
+    suite = case.ground_suite()
+    _tell_motions(suite)
+    _tell_written(write_suite(suite, case.target, folder))
+    runs: dict[str, History] = {}
+    for motion in suite.motions:
+        run = _run_pair(case.alone(motion.name), motion, dead, folder=folder / motion.name)
+        runs[motion.name] = run
+        if run.outcome.startswith("interrupted"):
+            break
+    table = pair_table(runs)
+    (folder / "suite.txt").write_text(table + "\n", encoding="utf-8")
+    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{table}")
+    _tell_written(write_envelopes(runs, dead, folder))
+    if run.outcome.startswith("interrupted"):
+        print("run the same command again to go on with the pairs that are left", file=sys.stderr)
+        raise KeyboardInterrupt
+    broken = [name for name, run in runs.items() if not complete(run)]
+    if broken:
+        raise DidNotConverge(
+            f"{len(broken)} of {len(runs)} pairs have no equilibrium at some step: "
+            f"{', '.join(broken)}; what was computed is kept"
+        )
+
+
+def _run_pair(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
+    """Run one pair, or take what an earlier command left of it; a failed step ends the pair only.
+
+    Raises:
+        DidNotConverge: not even the first step could be made.
+    """
+    from archfem.analysis import finished
+    from archfem.view.results import write_motion, write_run
+
+    summary = folder / "summary.txt"  # written last
+    run = finished(folder / "history.nc", case, motion)
+    if run is not None:
+        print(f"{motion.name}: finished before, kept {folder / 'history.nc'}")
+        if summary.is_file():
+            return run
+    else:
+        summary.unlink(missing_ok=True)
+        try:
+            run = _shake(case, motion, dead, folder=folder)
+        except DidNotConverge as error:
+            if error.history is None:
+                raise
+            print(f"archfem: {motion.name}: {error}", file=sys.stderr)
+            run = error.history
+    _tell_written([*write_motion(motion, folder), *write_run(case, run, dead, folder)])
     _tell(run, dead, folder)
-    _draw_run(case, run, dead, folder)
+    return run
 
 
 def _dead_load(case: Case) -> "Equilibrium":
-    from archfem.models.build import build
-    from archfem.statics import dead_load
+    from archfem.analysis import at_rest
 
     print(case.title)
     start = perf_counter()
-    model = build(case.structure, **case.model)
+    dead = at_rest(case)
+    model, worst = dead.model, abs(dead.joints["eccentricity"])
     print(
         f"model: {model.fidelity}, {len(case.structure.free)} blocks, "
         f"{len(case.structure.joints)} joints, {model.size} coordinates "
-        f"({perf_counter() - start:.2f} s)"
+        f"({perf_counter() - start:.2f} s with the dead load)"
     )
-    dead = dead_load(model)
-    worst = abs(dead.joints["eccentricity"])
     print(
         f"dead load: |e| ≤ {float(worst.max()):.3f}, "
         f"V/N ≤ {float(dead.joints['friction'].max()):.3f}, "
@@ -122,29 +208,24 @@ def _dead_load(case: Case) -> "Equilibrium":
     return dead
 
 
-def _shake(case: Case, dead: "Equilibrium") -> "History":
-    from archfem.runs import CountedMechanism, Record, time_history
+def _shake(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
+    """Run a time history and keep it in its folder, also where it fails."""
+    from archfem.analysis import shaken
 
-    motion, output = case.ground_motion(), case.output
-    animated = 10 if output.get("animation", False) else None
     start = perf_counter()
-    run = time_history(
-        dead.model,
-        motion,
-        dt=case.analysis.get("dt", 0.005),
-        start=dead,
-        damping=case.damping,
-        scheme=case.scheme,
-        record=Record(
-            every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-        ),
-        until=CountedMechanism() if case.analysis.get("halt", False) else None,
-    )
+    try:
+        run = shaken(case, motion, dead)
+    except DidNotConverge as error:
+        if error.history is not None:
+            error.history.save(folder / "history.nc")
+            print(f"what was computed is kept in {folder / 'history.nc'}", file=sys.stderr)
+        raise
     taken = perf_counter() - start
     print(
         f"time history: {motion.name}, peak {motion.pga:.2f} m/s², "
         f"{float(run.time[-1]):.2f} s in {taken:.1f} s; {run.outcome}"
     )
+    _tell_written([run.save(folder / "history.nc")])
     return run
 
 
@@ -166,37 +247,13 @@ def _tell(run: "History", dead: "Equilibrium", folder: Path) -> None:
     print(text)
 
 
-def _draw_dead(dead: "Equilibrium", folder: Path) -> None:
-    from archfem.view.plots import draw_structure
-    from archfem.view.style import save
+def _tell_motions(suite: "Suite") -> None:
+    """Print what matching did, or how strong the motions are."""
+    from archfem.summary import match_table, motion_table
 
-    print(f"wrote {save(draw_structure(dead.model.structure, dead.joints), folder / 'dead.png')}")
-
-
-def _draw_run(case: Case, run: "History", dead: "Equilibrium", folder: Path) -> None:
-    """The pictures of a run: its gravest instant, envelopes, joint histories, animation."""
-    from archfem.view.plots import draw_envelope, draw_joint_histories, draw_structure
-    from archfem.view.style import save
-
-    gravest = _gravest(run)
-    worst = abs(run.joints["eccentricity"]).max("time").fillna(0.5)
-    chosen = case.output.get("joints", [int(j) for j in worst.argsort()[::-1][:2]])
-    figures = {
-        "gravest.png": draw_structure(case.structure, gravest),
-        "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
-        "joints.png": draw_joint_histories(run, chosen),
-    }
-    for name, figure in figures.items():
-        print(f"wrote {save(figure, folder / name)}")
-    if case.output.get("animation", False):
-        from archfem.view.scenes import animate
-
-        print(f"wrote {animate(dead.model, run, folder / 'hinges.mp4')}")
+    print(match_table(suite.matches) if suite.matches else motion_table(suite.motions))
 
 
-def _gravest(run: "History") -> "xr.Dataset":
-    """Joints at the instant of the first mechanism, or of the largest eccentricity."""
-    if run.mechanism is not None:
-        return run.joints.sel(time=run.mechanism.time, method="nearest")
-    worst = abs(run.joints["eccentricity"]).max("joint")
-    return run.joints.isel(time=int(worst.argmax("time")))
+def _tell_written(files: Sequence[Path]) -> None:
+    for path in files:
+        print(f"wrote {path}")

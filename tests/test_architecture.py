@@ -13,13 +13,14 @@ ROOT = Path(archfem.__file__).parent
 LAYERS = [
     "errors units laws criteria _petsc",
     "materials quadrature quantities schemes signals oscillator records",
-    "structure synthetic codes",
-    "actions shapes joints sparsity resultants motion",
-    "kinematics spectra summary",
-    "equilibrium measures matching",
-    "suite mechanism sliding",
-    "limit",
-    "capacity",
+    "structure synthetic codes settings",
+    "actions shapes sparsity resultants motion",
+    "joints",
+    "kinematics spectra",
+    "equilibrium measures",
+    "matching mechanism sliding",
+    "limit suite",
+    "capacity ground",
     "_fenicsx",
     "mesh",
     "space",
@@ -27,9 +28,11 @@ LAYERS = [
     "models",
     "newton",
     "statics history",
-    "dynamics pushover",
+    "dynamics push summary kernel",
+    "contact",
     "runs",
     "case",
+    "analysis",
     "view",
     "cli",
     "__main__",
@@ -77,6 +80,25 @@ def test_modules_are_small_and_say_what_they_are(path):
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 330
     assert ast.get_docstring(ast.parse(text))
+
+
+def test_public_names_are_few_and_load():
+    values = {name: value for name, value in vars(archfem).items() if name[0] != "_"}
+    ours = {
+        name for name, value in values.items() if "archfem." in getattr(value, "__module__", "")
+    }
+    assert len(ours | set(archfem._LATER)) <= 42
+    for name, module in archfem._LATER.items():
+        assert getattr(archfem, name).__module__ == f"archfem.{module}"
+        # A module of the same name would take the place of what it holds.
+        assert not (ROOT / f"{name}.py").exists()
+
+
+def test_importing_archfem_leaves_slow_libraries_alone():
+    slow = {"scipy.signal", "scipy.stats", "numba", "matplotlib", "pint", "gmsh", "pyvista"}
+    script = f"import sys, archfem; print(*({slow} & set(sys.modules)))"
+    ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert ran.stdout.split() == []
 
 
 def test_masonry_side_needs_no_fenicsx():

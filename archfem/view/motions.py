@@ -1,6 +1,6 @@
 """Pictures of motions: accelerograms with their integrals, and the spectra of a suite."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -64,8 +64,8 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     Spectra include the suite's scale but not its reduction factor, as the target does.
 
     Args:
-        suite: motions, all with or all without a vertical.
-        target: design spectrum, drawn beside them.
+        suite: motions; verticals are drawn where all have one.
+        target: design spectrum, drawn beside them over the periods at which it is defined.
     """
     names = ["horizontal"]
     if all(pair.vertical is not None for pair in suite.pairs):
@@ -78,10 +78,21 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
         axis.plot(PERIODS, values.mean(axis=0), INK, lw=1.8, label="mean")
         if target is not None:
             aim = target.vertical if name == "vertical" else target.horizontal
-            axis.plot(PERIODS, aim(PERIODS), HINGE, ls="--", lw=1.8, label="target")
+            axis.plot(*_defined(aim), HINGE, ls="--", lw=1.8, label="target")
         _label(axis, name)
     figure.suptitle(suite.name, fontsize=NORMAL)
     return figure
+
+
+def _defined(aim: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return those of the periods at which a target is defined, and its values (2, n)."""
+    known = []
+    for period in PERIODS:
+        try:
+            known.append((period, float(aim(period))))
+        except InvalidInput:  # a table ends somewhere, and need not have a vertical
+            continue
+    return np.array(known).reshape(-1, 2).T
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:

@@ -10,7 +10,7 @@ from archfem.errors import DidNotConverge
 from archfem.limit import collapse_factor
 from archfem.models.build import build
 from archfem.models.rigid import rigid
-from archfem.pushover import CONTROLS, Stop, pushover
+from archfem.push import CONTROLS, Stop, pushover
 from archfem.quadrature import Quadrature
 from archfem.shapes import arch_on_piers, circular_arch, column
 

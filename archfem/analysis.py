@@ -1,0 +1,85 @@
+"""Carry out what a case describes: dead load, time histories, and what earlier runs have left."""
+
+from pathlib import Path
+
+import numpy as np
+
+from archfem.case import Case
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.history import History
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.runs import CountedMechanism, Record, time_history
+from archfem.statics import Equilibrium, dead_load
+
+FRAMES = 10
+"""Steps between two fields that are kept for an animation, unless the case says otherwise."""
+
+SAME = 1e-6
+"""Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
+
+
+def at_rest(case: Case) -> Equilibrium:
+    """Build the model of a case and find its dead load.
+
+    Raises:
+        DidNotConverge: the structure does not stand.
+    """
+    return dead_load(build(case.structure, **case.model))
+
+
+def shaken(case: Case, motion: Motion, dead: Equilibrium) -> History:
+    """Run the time history of a case under a motion; the history carries the case.
+
+    Args:
+        case: tells steps, scheme, damping, and what to record.
+        motion: of the ground.
+        dead: where it starts.
+
+    Raises:
+        DidNotConverge: a step failed; `history` is the record up to it.
+    """
+    output = case.output
+    animated = FRAMES if output.get("animation", False) else None
+    try:
+        run = time_history(
+            dead.model,
+            motion,
+            dt=case.analysis.get("dt", 0.005),
+            start=dead,
+            damping=case.damping,
+            scheme=case.scheme,
+            record=Record(
+                every=output.get("every", 1), fields_every=output.get("fields_every", animated)
+            ),
+            until=CountedMechanism() if case.analysis.get("halt", False) else None,
+        )
+    except DidNotConverge as error:
+        if error.history is not None:
+            error.history.dataset.attrs["case"] = case.text()
+        raise
+    run.dataset.attrs["case"] = case.text()
+    return run
+
+
+def finished(path: Path, case: Case, motion: Motion) -> History | None:
+    """Read what an earlier run left, where it ended by itself, of the same case and motion.
+
+    Args:
+        path: file of the history.
+        case: to compare with the one in the file.
+        motion: to compare with the ground motion in the file.
+    """
+    try:
+        run = History.read(path)
+    except InvalidInput:
+        return None
+    if not complete(run) or run.dataset.attrs.get("case") != case.text():
+        return None
+    before, now = run.dataset["ground"].values, motion.at(run.time)
+    return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
+
+
+def complete(run: History) -> bool:
+    """Whether a run came to the end of its motion or to its event, and was not broken off."""
+    return not run.outcome.startswith(("interrupted", "failed"))

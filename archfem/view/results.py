@@ -1,0 +1,100 @@
+"""The pictures of runs, suites and motions, written to a folder."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from archfem.case import Case
+from archfem.codes import DesignSpectrum
+from archfem.history import History
+from archfem.motion import Motion
+from archfem.statics import Equilibrium
+from archfem.suite import Suite
+from archfem.view.motions import accelerogram, spectra, suite_spectra
+from archfem.view.plots import draw_envelope, draw_joint_histories, draw_structure
+from archfem.view.style import LINES, save
+
+
+def write_dead(dead: Equilibrium, folder: Path) -> Path:
+    """Draw the thrust line under dead load."""
+    return save(draw_structure(dead.model.structure, dead.joints), folder / "dead.png")
+
+
+def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list[Path]:
+    """Draw a run: its gravest instant, envelope, two joints over time, and film it where asked.
+
+    Args:
+        case: tells title, which joints, and whether to film.
+        run: what happened.
+        dead: the state before.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
+    worst = abs(run.joints["eccentricity"]).max("time").fillna(0.5)
+    chosen = case.output.get("joints", [int(joint) for joint in worst.argsort()[::-1][:2]])
+    figures = {
+        "gravest.png": draw_structure(case.structure, gravest(run)),
+        "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
+        "joints.png": draw_joint_histories(run, chosen),
+    }
+    files = [save(figure, folder / name) for name, figure in figures.items()]
+    if case.output.get("animation", False):
+        from archfem.view.scenes import animate  # loads pyvista, which is slow
+
+        files.append(animate(dead.model, run, folder / "hinges.mp4"))
+    return files
+
+
+def gravest(run: History) -> xr.Dataset:
+    """Joints at the instant of the first mechanism, or of the largest eccentricity."""
+    if run.mechanism is not None:
+        return run.joints.sel(time=run.mechanism.time, method="nearest")
+    worst = abs(run.joints["eccentricity"]).max("joint")
+    return run.joints.isel(time=int(worst.argmax("time")))
+
+
+def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
+    """Draw the spectra of a suite beside its target."""
+    return [save(suite_spectra(suite, target), folder / "spectra.png")]
+
+
+def write_motion(motion: Motion, folder: Path) -> list[Path]:
+    """Draw a motion as it is applied, with its integrals."""
+    return [save(accelerogram(motion), folder / "motion.png")]
+
+
+def write_envelopes(runs: Mapping[str, History], dead: Equilibrium, folder: Path) -> list[Path]:
+    """Draw the envelopes of all runs in one picture, or six to a picture where there are more."""
+    pairs, most = list(runs.items()), len(LINES)
+    parts = [dict(pairs[first : first + most]) for first in range(0, len(pairs), most)]
+    names = ["envelope.png", *(f"envelope_{number}.png" for number in range(2, len(parts) + 1))]
+    return [
+        save(draw_envelope(part, dead=dead.joints), folder / name)
+        for name, part in zip(names, parts, strict=True)
+    ]
+
+
+def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
+    """Draw each motion with its integrals, and the spectra of all.
+
+    Args:
+        motions: with names of their own, which the files bear.
+        folder: for the files.
+    """
+    pictures: dict[str, Figure] = {motion.name: accelerogram(motion) for motion in motions}
+    files = [save(figure, folder / f"{name}.png") for name, figure in pictures.items()]
+    return [*files, save(spectra(motions), folder / "spectra.png")]
+
+
+def named_apart(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:
+    """Give motions the names of their files; where names are the same, with a number behind."""
+    named: list[Motion] = []
+    for index, (motion, name) in enumerate(zip(motions, names, strict=True)):
+        before = list(names[:index]).count(name)
+        named.append(replace(motion, name=f"{name} ({before + 1})" if before else name))
+    return named
