@@ -205,33 +205,41 @@ def _jacobians(gap, law, jacobian):  # type: ignore
             jacobian[row, 0] = stiffness[row] if gap[row] > 0.0 else 0.0
         return
     for row in range(0, len(gap), 2):
-        a, b, k = gap[row], gap[row + 1], stiffness[row]
-        low, high = 0.0, 0.0  # the open part of the facet, of unit length
-        if a > 0.0 and b > 0.0:
-            high = 1.0
-        elif a > 0.0:
-            high = a / (a - b)
-        elif b > 0.0:
-            low, high = a / (a - b), 1.0
-        squares, cubes = 0.5 * (high**2 - low**2), (high**3 - low**3) / 3.0
-        jacobian[row, 0] = k * (high - low - 2.0 * squares + cubes)
-        jacobian[row, 1] = jacobian[row + 1, 1] = k * (squares - cubes)
-        jacobian[row + 1, 0] = k * cubes
+        low, high = _open_part(gap[row], gap[row + 1])
+        first, mixed, second = _integrals(low, high)
+        jacobian[row, 0] = stiffness[row] * first
+        jacobian[row, 1] = jacobian[row + 1, 1] = stiffness[row] * mixed
+        jacobian[row + 1, 0] = stiffness[row] * second
+
+
+@numba.njit(cache=True)
+def _open_part(a, b):  # type: ignore
+    """Where a facet of unit length with end gaps a and b is open."""
+    if a > 0.0:
+        return 0.0, (1.0 if b > 0.0 else a / (a - b))
+    return (a / (a - b) if b > 0.0 else 1.0), 1.0
+
+
+@numba.njit(cache=True)
+def _integrals(low, high):  # type: ignore
+    """∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2)."""
+    squares, cubes = 0.5 * (high**2 - low**2), (high**3 - low**3) / 3.0
+    return high - low - 2.0 * squares + cubes, squares - cubes, cubes
 
 
 @numba.njit(cache=True)
 def _resultants(result, gap, shear, law):  # type: ignore
     """N, V, M of every joint from the gaps at its points."""
     facets, stiffness, arm, joint = law
-    jacobian = np.zeros((len(gap), 2))
-    _jacobians(gap, law, jacobian)
     result[:] = 0.0
     result[:, 1] = shear
     for row in range(len(gap)):
-        if facets:
-            whole = stiffness[row] / 6.0 * (2.0 * gap[row] + gap[row ^ 1])
-        else:
-            whole = stiffness[row] * gap[row]
-        pull = whole - _product(jacobian, gap, row, facets)
+        pull = 0.0  # from the closed part alone, so that an open joint carries exactly nothing
+        if not facets:
+            pull = stiffness[row] * min(gap[row], 0.0)
+        elif gap[row] <= 0.0 or gap[row ^ 1] <= 0.0:
+            low, high = _open_part(gap[row], gap[row ^ 1])
+            first, mixed, _ = _integrals(high, 1.0) if low == 0.0 else _integrals(0.0, low)
+            pull = stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
         result[joint[row], 0] -= pull
         result[joint[row], 2] -= pull * arm[row]

@@ -1,0 +1,196 @@
+"""The ladder of models: each rung against the one above it, and against the assembled forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archfem.errors import InvalidInput
+from archfem.joints import Facets, JointPoints, Springs
+from archfem.materials import BACKFILL
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.newton import Newton
+from archfem.runs import time_history
+from archfem.schemes import HHT, Rayleigh
+from archfem.shapes import column
+from archfem.statics import dead_load
+
+MOTION = Motion.synthetic(duration=4.0, pga=2.5, seed=5)
+TIGHT = Newton(tolerance=1e-13)
+
+
+def envelope(model, **given):
+    """Largest |e| of every joint over a run."""
+    given = {"damping": Rayleigh(0.05, (8.0, 16.0)), **given}
+    run = time_history(model, MOTION, **given)
+    return abs(run.joints["eccentricity"]).max("time").values
+
+
+@pytest.fixture(scope="module")
+def full(ring):
+    return build(ring, cells=(4, 4))
+
+
+def test_sizes(ring):
+    sizes = {rung: build(ring, fidelity=rung).size for rung in ("rigid", "faces", "condensed")}
+    assert sizes == {"rigid": 51, "faces": 102, "condensed": 340}
+
+
+def test_static_condensation_is_exact_for_statics(ring, full):
+    """Guyan: joint displacements under any static load are those of the whole model."""
+    reference = dead_load(full, TIGHT).joints
+    found = dead_load(build(ring, fidelity="condensed"), TIGHT).joints
+    for key in ("N", "V", "M"):
+        scale = float(abs(reference[key]).max())
+        assert np.abs(found[key] - reference[key]).max() < 1e-9 * scale
+
+
+@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
+def test_monolithic_is_full(ring, rule):
+    """UFL forms assembled at each iteration, with joint tractions integrated as forms too."""
+    full = build(ring, cells=(2, 2), quadrature=rule)
+    slow = build(ring, cells=(2, 2), quadrature=rule, fidelity="monolithic")
+    dead = [dead_load(model, TIGHT) for model in (full, slow)]
+    assert dead[0].q == pytest.approx(dead[1].q, rel=1e-9, abs=1e-15)
+    for key in ("N", "V", "M"):
+        scale = float(abs(dead[0].joints[key]).max())
+        assert np.abs(dead[0].joints[key] - dead[1].joints[key]).max() < 1e-9 * scale
+    assert full.energy(dead[0].q) == pytest.approx(slow.energy(dead[0].q), rel=1e-10)
+
+
+def test_monolithic_history_is_that_of_full(ring):
+    short = MOTION.cut(1.0, 1.2)
+    runs = [
+        time_history(
+            build(ring, cells=(2, 2), fidelity=rung), short, newton=TIGHT, method="snes"
+        ).joints["M"]
+        for rung in ("full", "monolithic")
+    ]
+    assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
+
+
+def test_errors_fall_up_the_ladder(ring, full):
+    """Against all nodes on the same mesh; bounds about twice what was found on this motion."""
+    reference = envelope(full)
+    off = {
+        rung: np.abs(envelope(build(ring, fidelity=rung)) - reference).max()
+        for rung in ("rigid", "modal", "faces", "condensed")
+    }
+    assert off["condensed"] < 1e-6 < off["faces"] < off["rigid"] < 0.006
+    assert off["faces"] < 0.002
+    assert off["modal"] < 0.003
+
+
+@pytest.mark.parametrize("rule", ["nodal", "lobatto", "gauss", "exact"])
+@pytest.mark.parametrize("rung", ["rigid", "modal", "faces", "condensed"])
+def test_contact_stepper_gives_the_history_of_snes(ring, rung, rule):
+    """To 1e-8 of the largest, joints opening and closing, either damping, Newmark and HHT."""
+    model = build(ring, fidelity=rung, quadrature=rule, cells=(2, 2))
+    dead = dead_load(model, TIGHT)
+    short = MOTION.cut(0.8, 2.3)
+    for joints, scheme in (("closed", None), ("initial", HHT(-0.1))):
+        given = {
+            "start": dead,
+            "damping": Rayleigh(0.05, (8.0, 16.0), joints),
+            "scheme": scheme,
+            "newton": TIGHT,
+        }
+        runs = [time_history(model, short, method=m, **given) for m in ("snes", "contact")]
+        assert runs[0].dataset.attrs["method"] == "snes"
+        assert runs[1].dataset["iterations"].max() > 1  # points have opened
+        for key in ("N", "V", "M"):
+            first, second = (run.joints[key] for run in runs)
+            assert np.abs(first - second).max() < 1e-8 * np.abs(first).max()
+
+
+def test_contact_stepper_refuses_what_does_not_fall_into_modes(ring, full):
+    with pytest.raises(InvalidInput, match="use method='snes'"):
+        time_history(full, MOTION, damping=Rayleigh(0.05, (8, 16), "none"), method="contact")
+    with pytest.raises(InvalidInput, match="method 'fast' is not known"):
+        time_history(full, MOTION, method="fast")
+
+
+def test_rungs_may_differ_from_block_to_block(ring, full):
+    mixed = build(ring, fidelity={"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"})
+    assert mixed.size == 15 * 6 + 50 + 3
+    off = np.abs(envelope(mixed) - envelope(full)).max()
+    assert off < 0.003
+    with pytest.raises(InvalidInput, match="no blocks or parts"):
+        build(ring, fidelity={"voussoir 99": "full"})
+    with pytest.raises(InvalidInput, match=r"rungs \['soft'\] are not known"):
+        build(ring, fidelity={"rest": "soft"})
+
+
+def test_inner_fields_are_recovered(ring, full):
+    """Stress of the condensed model is that of all nodes, but for the weight inside a block."""
+    condensed = build(ring, fidelity="condensed")
+    whole = full.shape.stress @ dead_load(full).q
+    found = condensed.shape.stress @ dead_load(condensed).q
+    weight = 20e3 * 0.55  # the stress that a stone's own weight makes in it [Pa]
+    assert np.abs(found - whole).max() < weight
+    assert np.abs(whole).max() > 10.0 * weight
+
+
+def test_rigid_and_condensed_are_wrong_where_a_block_is_soft(caplog):
+    """A stone on a metre of backfill: rigid misses it all, condensation its inner modes."""
+    stack = column(breadth=1.0, heights=[1.0, 0.5])
+    soft = replace(stack.blocks[1], material=BACKFILL)
+    stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
+    reference = envelope(build(stack, fidelity="full"))
+    off = {}
+    for rung in ("rigid", "condensed"):
+        off[rung] = np.abs(envelope(build(stack, fidelity=rung)) - reference).max()
+        assert "block 'block 1'" in caplog.text
+        caplog.clear()
+    assert off["rigid"] > 0.01
+    assert off["condensed"] > 0.002
+    mixed = build(stack, fidelity={"block 1": "full", "rest": "faces"})
+    assert np.abs(envelope(mixed) - reference).max() < 0.002
+    assert not caplog.text
+
+
+@pytest.mark.parametrize("rule", ["exact", "lobatto"])
+def test_joint_forces_integrate_the_traction(rule):
+    """Against 4000 points on one facet, for gaps that are open, closed and mixed."""
+    points = JointPoints(
+        np.zeros(2, dtype=int),
+        np.array([-0.25, 0.25]),
+        np.array([0.25, 0.25]),
+        np.full(2, 2e9),
+        np.full(2, 1e9),
+        1,
+    )
+    law = Facets(points) if rule == "exact" else Springs(points)
+    place = (np.arange(4000) + 0.5) / 4000.0
+    for a, b in ((-1.0, -2.0), (-1.0, 2.0), (3.0, -1.0), (1.0, 2.0), (0.0, -1.0), (0.0, 0.0)):
+        gap = 1e-5 * (a + (b - a) * place)
+        traction = 2e9 * np.minimum(gap, 0.0) * 0.5 / 4000.0
+        sampled = np.array([traction @ (1.0 - place), traction @ place])
+        found = law.forces(1e-5 * np.array([a, b]))
+        near = np.abs(found - sampled).max() <= 1e-5 * np.abs(sampled).max() + 1e-12
+        assert near == (rule == "exact" or (a == b == 0.0) or (a > 0.0 and b > 0.0))
+
+
+def test_exact_facets_are_the_limit_of_quadrature(ring):
+    """On one mesh, rules with more and more points approach the closed form."""
+    exact = dead_load(build(ring, fidelity="rigid", quadrature="exact")).joints["eccentricity"]
+    off = [
+        float(
+            abs(
+                dead_load(build(ring, fidelity="rigid", points=n, cells=(8, 1))).joints[
+                    "eccentricity"
+                ]
+                - exact
+            ).max()
+        )
+        for n in (2, 4, 8)
+    ]
+    assert off[2] < off[1] < off[0]
+    assert off[2] < 1e-4
+
+
+def test_exact_quadrature_needs_linear_facets(ring):
+    for given in ({"degree": 2}, {"fidelity": "monolithic"}):
+        with pytest.raises(InvalidInput, match="linear along a facet"):
+            build(ring, quadrature="exact", **given)
