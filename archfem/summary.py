@@ -81,6 +81,8 @@ def pair_table(runs: Mapping[str, History]) -> str:
 def motion_table(motions: Sequence[Motion]) -> str:
     """One line a component: its step and its intensity measures.
 
+    The only component of a motion may have any direction, and is named so.
+
     Args:
         motions: each with a name.
     """
@@ -93,7 +95,7 @@ def motion_table(motions: Sequence[Motion]) -> str:
             rows.append(
                 [
                     motion.name,
-                    component,
+                    component if len(motion.components) > 1 else "only one",
                     str(len(motion.component(component))),
                     f"{motion.dt:g} s",
                     f"{found.pga / STANDARD_GRAVITY:.4f} g",

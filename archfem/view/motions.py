@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from archfem.codes import DesignSpectrum
 from archfem.errors import InvalidInput
-from archfem.motion import Motion
+from archfem.motion import COMPONENTS, Motion
 from archfem.spectra import response_spectrum
 from archfem.suite import Suite
 from archfem.units import STANDARD_GRAVITY
@@ -32,29 +32,33 @@ def accelerogram(motion: Motion) -> Figure:
         for axis, (values, label) in zip(column, rows, strict=True):
             _trace(axis, motion.times(name), values)
             dress(axis, "time [s]" if axis is column[-1] else "", label)
-        column[0].set_title(name, fontsize=NORMAL)
+        if len(names) > 1:  # one alone may be of any direction
+            column[0].set_title(name, fontsize=NORMAL)
     figure.suptitle(motion.name, fontsize=NORMAL)
     return figure
 
 
 def spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
-    """Draw the response spectra of motions, horizontal and, where there is one, vertical.
+    """Draw the response spectra of motions, a panel for each component there is.
+
+    The only component of a motion is drawn with the horizontals, whatever its direction.
 
     Raises:
         InvalidInput: there is no motion.
     """
     if not motions:
         raise InvalidInput("spectra of no motion: give one or more")
-    upright = [motion for motion in motions if motion.vertical is not None]
-    panels = [("horizontal", motions), ("vertical", upright)]
-    panels = [(name, members) for name, members in panels if members]
-    figure, axes = _panels(len(panels))
-    for axis, (name, members) in zip(axes, panels, strict=True):
-        for index, motion in enumerate(members):
-            values = response_spectrum(motion, PERIODS, damping, component=name)
-            colour = LINES[index % len(LINES)]
-            axis.plot(PERIODS, values / STANDARD_GRAVITY, colour, lw=1.0, label=motion.name)
-        _label(axis, name)
+    names = [name for name in COMPONENTS if any(name in motion.components for motion in motions)]
+    figure, axes = _panels(len(names))
+    for axis, name in zip(axes, names, strict=True):
+        for index, motion in enumerate(motions):
+            if name in motion.components:
+                values = response_spectrum(motion, PERIODS, damping, component=name)
+                style = {"color": LINES[index % len(LINES)], "ls": _dashes(index), "lw": 1.0}
+                axis.plot(PERIODS, values / STANDARD_GRAVITY, **style, label=motion.name)
+        alone = name == "horizontal" and any(len(motion.components) == 1 for motion in motions)
+        _label(axis, "horizontal or only component" if alone else name)
+    _legend(figure, axes)
     return figure
 
 
@@ -74,13 +78,15 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     for axis, name in zip(axes, names, strict=True):
         values = suite.spectra(PERIODS, component=name) / STANDARD_GRAVITY
         for index, (pair, row) in enumerate(zip(suite.pairs, values, strict=True)):
-            axis.plot(PERIODS, row, LINES[index % len(LINES)], lw=0.7, label=pair.name)
+            style = {"color": LINES[index % len(LINES)], "ls": _dashes(index), "lw": 0.7}
+            axis.plot(PERIODS, row, **style, label=pair.name)
         axis.plot(PERIODS, values.mean(axis=0), INK, lw=1.8, label="mean")
         if target is not None:
             aim = target.vertical if name == "vertical" else target.horizontal
             axis.plot(*_defined(aim), HINGE, ls="--", lw=1.8, label="target")
         _label(axis, name)
     figure.suptitle(suite.name, fontsize=NORMAL)
+    _legend(figure, axes)
     return figure
 
 
@@ -95,8 +101,22 @@ def _defined(aim: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     return np.array(known).reshape(-1, 2).T
 
 
+def _dashes(index: int) -> str:
+    """Return the kind of a line, another where colours begin anew."""
+    return ("-", "--", ":", "-.")[index // len(LINES) % 4]
+
+
+def _legend(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Explain the lines below all panels; the first has one of every motion."""
+    handles, names = axes[0].get_legend_handles_labels()
+    columns = 4 if max(map(len, names)) < 20 else 2
+    figure.legend(
+        handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=SMALL
+    )
+
+
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure(figsize=(0.75 * COLUMN * count, 3.6), layout="constrained")
+    figure = Figure(figsize=(0.75 * COLUMN * max(count, 1.3), 4.2), layout="constrained")
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
@@ -119,4 +139,3 @@ def _label(axis: Axes, component: str) -> None:
     dress(axis, "period [s]", "spectral acceleration [g]")
     axis.set_title(component, fontsize=NORMAL)
     axis.set_ylim(bottom=0.0)
-    axis.legend(fontsize=SMALL, frameon=False)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.codes import Tbec2018
+from archfem.codes import TableSpectrum, Tbec2018
 from archfem.errors import InvalidInput
 from archfem.motion import Motion
 from archfem.spectra import response_spectrum
@@ -47,3 +47,22 @@ def test_suite_spectra_show_mean_and_target(shaking):
     assert mean == pytest.approx(2.0 * first)
     assert aim == pytest.approx(target.horizontal(view.PERIODS))
     assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(view.PERIODS))
+
+
+def test_target_is_drawn_where_it_is_defined(shaking):
+    target = TableSpectrum([0.1, 1.0], [1.0, 0.5])
+    level, upright = view.suite_spectra(Suite("one", (shaking,)), target).get_axes()
+    periods, values = level.get_lines()[-1].get_data()
+    assert 0.1 <= periods.min() < 0.11
+    assert 0.95 < periods.max() <= 1.0
+    assert values == pytest.approx(target.horizontal(periods))
+    assert len(upright.get_lines()[-1].get_xdata()) == 0
+
+
+def test_more_motions_than_colours_differ_in_their_dashes(shaking):
+    figure = view.spectra([shaking.with_vertical(None)] * 7)
+    (axes,) = figure.get_axes()
+    first, last = axes.get_lines()[0], axes.get_lines()[6]
+    assert first.get_color() == last.get_color()
+    assert first.get_linestyle() != last.get_linestyle()
+    assert axes.get_title() == "horizontal or only component"

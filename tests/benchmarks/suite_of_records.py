@@ -1,0 +1,95 @@
+"""The suite of the case study: six horizontal and three vertical records, matched.
+
+    python tests/benchmarks/suite_of_records.py FOLDER_WITH_RECORDS [FOLDER_FOR_PICTURES]
+
+Matches the pairs to the spectrum of TBEC-2018 (S_S 1.140, S_1 0.315, class ZD). Prints misfit and
+drift of each component, with peak, Arias intensity and significant duration before and after, and
+how far the mean is from the target. Saves the accelerograms (figure 8 of the paper) and the spectra
+against their target (figure 9) to the second folder, by default out/suite.
+"""
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from archfem.codes import Tbec2018
+from archfem.motion import Motion
+from archfem.suite import Suite
+from archfem.summary import match_table
+from archfem.units import STANDARD_GRAVITY
+from archfem.view.motions import suite_spectra
+from archfem.view.style import COLUMN, LINES, NORMAL, SMALL, dress, save
+
+TARGET = Tbec2018(ss=1.140, s1=0.315, site="ZD")
+STEP = 0.005  # s, that of most of the records
+
+# Each vertical goes with the two horizontals of its own station.
+STATIONS = {
+    "Duzce": "RSN1158_KOCAELI_DZC",
+    "El Centro": "RSN6_IMPVALL.I_I-ELC",
+    "Tolmezzo": "RSN125_FRIULI.A_A-TMZ",
+}
+DIRECTIONS = {"Duzce": ("180", "270"), "El Centro": ("180", "270"), "Tolmezzo": ("000", "270")}
+
+
+def records(folder):
+    """Read the six pairs, each under the name of its station and direction."""
+    for station, stem in STATIONS.items():
+        upright = Motion.read(folder / f"{stem}-UP.AT2").resampled(STEP)
+        for direction in DIRECTIONS[station]:
+            level = Motion.read(folder / f"{stem}{direction}.AT2").resampled(STEP)
+            yield replace(level.with_vertical(upright), name=f"{station} {direction}")
+
+
+def drawn(suite):
+    """Draw the matched accelerograms, divided by R: six horizontals, three verticals."""
+    figure = Figure(figsize=(1.5 * COLUMN, 9.0), layout="constrained")
+    axes = figure.subplots(5, 2, sharex=True)
+    motions = suite.motions
+    panels = [(motion, "horizontal") for motion in motions]
+    panels += [(motion, "vertical") for motion in motions[::2]]
+    for axis, (motion, component) in zip(axes.flat, panels, strict=False):
+        values = motion.component(component) / STANDARD_GRAVITY
+        axis.plot(motion.times(component), values, LINES[component == "vertical"], lw=0.5)
+        name = motion.name if component == "horizontal" else motion.name.rpartition(" ")[0]
+        axis.set_title(f"{name}, {component}", fontsize=NORMAL)
+        dress(axis, "", "acceleration [g]")
+        top = values[np.argmax(np.abs(values))]
+        axis.text(0.98, 0.9, f"{top:.3f} g", transform=axis.transAxes, ha="right", fontsize=SMALL)
+        axis.set_ylim(-0.25, 0.25)
+    axes[-1, -1].set_visible(False)
+    for axis in (axes[-1, 0], axes[-2, 1]):
+        axis.set_xlabel("time [s]", fontsize=SMALL)
+        axis.tick_params(labelbottom=True)
+    return figure
+
+
+def mean_apart(suite, component):
+    """Root mean square, least and largest of mean/target - 1 from 0.05 to 2 s."""
+    periods = np.geomspace(0.05, 2.0, 150)
+    mean = suite.spectra(periods, component=component).mean(axis=0) / STANDARD_GRAVITY
+    apart = mean / getattr(TARGET, component)(periods) - 1.0
+    return np.sqrt(np.mean(apart**2)), apart.min(), apart.max()
+
+
+def main(folder, pictures):
+    """Match, print and draw."""
+    begun = time.perf_counter()
+    suite = Suite("TBEC-2018, class ZD", tuple(records(folder)), reduction=3.0).matched(TARGET)
+    print(match_table(suite.matches))
+    print(f"matched in {time.perf_counter() - begun:.1f} s; before the reduction R = 3")
+    for component in ("horizontal", "vertical"):
+        rms, least, most = mean_apart(suite, component)
+        print(f"mean of {component} against target: rms {rms:.2%}, {least:+.1%} to {most:+.1%}")
+    print(f"wrote {save(drawn(suite), pictures / 'accelerograms.png')}")
+    print(f"wrote {save(suite_spectra(suite, TARGET), pictures / 'spectra.png')}")
+
+
+if __name__ == "__main__":
+    here = Path(sys.argv[1])
+    nested = here / "peer_at2"
+    main(nested if nested.is_dir() else here, Path((sys.argv[2:] or ["out/suite"])[0]))
