@@ -1,0 +1,61 @@
+"""Runs of archfem's steppers without recording, for timing."""
+
+import numpy as np
+
+import archfem as af
+from archfem.contact import ContactStepper
+from archfem.dynamics import State, Stepper
+from archfem.models.jointed import Jointed
+from setting import DAMPING, DT
+from timing import Clock, least, stopwatch, watched
+
+STEPPERS = {"snes": Stepper, "contact": ContactStepper}
+
+
+class Run:
+    """A model ready to be shaken by one of the steppers, from its dead load.
+
+    Attributes:
+        setup: time it took to prepare the stepper [s].
+    """
+
+    def __init__(self, model: Jointed, motion: af.Motion, method: str) -> None:
+        self.model = model
+        self.motion = motion
+        self.dead = af.dead_load(model)
+        watch = stopwatch()
+        self.stepper = STEPPERS[method](model, motion, damping=DAMPING)
+        self.start: State = self.stepper.at_rest(self.dead.q)
+        next(iter(self.stepper.batches(self.start, DT, DT)))
+        self.setup = watch()[0]
+
+    @property
+    def steps(self) -> int:
+        """How many there are."""
+        return round(self.motion.duration / DT)
+
+    def step(self) -> None:
+        """Take all steps and keep nothing."""
+        for _ in self.stepper.batches(self.start, DT, self.motion.duration):
+            pass
+
+    def clock(self, repeat: int) -> Clock:
+        """Time a step."""
+        return least(watched(self.step), self.steps, repeat)
+
+    def resultants(self) -> np.ndarray:
+        """N, V, M of every joint at every step, the start first (steps + 1, n_joints, 3)."""
+        batches = self.stepper.batches(self.start, DT, self.motion.duration)
+        first = self.model.resultants(self.dead.q)[None]
+        return np.concatenate([first, *(batch.resultants for batch in batches)])
+
+
+def warm_up(motion: af.Motion) -> None:
+    """Compile what is compiled, on a small model."""
+    for rule in ("nodal", "exact"):
+        small = af.build(
+            af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=3, width=1.0),
+            fidelity="rigid",
+            quadrature=rule,
+        )
+        Run(small, motion.cut(0.0, 0.1), "contact").step()
