@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 import openseespy.opensees as ops
+from timing import stopwatch
 
 from archfem.statics import self_weight
-from timing import stopwatch
 
 SETTINGS = {
     "element": "quad",

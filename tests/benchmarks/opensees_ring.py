@@ -10,12 +10,12 @@ equations (all nodes, nodal springs, lumped mass), and with a converged solution
 from dataclasses import dataclass
 
 import numpy as np
-
-import archfem as af
 import opensees_model as opensees
 from setting import DAMPING, DT, ground_motion, largest, lumped, options, ring
 from stepping import Run, warm_up
 from timing import Clock, least, table
+
+import archfem as af
 
 SETTINGS = {
     "quad, Newton, BandGeneral": {},

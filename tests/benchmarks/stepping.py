@@ -1,13 +1,13 @@
 """Runs of archfem's steppers without recording, for timing."""
 
 import numpy as np
+from setting import DAMPING, DT
+from timing import Clock, least, stopwatch, watched
 
 import archfem as af
 from archfem.contact import ContactStepper
 from archfem.dynamics import State, Stepper
 from archfem.models.jointed import Jointed
-from setting import DAMPING, DT
-from timing import Clock, least, stopwatch, watched
 
 STEPPERS = {"snes": Stepper, "contact": ContactStepper}
 
