@@ -1,13 +1,17 @@
 """From a structure to a model on the rung that was asked for."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Mapping, Sequence
 
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.reduce import modal, reduced
 from archfem.models.rigid import rigid
+from archfem.models.soft import soft_blocks, softness
 from archfem.quadrature import Quadrature
 from archfem.structure import Structure
+
+logger = logging.getLogger("archfem")
 
 FIDELITIES = ("rigid", "modal", "faces", "condensed", "full", "monolithic")
 """The ladder, the cheapest rung first."""
@@ -58,6 +62,8 @@ def build(
             "exact quadrature needs openings that are linear along a facet, and is not written in "
             "UFL: use degree 1 and a rung other than monolithic"
         )
+    rungs = _rungs(structure, fidelity)
+    _doubt(structure, rungs)
     if fidelity == "rigid":
         return rigid(structure, cells[0], rule)
     from archfem.mesh import Meshing, mesh  # FEniCSx is needed from here on only
@@ -71,7 +77,6 @@ def build(
     model = full(space, rule)
     if fidelity == "modal":
         return modal(model, MODAL_LIMIT)
-    rungs = _rungs(structure, fidelity)
     return model if fidelity == "full" else reduced(model, rungs, _name(fidelity))
 
 
@@ -87,6 +92,21 @@ def _rungs(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]
         )
     rest = fidelity.get("rest", "full")
     return [fidelity.get(b.name, fidelity.get(b.part, rest)) for b in structure.blocks]
+
+
+def _doubt(structure: Structure, rungs: Sequence[str]) -> None:
+    """Say where a rung is too low for a block."""
+    for number in soft_blocks(structure):
+        if rungs[number] in ("rigid", "faces", "condensed"):
+            found = softness(structure, number)
+            logger.warning(
+                "block '%s' is soft: its own modes begin near %.0f Hz, in the seismic band, and it "
+                "is %.2g times as stiff as its joints; '%s' is wrong for it, use 'full'",
+                structure.blocks[number].name,
+                found.inner,
+                found.ratio,
+                rungs[number],
+            )
 
 
 def _name(fidelity: str | Mapping[str, str]) -> str:

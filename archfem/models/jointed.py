@@ -1,5 +1,7 @@
 """Linear blocks between dry joints: the model behind every rung that has matrices."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
@@ -8,6 +10,28 @@ from archfem.joints import JointOperator
 from archfem.models.shape import Shape
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What was predicted of a model when it was chosen.
+
+    Attributes:
+        error: in the largest |e| of the worst joint [-].
+        tolerance: that was asked for [-].
+        dt: time step with which the error is met [s].
+        considered: settings that were tried, the cheapest first, and the error of each.
+    """
+
+    error: float
+    tolerance: float
+    dt: float
+    considered: tuple[tuple[str, float], ...]
+
+    @property
+    def met(self) -> bool:
+        """Whether the error is within the tolerance."""
+        return self.error <= self.tolerance
 
 
 class Jointed:
@@ -40,6 +64,7 @@ class Jointed:
         self._pattern = pattern
         self._always = self.blocks.data + pattern.spread(joints.shear_stiffness()).data
         self._across = joints.normal_stiffness(pattern)
+        self.prediction: Prediction | None = None
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
     def with_joints(self, joints: JointOperator) -> "Jointed":

@@ -1,0 +1,254 @@
+"""Which rung, mesh and time step a scene needs: the cheapest whose error stays below a tolerance.
+
+The error is predicted, not assumed: candidates are run on the strongest part of the motion and
+compared with a finer model on the same part. What is compared is the envelope of |e|, joint by
+joint, since that is what hinges are judged by.
+"""
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import eigsh
+
+from archfem.actions import BodyForce
+from archfem.contact import LARGEST
+from archfem.errors import DidNotConverge
+from archfem.models import Model
+from archfem.models import build as plain
+from archfem.models.jointed import Jointed, Prediction
+from archfem.models.soft import soft_blocks
+from archfem.motion import Motion
+from archfem.runs import time_history
+from archfem.schemes import Rayleigh
+from archfem.statics import equilibrium, self_weight
+from archfem.structure import Array, Structure
+
+logger = logging.getLogger("archfem")
+
+WINDOW = 8.0
+"""Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
+
+SAFETY = 1.5
+"""By how much an error elsewhere in the motion may exceed that in the window: 1.0 to 2.1 times in
+the rings and columns tried, once 4.7 times."""
+
+SEVERE = 0.40
+"""|e| to which a probing motion is scaled where none is given."""
+
+STEPS = (0.005, 0.0025)
+"""Time steps considered [s]."""
+
+REFERENCE = (("condensed", (8, 8)), ("condensed", (4, 4)), ("faces", (4, 4)))
+"""Models against which errors are measured, the best first; the first that is small enough."""
+
+CANDIDATES = (
+    ("rigid", (1, 1)),
+    ("faces", (2, 2)),
+    ("faces", (4, 4)),
+    ("condensed", (4, 4)),
+    ("condensed", (8, 8)),
+)
+"""Rungs and meshes considered, the cheapest first."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A model and a time step.
+
+    Attributes:
+        fidelity: rung, or rungs by block.
+        cells: through the thickness and along each block.
+        quadrature: rule on the joints.
+        dt: time step [s].
+        points: of the rule, on a facet.
+    """
+
+    fidelity: str | Mapping[str, str]
+    cells: tuple[int, int]
+    quadrature: str
+    dt: float
+    points: int | None = None
+
+    @property
+    def label(self) -> str:
+        """The setting in a few words."""
+        rung = self.fidelity if isinstance(self.fidelity, str) else "mixed"
+        rule = self.quadrature + (f" {self.points}" if self.points else "")
+        return f"{rung} {self.cells[0]}×{self.cells[1]} {rule} {1e3 * self.dt:g} ms"
+
+    def build(self, structure: Structure) -> Model:
+        """The model of a structure."""
+        return plain.build(
+            structure,
+            fidelity=self.fidelity,
+            cells=self.cells,
+            quadrature=self.quadrature,
+            points=self.points,
+        )
+
+
+def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
+    structure: Structure,
+    *,
+    fidelity: str | Mapping[str, str] = "full",
+    cells: tuple[int, int] = (4, 4),
+    cell: str = "quadrilateral",
+    degree: int = 1,
+    quadrature: str = "lobatto",
+    points: int | None = None,
+    tolerance: float = 0.005,
+    motion: Motion | None = None,
+    damping: Rayleigh | None = None,
+) -> Model:
+    """Build a model of a structure, on a rung that is named or chosen.
+
+    Args:
+        structure: what stands.
+        fidelity: a rung as in `models.build`, or "auto": the cheapest rung, mesh and time step
+            whose predicted error stays below the tolerance. What was predicted is the model's
+            `prediction`; cells, quadrature and points are then chosen too.
+        cells: through the thickness (facets on a joint) and along each block.
+        cell: "quadrilateral" or "triangle".
+        degree: of the elements, 1 or 2.
+        quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
+        points: on each facet, 3 where not given.
+        tolerance: for "auto", of the largest |e| of every joint [-].
+        motion: for "auto", the ground motion to come; without it a synthetic one is used that
+            brings |e| to 0.4, and the prediction is the less certain.
+        damping: for "auto", that of the run to come.
+
+    Raises:
+        InvalidInput: an option is not one of those above.
+        MeshError: the blocks cannot be cut as asked.
+    """
+    if fidelity == "auto":
+        return choose(structure, tolerance, motion, damping)
+    return plain.build(
+        structure,
+        fidelity=fidelity,
+        cells=cells,
+        cell=cell,
+        degree=degree,
+        quadrature=quadrature,
+        points=points,
+    )
+
+
+def choose(
+    structure: Structure,
+    tolerance: float,
+    motion: Motion | None = None,
+    damping: Rayleigh | None = None,
+) -> Model:
+    """Find the cheapest model and time step whose predicted error is within a tolerance.
+
+    Where none is, the best is given, and a warning says so.
+    """
+    damping = damping or _usual_damping(structure)
+    window = strongest(motion) if motion is not None else _probe(structure)
+    best = finest(structure)
+    reference = envelope(best.build(structure), window, damping, best.dt)
+    considered: list[tuple[Setting, float, Model]] = []
+    for setting in _candidates(structure):
+        model = setting.build(structure)
+        found = envelope(model, window, damping, setting.dt)
+        error = SAFETY * largest_difference(found, reference)
+        considered.append((setting, error, model))
+        if error <= tolerance:
+            break
+    setting, error, model = min(considered, key=lambda found: (found[1] > tolerance, found[1]))
+    tried = tuple((each.label, found) for each, found, _ in considered)
+    if error > tolerance:
+        logger.warning(
+            "no rung of the ladder is predicted to err by less than %g in |e|: the best is %s with "
+            "%.2g; a motion past the first mechanism cannot be followed more closely",
+            tolerance,
+            setting.label,
+            error,
+        )
+    assert isinstance(model, Jointed)
+    model.prediction = Prediction(error, tolerance, setting.dt, tried)
+    return model
+
+
+def envelope(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
+    """Largest |e| of each joint over a run (n_joints,); 0.5 where it came apart."""
+    joints = time_history(model, motion, damping=damping, dt=dt).joints
+    return abs(joints["eccentricity"]).fillna(0.5).max("time").values
+
+
+def largest_difference(first: Array, second: Array) -> float:
+    """Error in eccentricity: the largest difference of two envelopes over the joints."""
+    return float(np.abs(first - second).max())
+
+
+def strongest(motion: Motion) -> Motion:
+    """The part of a motion around its peak."""
+    peak = float(motion.times()[np.argmax(np.abs(motion.horizontal))])
+    start = max(0.0, min(peak - WINDOW / 2.0, motion.duration - WINDOW))
+    return motion.cut(start, min(start + WINDOW, motion.duration))
+
+
+def _mixed(structure: Structure, rung: str) -> str | dict[str, str]:
+    """A rung for all blocks but the soft ones, which keep all their nodes."""
+    soft = [structure.blocks[number].name for number in soft_blocks(structure)]
+    return {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
+
+
+def _candidates(structure: Structure) -> Iterator[Setting]:
+    """Settings to try, the cheapest first; small enough for the contact stepper."""
+    for dt in STEPS:
+        for rung, cells in CANDIDATES:
+            fits = rung == "rigid" or _size(structure, rung, cells) <= LARGEST
+            if fits or (rung, cells) == CANDIDATES[1]:
+                yield Setting(_mixed(structure, rung), cells, "exact", dt)
+
+
+def finest(structure: Structure) -> Setting:
+    """The finest model that the contact stepper still takes, with half the smallest step."""
+    for rung, cells in REFERENCE:
+        if _size(structure, rung, cells) <= LARGEST:
+            break
+    return Setting(_mixed(structure, rung), cells, "exact", min(STEPS) / 2.0)
+
+
+def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
+    """About how many coordinates a rung has."""
+    soft = set(soft_blocks(structure))
+    through, along = cells[0] + 1, cells[1] + 1
+    sides = np.bincount(
+        [block for joint in structure.joints for block in joint.blocks],
+        minlength=len(structure.blocks),
+    )
+    each = 3 if rung == "faces" else 2 * through
+    return sum(
+        2 * through * along if number in soft else each * int(sides[number])
+        for number in structure.free
+    )
+
+
+def _usual_damping(structure: Structure) -> Rayleigh:
+    """Five per cent at the first closed frequency and at three times that."""
+    model = plain.build(structure, fidelity="rigid", quadrature="exact")
+    closed = model.tangent(np.zeros(model.size)).tocsc()
+    square = eigsh(closed, 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False)[0]
+    first = float(np.sqrt(square) / (2.0 * np.pi))
+    return Rayleigh(0.05, (first, 3.0 * first))
+
+
+def _probe(structure: Structure) -> Motion:
+    """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
+    model = plain.build(structure, fidelity="rigid", quadrature="exact")
+    weight, low, high = self_weight(model), 0.0, 2.0
+    for _ in range(10):
+        middle = 0.5 * (low + high)
+        try:
+            joints = equilibrium(model, weight + model.load(BodyForce(middle))).joints
+            severe = float(abs(joints["eccentricity"]).max()) > SEVERE
+        except DidNotConverge:
+            severe = True
+        low, high = (low, middle) if severe else (middle, high)
+    pga = max(low, 0.02) * structure.gravity
+    return Motion.synthetic(duration=WINDOW, pga=pga, seed=1)
