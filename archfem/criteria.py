@@ -11,6 +11,10 @@ import xarray as xr
 HINGE = 0.46
 """|e| from which a joint counts as hinged, 8 % short of its edge: Demirel and Aldemir (2021)."""
 
+USED_UP = 1e-6
+"""Friction left, relative to its limit, below which it is used up: round-off decides nothing there.
+Well above that of programmes and equilibria (1e-9), well below what friction is known to."""
+
 FAILURES = 4
 """Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
 
@@ -34,8 +38,8 @@ def hinged(joints: xr.Dataset, limit: float = HINGE) -> xr.DataArray:
 
 
 def sliding(joints: xr.Dataset) -> xr.DataArray:
-    """Whether the mobilised friction |V| / N of each joint exceeds its coefficient μ."""
-    return (joints["friction"] > joints["friction_limit"]).rename("sliding")
+    """Whether the mobilised friction |V| / N of each joint has reached its coefficient μ."""
+    return (joints["friction"] >= (1.0 - USED_UP) * joints["friction_limit"]).rename("sliding")
 
 
 def opened(joints: xr.Dataset) -> xr.DataArray:

@@ -133,8 +133,9 @@ def _freedoms(joints: xr.Dataset, limit: float) -> tuple[Array, Array]:
     """
     side, apart = hinged(joints, limit).values, opened(joints).values
     ends = np.concatenate([(side > 0) | apart, (side < 0) | apart], axis=-1)
-    slip = np.where(sliding(joints).values, np.sign(joints["V"].values), 0.0)
-    return ends.astype(float), np.where(apart, 2.0, slip)
+    sense, slides = np.sign(joints["V"].values), sliding(joints).values
+    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+    return ends.astype(float), np.where(either, 2.0, np.where(slides, sense, 0.0))
 
 
 def _largest_motion(blocks: RigidBlocks, openings: Array, slips: Array) -> Array:

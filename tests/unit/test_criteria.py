@@ -1,5 +1,7 @@
 """Resultants and criteria on joints whose state is known by construction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,10 @@ from archfem.criteria import (
     opened,
     sliding,
 )
+from archfem.materials import STONE_TO_STONE
+from archfem.mechanism import verified_mechanism
 from archfem.resultants import joint_dataset, thrust_line
+from archfem.shapes import column
 from archfem.summary import joint_table
 
 DEPTH = 0.55
@@ -47,6 +52,23 @@ def test_flags(joints):
     assert sliding(joints).sum() == 3
     assert opened(joints).sum() == 1
     assert failed(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-9, 1.0, 1.0 + 1e-9])
+def test_friction_at_its_limit_is_used_up_whatever_the_round_off(ring, share):
+    normal = 1000.0 * 1.1 ** np.arange(18)  # V / N is then μ only to a few digits of the last
+    resultants = np.stack([normal, 0.6 * share * normal, np.zeros(18)], axis=1)
+    assert sliding(joint_dataset(ring, resultants)).all()
+    resultants[:, 1] *= 1.0 - 1e-5
+    assert not sliding(joint_dataset(ring, resultants)).any()
+
+
+def test_a_joint_without_friction_slides_either_way():
+    """A plain stack on a frictionless bed: nothing but the bed lets it move."""
+    slippery = replace(STONE_TO_STONE, friction=0.0)
+    stack = column(breadth=1.0, heights=[1.0], contact=slippery)
+    joints = joint_dataset(stack, np.array([[1000.0, 0.0, 0.0]]))
+    assert verified_mechanism(stack, joints).moved.blocks == (1,)
 
 
 def test_first_times_and_durations(joints):
