@@ -10,7 +10,7 @@ APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test test-slow lint clean
+.PHONY: help setup demo test test-slow hard bench lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -35,6 +35,13 @@ test: .venv/ready  ## the default tests
 
 test-slow: .venv/ready  ## the tests that take minutes
 	$(PYTHON) -m pytest -m slow
+
+bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
+	$(PYTHON) tests/benchmarks/run.py
+
+.venv/bench: .venv/ready
+	.venv/bin/pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev,bench]'
+	@touch $@
 
 lint: .venv/ready  ## style and types
 	.venv/bin/ruff check . && .venv/bin/ruff format --check . && .venv/bin/mypy archfem

@@ -46,11 +46,11 @@ from archfem.structure import Structure as Structure
 if TYPE_CHECKING:
     from archfem.capacity import minimum_thickness as minimum_thickness
     from archfem.history import History as History
+    from archfem.ladder import build as build
     from archfem.limit import collapse_factor as collapse_factor
     from archfem.limit import stands as stands
     from archfem.matching import matched as matched
     from archfem.mechanism import verified_mechanism as verified_mechanism
-    from archfem.models.build import build as build
     from archfem.newton import Newton as Newton
     from archfem.push import pushover as pushover
     from archfem.runs import CountedMechanism as CountedMechanism
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from archfem.runs import time_history as time_history
     from archfem.statics import dead_load as dead_load
     from archfem.suite import Suite as Suite
+    from archfem.tradeoff import accuracy as accuracy
 
 __version__ = "0.1.0"
 
@@ -68,7 +69,7 @@ _LATER = {
     "stands": "limit",
     "matched": "matching",
     "verified_mechanism": "mechanism",
-    "build": "models.build",
+    "build": "ladder",
     "Newton": "newton",
     "pushover": "push",
     "CountedMechanism": "runs",
@@ -76,6 +77,7 @@ _LATER = {
     "time_history": "runs",
     "dead_load": "statics",
     "Suite": "suite",
+    "accuracy": "tradeoff",
 }
 
 

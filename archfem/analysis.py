@@ -1,13 +1,14 @@
 """Carry out what a case describes: dead load, time histories, and what earlier runs have left."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from archfem.case import Case
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import History
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.runs import CountedMechanism, Record, time_history
 from archfem.statics import Equilibrium, dead_load
@@ -22,10 +23,24 @@ SAME = 1e-6
 def at_rest(case: Case) -> Equilibrium:
     """Build the model of a case and find its dead load.
 
+    With fidelity "auto" the model is chosen for the case's own motion, or the first of its suite.
+
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    return dead_load(build(case.structure, **case.model))
+    return dead_load(build(case.structure, **case.model, **_wanted(case)))
+
+
+def _wanted(case: Case) -> dict[str, Any]:
+    """What the choice of a model needs to know of the run to come."""
+    if case.model.get("fidelity") != "auto":
+        return {}
+    motion = None
+    if case.motion is not None:
+        motion = case.ground_motion()
+    elif case.suite is not None:
+        motion = case.ground_suite().motions[0]
+    return {"motion": motion, "damping": case.damping}
 
 
 def shaken(case: Case, motion: Motion, dead: Equilibrium) -> History:
@@ -45,7 +60,7 @@ def shaken(case: Case, motion: Motion, dead: Equilibrium) -> History:
         run = time_history(
             dead.model,
             motion,
-            dt=case.analysis.get("dt", 0.005),
+            dt=case.analysis.get("dt"),
             start=dead,
             damping=case.damping,
             scheme=case.scheme,

@@ -48,6 +48,7 @@ MODEL = {
     "degree": int,
     "quadrature": str,
     "points": int,
+    "tolerance": "1",
 }
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}

@@ -63,6 +63,9 @@ def _parser() -> argparse.ArgumentParser:
     mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
     mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
     mesh.set_defaults(command=_mesh)
+    study = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
+    study.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    study.set_defaults(command=_accuracy)
     _motion_command(commands.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
 
@@ -101,6 +104,31 @@ def _motion(given: argparse.Namespace) -> None:
     )
     print(motion_table(motions))
     _tell_written(write_motions(motions, Path(given.out)))
+
+
+def _accuracy(given: argparse.Namespace) -> None:
+    from archfem.tradeoff import accuracy
+    from archfem.view.style import save
+    from archfem.view.tradeoff import draw_accuracy
+
+    case, folder = Case.read(given.case, given.changes), Path(given.out)
+    found = accuracy(
+        case.structure,
+        case.ground_motion(),
+        damping=case.damping,
+        tolerance=case.model.get("tolerance", 0.005),
+    )
+    chosen = found.chosen.setting.label if found.chosen else "none: a finer model is needed"
+    lines = [
+        found.table(),
+        "",
+        f"reference: {found.reference.label}, in doubt by {found.doubt:.2g}",
+        f"chosen for an error of {found.tolerance:g}: {chosen}",
+    ]
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "accuracy.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print("\n".join(lines))
+    _tell_written([folder / "accuracy.txt", save(draw_accuracy(found), folder / "accuracy.png")])
 
 
 def _mesh(given: argparse.Namespace) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.accuracy import Accuracy, Trial
-from archfem.view.style import EDGE, FAINT, LINES, dress
+from archfem.tradeoff import Accuracy, Trial
+from archfem.view.style import EDGE, FAINT, LINES, SMALL, dress
 from archfem.view.style import HINGE as RED
 
 MARKERS = {"rigid": "o", "modal": "P", "faces": "s", "condensed": "D", "full": "^"}
@@ -26,6 +26,7 @@ def draw_accuracy(found: Accuracy) -> Figure:
     dress(axes, "time to step through the motion [s]", "error in the largest |e| of a joint [-]")
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.tick_params(which="both", labelsize=SMALL)
     floor = max(found.doubt / 10.0, 1e-7)
     for trial in found.trials:
         _mark(axes, trial, floor)

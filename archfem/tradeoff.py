@@ -88,7 +88,7 @@ class Accuracy:
         return aligned(head, rows)
 
 
-def accuracy( 
+def accuracy(
     structure: Structure,
     motion: Motion,
     *,

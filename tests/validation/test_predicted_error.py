@@ -1,0 +1,110 @@
+"""Is what `fidelity="auto"` predicts what comes about? And the study of speed against error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archfem.ladder import Setting, _usual_damping, build, envelope, largest_difference, strongest
+from archfem.materials import BACKFILL, Contact
+from archfem.models.build import build as plain
+from archfem.motion import Motion
+from archfem.shapes import circular_arch, column
+from archfem.tradeoff import accuracy
+
+STIFF = Contact(1.48e10, 0.3e10)
+SCENES = {
+    "ring": (circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17), 1.7),
+    "semicircle": (circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15), 0.6),
+    "stiff joints": (
+        circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, contact=STIFF),
+        1.7,
+    ),
+    "column": (column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("tolerance", [0.02, 0.005])
+def test_prediction_is_within_a_factor_of_three(scene, tolerance):
+    """Predicted over actual error, the actual one over a whole motion and on a finer model."""
+    structure, pga = SCENES[scene]
+    motion = Motion.synthetic(duration=14.0, pga=pga, seed=1)
+    damping = _usual_damping(structure)
+    model = build(structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping)
+    predicted = model.prediction
+    best = plain(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
+    reference = envelope(best, motion, damping, 0.00125)
+    actual = largest_difference(envelope(model, motion, damping, predicted.dt), reference)
+    assert predicted.met
+    assert actual <= 1.5 * tolerance
+    assert 1.0 / 3.0 < predicted.error / actual < 3.0
+
+
+def test_choice_climbs_as_the_tolerance_falls():
+    structure, pga = SCENES["ring"]
+    motion = Motion.synthetic(duration=8.0, pga=pga, seed=1)
+    tried = [
+        len(build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
+        for t in (0.05, 0.005, 0.0015)
+    ]
+    assert tried[0] == 1 < tried[1] <= tried[2]
+
+
+def test_a_soft_block_keeps_its_nodes():
+    stack = column(breadth=1.0, heights=[1.0, 0.5])
+    soft = replace(stack.blocks[1], material=BACKFILL)
+    stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
+    model = build(stack, fidelity="auto", tolerance=0.01)
+    assert "block 1: full" in model.fidelity
+    assert model.prediction.met
+
+
+def test_without_a_motion_a_severe_one_is_assumed(ring):
+    model = build(ring, fidelity="auto", tolerance=0.02)
+    assert model.prediction.met
+    assert model.prediction.dt in (0.005, 0.0025)
+
+
+def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
+    motion = Motion.synthetic(duration=4.0, pga=4.0, seed=3)
+    model = build(ring, fidelity="auto", tolerance=1e-6, motion=motion)
+    assert not model.prediction.met
+    assert "no rung of the ladder" in caplog.text
+
+
+def test_the_strongest_part_holds_the_peak():
+    motion = Motion.synthetic(duration=30.0, pga=2.0, seed=4)
+    part = strongest(motion)
+    assert part.duration == pytest.approx(8.0)
+    assert part.pga == pytest.approx(motion.pga)
+
+
+def test_study_of_speed_against_error(ring):
+    """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance."""
+    motion = Motion.synthetic(duration=3.0, pga=1.7, seed=1)
+    found = accuracy(
+        ring,
+        motion,
+        rungs=("rigid", "faces"),
+        cells=((4, 4),),
+        rules=(("nodal", None), ("exact", None)),
+        steps=(0.005, 0.0025),
+        tolerance=0.01,
+    )
+    error = {trial.setting.label: trial.error for trial in found.trials}
+    assert len(error) == 8
+    assert error["faces 4×4 exact 2.5 ms"] < 0.5 * error["faces 4×4 nodal 2.5 ms"]
+    assert error["faces 4×4 exact 2.5 ms"] < error["rigid 1×1 exact 2.5 ms"]
+    assert found.chosen.error <= 0.01
+    assert all(
+        trial.error > 0.01 or trial.seconds >= found.chosen.seconds for trial in found.trials
+    )
+    errors = [trial.error for trial in found.front]
+    assert errors == sorted(errors, reverse=True)
+    assert len(found.table().splitlines()) == 9
+
+
+def test_labels_name_the_setting():
+    assert Setting("faces", (4, 2), "gauss", 0.005, 3).label == "faces 4×2 gauss 3 5 ms"
+    assert np.isclose(Setting({"rest": "faces"}, (4, 4), "exact", 0.001).dt, 1e-3)
