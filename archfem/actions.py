@@ -81,6 +81,12 @@ class Settlement:
             )
         return int(number)
 
+    def added(self, structure: Structure, supports: Array) -> Array:
+        """Motions of all blocks with this one on top (n_blocks, 3) [m, m, rad]."""
+        moved = supports.copy()
+        moved[self.place(structure)] += self.motion
+        return moved
+
 
 Action = BodyForce | PointLoad
 

@@ -170,11 +170,13 @@ class JointOperator:
         law: forces from openings and slips, and the points at which those are taken.
         opening: rows of G for the opening, positive open (p, n).
         slip: rows of G for the slip, of the higher block toward the extrados (p, n).
+        offset: opening and slip at q = 0, which supports cause that have moved (2, p) [m], or None.
     """
 
     law: Law
     opening: sparse.csr_matrix
     slip: sparse.csr_matrix
+    offset: Array | None = None
 
     @property
     def points(self) -> JointPoints:
@@ -194,23 +196,31 @@ class JointOperator:
         force = sparse.csr_matrix((np.ones(shape[1]), places), shape)
         return force, sparse.csr_matrix((points.arm, places), shape)
 
+    def openings(self, q: Array) -> Array:
+        """Openings at the points (p,) [m]."""
+        return self.opening @ q if self.offset is None else self.opening @ q + self.offset[0]
+
+    def slips(self, q: Array) -> Array:
+        """Slips at the points (p,) [m]."""
+        return self.slip @ q if self.offset is None else self.slip @ q + self.offset[1]
+
     def force(self, q: Array) -> Array:
         """Generalised forces that the joints exert, as internal forces (n,)."""
         normal, shear = self._back
-        return normal @ self.law.forces(self.opening @ q) + shear @ (self.slip @ q)
+        return normal @ self.law.forces(self.openings(q)) + shear @ self.slips(q)
 
     def energy(self, q: Array) -> float:
         """Energy stored in the joints [J]; forces are homogeneous, so it is half of f·g."""
-        opening, slip = self.opening @ q, self.slip @ q
+        opening, slip = self.openings(q), self.slips(q)
         return 0.5 * float(opening @ self.law.forces(opening) + slip @ (self.law.shear @ slip))
 
     def status(self, q: Array) -> Status:
         """Which points are closed (p,)."""
-        return is_closed(self.opening @ q)
+        return is_closed(self.openings(q))
 
     def stiffness(self, q: Array) -> Array:
         """The numbers on which the tangent depends, for `normal_stiffness` (entries,) [N/m]."""
-        return self.law.stiffness(self.opening @ q)
+        return self.law.stiffness(self.openings(q))
 
     def normal_stiffness(self, pattern: Pattern) -> sparse.csr_matrix:
         """Linear map from `stiffness` to the entries of the tangent on a pattern (nnz, entries)."""
@@ -233,8 +243,8 @@ class JointOperator:
 
         N = -∫ w t_n,   V = ∫ w t_s,   M = -∫ w t_n r
         """
-        normal = self.law.forces(self.opening @ q)
-        shear = self.law.shear @ (self.slip @ q)
+        normal = self.law.forces(self.openings(q))
+        shear = self.law.shear @ self.slips(q)
         force, moment = self.sums
         return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
 
@@ -268,7 +278,8 @@ class JointOperator:
             points.shear_stiffness[kept],
             points.count,
         )
-        return JointOperator(Facets(chosen), self.opening[kept], self.slip[kept])
+        offset = None if self.offset is None else self.offset[:, kept]
+        return JointOperator(Facets(chosen), self.opening[kept], self.slip[kept], offset)
 
 
 def law_of(rule: Quadrature, points: JointPoints) -> Law:

@@ -45,13 +45,37 @@ def rigid_joints(structure: Structure, cells: int, rule: Quadrature) -> JointOpe
     rules = [rule.on_joint(facets_of(joint.depth, cells)) for joint in structure.joints]
     points = JointPoints.on(structure, rules)
     size = 3 * len(structure.free)
-    joints = structure.joints
-    tangents = np.array([joint.tangent for joint in joints])[points.joint]
-    middles = np.array([joint.middle for joint in joints])[points.joint]
-    places = middles + points.arm[:, None] * tangents
+    places, normals, tangents = _frames(structure, points)
     jump = _jump(structure, points, places, size)
-    normals = structure.normals[points.joint]
     return JointOperator(law_of(rule, points), _along(normals, jump), _along(tangents, jump))
+
+
+def gaps_of(structure: Structure, points: JointPoints, motion: Array) -> Array:
+    """Opening and slip that motions of blocks alone cause at points on the joints.
+
+    Args:
+        structure: whose blocks move.
+        points: on its joints (p points).
+        motion: of the centroid of every block (n_blocks, 3) [m, m, rad].
+
+    Returns:
+        (2, p) [m].
+    """
+    places, normals, tangents = _frames(structure, points)
+    jump = np.zeros_like(places)
+    centroids = np.array([block.centroid for block in structure.blocks])
+    for side, sign in (("higher", 1.0), ("lower", -1.0)):
+        block = np.array([getattr(joint, side) for joint in structure.joints])[points.joint]
+        jump += sign * np.einsum("pij,pj->pi", motion_of(places, centroids[block]), motion[block])
+    return np.stack([np.sum(normals * jump, axis=1), np.sum(tangents * jump, axis=1)])
+
+
+def _frames(structure: Structure, points: JointPoints) -> tuple[Array, Array, Array]:
+    """Places of points on the joints, and the joints' normals and tangents there, each (p, 2)."""
+    tangents = np.array([joint.tangent for joint in structure.joints])[points.joint]
+    middles = np.array([joint.middle for joint in structure.joints])[points.joint]
+    places = middles + points.arm[:, None] * tangents
+    return places, structure.normals[points.joint], tangents
 
 
 def _jump(structure: Structure, points: JointPoints, places: Array, size: int) -> list[Array]:

@@ -1,5 +1,6 @@
 """Equilibrium under loads that stay: self-weight first of all."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +15,7 @@ from archfem.resultants import joint_dataset
 from archfem.structure import Array
 
 SMALLEST_STEP = 1.0 / 64.0
-"""Of the load, to which steps are halved before giving up."""
+"""Of a load or a settlement, to which steps are halved before giving up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,7 @@ class Equilibrium:
         model: whose equilibrium it is.
         q: coordinates (n,).
         iterations: of Newton's method, over all steps.
-        steps: in which the load was brought on.
+        steps: in which the load, and then any motion of the supports, was brought on.
     """
 
     model: Model
@@ -64,6 +65,8 @@ def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
 def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
     """Find the equilibrium under a load that is brought on from rest.
 
+    Supports that have moved do so after that, little by little: the joints follow.
+
     Args:
         model: any rung of the ladder.
         load: generalised forces (n,).
@@ -73,18 +76,35 @@ def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equi
         DidNotConverge: there is none; `last` is the last one on the way.
     """
     solver = Solver(model.size, newton)
-    found = Equilibrium(model, np.zeros(model.size), 0, 0)
+    before = model.moved(np.zeros_like(model.supports))
+    rest = Equilibrium(before, np.zeros(model.size), 0, 0)
+    carried = _grown(solver, rest, lambda part: (before, part * load), "load")
+    if not model.supports.any():
+        return carried
+    return _grown(
+        solver, carried, lambda part: (model.moved(part * model.supports), load), "settlement"
+    )
+
+
+def _grown(
+    solver: Solver,
+    found: Equilibrium,
+    at: Callable[[float], tuple[Model, Array]],
+    what: str,
+) -> Equilibrium:
+    """Follow an equilibrium while something grows, which gives a model and a load for each part."""
     factor, step = 0.0, 1.0
     while factor < 1.0:
         target = min(1.0, factor + step)
+        model, load = at(target)
         try:
-            solved = _solve(solver, model, target * load, found.q)
+            solved = _solve(solver, model, load, found.q)
         except DidNotConverge as error:
             step /= 2.0
             if step >= SMALLEST_STEP:
                 continue
             raise DidNotConverge(
-                f"no equilibrium beyond {factor:.3f} of the load ({error}): the structure cannot "
+                f"no equilibrium beyond {factor:.3f} of the {what} ({error}): the structure cannot "
                 "carry it; make it thicker, or check the outline, the supports and the load",
                 last=found,
             ) from error

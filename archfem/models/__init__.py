@@ -4,11 +4,11 @@ Everything above (structure, mesh, forms) exists to produce a `Model`; everythin
 dynamics, modal analysis) consumes one and never asks how it came about.
 """
 
-from typing import Protocol
+from typing import Protocol, Self
 
 from scipy import sparse
 
-from archfem.actions import Action
+from archfem.actions import Action, Settlement
 from archfem.models.shape import Shape
 from archfem.structure import Array, Structure
 
@@ -27,6 +27,7 @@ class Model(Protocol):
         blocks: stiffness of the blocks without the joints (n, n).
         body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg …].
         shape: how the blocks' points move with q.
+        supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
     """
 
     structure: Structure
@@ -36,6 +37,7 @@ class Model(Protocol):
     blocks: sparse.csr_matrix
     body: Array
     shape: Shape
+    supports: Array
 
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""
@@ -48,6 +50,12 @@ class Model(Protocol):
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+
+    def settled(self, settlement: Settlement) -> Self:
+        """The same model with a support that has moved, further than before."""
+
+    def moved(self, supports: Array) -> Self:
+        """The same model with its supports moved so far from where they were built."""
 
     def load(self, action: Action) -> Array:
         """Generalised forces of an action (n,)."""

@@ -1,12 +1,14 @@
 """Linear blocks between dry joints: the model behind every rung that has matrices."""
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from archfem.actions import Action, BodyForce
+from archfem.actions import Action, BodyForce, Settlement
 from archfem.joints import JointOperator
+from archfem.kinematics import gaps_of
 from archfem.models.shape import Shape
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
@@ -61,6 +63,7 @@ class Jointed:
         self.body = body
         self.joints = joints
         self.shape = shape
+        self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
         self._always = self.blocks.data + pattern.spread(joints.shear_stiffness()).data
         self._across = joints.normal_stiffness(pattern)
@@ -77,7 +80,20 @@ class Jointed:
             body=self.body,
             joints=joints,
             shape=self.shape,
-        )
+        ).moved(self.supports)
+
+    def settled(self, settlement: Settlement) -> "Jointed":
+        """The same model with a support that has moved, further than before."""
+        return self.moved(settlement.added(self.structure, self.supports))
+
+    def moved(self, supports: Array) -> "Jointed":
+        """The same model with its supports moved: joints open and slip by as much at q = 0."""
+        other = copy(self)
+        other.supports = supports
+        offset = gaps_of(self.structure, self.joints.points, supports) if supports.any() else None
+        other.joints = replace(self.joints, offset=offset)
+        other._last = None
+        return other
 
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""

@@ -1,9 +1,13 @@
 """The slow reference: weak forms assembled at every iteration, sharing no shortcut."""
 
+from copy import copy
+
 import numpy as np
 from scipy import sparse
 
+from archfem.actions import Settlement
 from archfem.forms import Forms
+from archfem.kinematics import motion_of
 from archfem.models.full import full
 from archfem.quadrature import Quadrature
 from archfem.space import BrokenSpace
@@ -25,11 +29,28 @@ class Monolithic:
         self.load = linear.load
         self._forms = Forms(space, rule)
         self._free = space.free
+        self.supports = linear.supports
+        self._places, self._owner = space.places, space.owner
         self._everywhere = np.zeros(2 * len(space.places))
         # The forms' pattern couples all nodes of the two cells at a facet, even where it is zero.
         self._pattern = Pattern.of(linear.mass, self._assembled(np.zeros(self.size)))
         self.mass = self._pattern.spread(linear.mass)
         self.blocks = self._pattern.spread(linear.blocks)
+
+    def settled(self, settlement: Settlement) -> "Monolithic":
+        """The same model with a support that has moved, further than before."""
+        return self.moved(settlement.added(self.structure, self.supports))
+
+    def moved(self, supports: Array) -> "Monolithic":
+        """The same model with its supports moved: their nodes follow."""
+        other = copy(self)
+        other.supports = supports
+        other._everywhere = np.zeros_like(self._everywhere)
+        for number in set(range(len(supports))) - set(self.structure.free):
+            nodes = np.flatnonzero(self._owner == number)
+            motion = motion_of(self._places[nodes], self.structure.blocks[number].centroid)
+            other._everywhere.reshape(-1, 2)[nodes] = motion @ supports[number]
+        return other
 
     def _spread(self, q: Array) -> Array:
         """Displacements of all nodes, those of fixed blocks included."""

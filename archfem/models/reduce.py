@@ -42,7 +42,7 @@ def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointe
             lift=(shape.lift @ basis).tocsr(),
             stress=None if shape.stress is None else (shape.stress @ basis).tocsr(),
         ),
-    )
+    ).moved(model.supports)
 
 
 def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:

@@ -1,0 +1,135 @@
+"""Supports that move: joints follow, on every rung alike, toward limit states of rigid blocks."""
+
+import numpy as np
+import pytest
+
+from archfem.actions import Settlement
+from archfem.errors import InvalidInput
+from archfem.kinematics import gaps_of, motion_of
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.newton import Newton
+from archfem.runs import time_history
+from archfem.shapes import circular_arch, column
+from archfem.statics import dead_load
+
+RING = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+COUPLE = circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)
+TIGHT = Newton(tolerance=1e-13)
+RUNGS = ("rigid", "faces", "modal", "condensed", "full", "monolithic")
+
+
+def about(structure, block, turn, shift):
+    """Motion of a block that turns with the whole plane about the origin."""
+    x, y = structure.blocks[block].centroid
+    return (shift[0] - turn * y, shift[1] + turn * x, turn)
+
+
+def differ(found, reference):
+    """Largest difference of resultants, relative to the largest of each kind."""
+    return max(
+        float(np.abs(found[key] - reference[key]).max() / np.abs(reference[key]).max())
+        for key in ("N", "V", "M")
+    )
+
+
+def force_on_higher(joints):
+    """Force of each lower on its higher block of the couple (n_joints, 2) [N]."""
+    tangents = np.array([joint.tangent for joint in COUPLE.joints])
+    return joints["N"].values[:, None] * COUPLE.normals - joints["V"].values[:, None] * tangents
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+def test_supports_that_move_together_change_nothing(rung):
+    """The ring goes with them: a rigid motion of everything, by 1 cm and 1 mrad."""
+    model = build(RING, fidelity=rung, cells=(2, 2))
+    reference = dead_load(model, TIGHT)
+    moved = model
+    for block in (0, len(RING.blocks) - 1):
+        moved = moved.settled(Settlement(block, about(RING, block, 1e-3, (0.01, -0.01))))
+    found = dead_load(moved, TIGHT)
+    assert (
+        differ(found.joints, reference.joints) < 1e-5
+    )  # round-off of 1 cm, or 1e-16 of 0.7 modal units, against µm
+    gap = model.shape.displacement(found.q - reference.q)
+    plane = motion_of(model.shape.places, np.zeros(2)) @ [0.01, -0.01, 1e-3]
+    np.testing.assert_allclose(gap, plane, atol=1e-7)
+
+
+@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss", "exact"])
+def test_condensation_and_modes_follow_as_all_nodes_do(rule):
+    spread = Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
+    built = {
+        rung: build(RING, fidelity=rung, cells=(2, 2), quadrature=rule).settled(spread)
+        for rung in ("condensed", "full")
+    }
+    found = {rung: dead_load(model, TIGHT).joints for rung, model in built.items()}
+    assert differ(found["condensed"], found["full"]) < 1e-7
+
+
+def test_nodes_of_the_support_may_move_instead_of_joints():
+    """The monolithic model moves the abutment's own nodes, and knows nothing of offsets."""
+    spread = Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
+    full, slow = (
+        dead_load(build(RING, fidelity=rung, cells=(2, 2)).settled(spread), TIGHT).joints
+        for rung in ("full", "monolithic")
+    )
+    assert differ(full, slow) < 1e-8
+
+
+def test_two_blocks_on_a_support_that_sinks_a_little():
+    """A micrometre, by which no point opens or closes: linear, and odd about the crown.
+
+    The crown is sheared and not turned, and the springings carry the same weight between them.
+    """
+    model = build(COUPLE, fidelity="rigid")
+    before = dead_load(model, TIGHT).joints
+    sunk, risen = (
+        dead_load(model.settled(Settlement(3, (0.0, by, 0.0))), TIGHT).joints - before
+        for by in (-1e-6, 1e-6)
+    )
+    assert float(sunk["V"][1]) < -1.0  # the higher block, on the right, hangs on its neighbour
+    for key in ("N", "V", "M"):
+        np.testing.assert_allclose(sunk[key], -risen[key], atol=1e-5)
+    np.testing.assert_allclose(sunk["V"], sunk["V"][::-1], atol=1e-5)
+    np.testing.assert_allclose(sunk["M"], -sunk["M"][::-1], atol=1e-5)
+    change = force_on_higher(sunk)
+    assert change[0, 1] == pytest.approx(change[2, 1], abs=1e-5)
+
+
+def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges():
+    """Moments about the hinges alone give the thrust between the blocks, whatever the stiffness."""
+    joints = dead_load(build(COUPLE, fidelity="rigid").settled(Settlement(3, (0, -0.2, 0)))).joints
+    assert joints["eccentricity"].values == pytest.approx([-0.5, -0.5, 0.5], abs=1e-6)
+    left, crown, right = (
+        np.array(joint.extrados if e > 0.0 else joint.intrados)
+        for joint, e in zip(COUPLE.joints, joints["eccentricity"].values, strict=True)
+    )
+    rows, known = [], []
+    for pivot, block, sign in ((left, COUPLE.blocks[1], -1.0), (right, COUPLE.blocks[2], 1.0)):
+        arm = sign * (crown - pivot)
+        rows.append([-arm[1], arm[0]])
+        weight = block.area * block.material.unit_weight * COUPLE.width
+        known.append(weight * (block.centroid[0] - pivot[0]))
+    force = np.linalg.solve(rows, known)
+    assert force_on_higher(joints)[1] == pytest.approx(force, rel=1e-6)
+
+
+def test_the_gap_of_a_support_is_its_motion_across_the_joint():
+    base = column(breadth=1.0, heights=[1.0])
+    model = build(base, fidelity="rigid")
+    gaps = gaps_of(base, model.joints.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(gaps, [[0.02] * 9 if k == 0 else [0.0] * 9 for k in range(2)])
+
+
+def test_a_settled_ring_is_shaken_by_solving_each_step(ring):
+    model = build(RING, fidelity="rigid").settled(Settlement("left abutment", (-1e-3, 0.0, 0.0)))
+    start = dead_load(model)
+    run = time_history(model, Motion.synthetic(duration=0.3, pga=1e-6, seed=1), start=start)
+    assert run.dataset.attrs["method"] == "snes"
+    np.testing.assert_allclose(run.joints["N"][-1], start.joints["N"], rtol=1e-4)
+
+
+def test_only_supports_settle():
+    with pytest.raises(InvalidInput, match="cannot settle"):
+        build(RING, fidelity="rigid").settled(Settlement(3, (0.0, 0.1, 0.0)))
