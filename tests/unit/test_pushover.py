@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.actions import BodyForce, PointLoad
+from archfem.actions import BodyForce, PointLoad, Settlement
 from archfem.errors import DidNotConverge
 from archfem.limit import collapse_factor
 from archfem.models.build import build
@@ -137,6 +137,12 @@ def test_a_ring_that_does_not_stand_is_not_pushed():
         (lambda: pushover(rigid(RING), BodyForce(1.0), control="work"), "is not known"),
         (lambda: pushover(rigid(RING), BodyForce(0.0)), "load is zero"),
         (lambda: pushover(rigid(RING), PointLoad(9.0, (0.0, -1.0))), "misses the structure"),
+        (
+            lambda: pushover(rigid(RING), Settlement(0, (0.1, 0.0, 0.0)), control="force"),
+            "settlement is a displacement",
+        ),
+        (lambda: pushover(rigid(RING), Settlement(0, (0.0, 0.0, 0.0))), "is zero"),
+        (lambda: pushover(rigid(RING), Settlement(5, (0.1, 0.0, 0.0))), "cannot settle"),
         (lambda: Stop(slope=1.5), "not between 0 and 1"),
         (lambda: replace(Stop(), steps=0), "must be above 0"),
     ],
@@ -144,3 +150,35 @@ def test_a_ring_that_does_not_stand_is_not_pushed():
 def test_input_that_cannot_be_meant_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("spread", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
+def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(spread):
+    """Out: the least thrust; in: the greatest; down: the least share of the weight."""
+    settlement = Settlement("left abutment", spread)
+    limit = collapse_factor(RING, live=settlement, friction=None).factor
+    found = pushover(rigid(RING), settlement)
+    assert found.factor == pytest.approx(limit, rel=REACHED)
+    assert found.limit == pytest.approx(limit, rel=REACHED)
+    factor = found.curve["factor"]
+    assert float(factor.diff("step").max()) < 1e-9 * abs(limit)  # never resists it more
+    assert float(factor[0] - factor[-1]) > 0.02 * abs(limit)
+    assert len(found.hinges) >= 3
+    assert factor.attrs["units"] == "N m"
+
+
+@pytest.mark.parametrize("rung", ["faces", "modal", "condensed", "full"])
+def test_spreading_supports_bring_every_rung_to_the_least_thrust(rung):
+    settlement = Settlement("left abutment", (-1.0, 0.0, 0.0))
+    limit = collapse_factor(RING, live=settlement, friction=None).factor
+    found = pushover(build(RING, fidelity=rung), settlement)
+    assert found.factor == pytest.approx(limit, rel=REACHED)
+    assert found.factor < 0.8 * float(found.curve["factor"][0])  # the thrust of the dead load
+
+
+def test_work_on_a_settlement_is_the_thrust_on_the_support():
+    found = pushover(rigid(RING), Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3))
+    joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
+    thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
+    assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)
+    assert float(found.curve["displacement"][-1]) > 0.0
