@@ -14,7 +14,7 @@ the equilibrium solves of `dynamics`, to rounding.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
@@ -39,7 +39,8 @@ BATCH = 128
 def applies(model: Model, damping: Rayleigh | None) -> bool:
     """Whether the closed structure falls into modes, few enough to keep all of them."""
     proportional = damping is None or damping.joints != "none"
-    return isinstance(model, Jointed) and proportional and model.size <= LARGEST
+    still = not model.supports.any()  # the modes are those about joints closed at q = 0
+    return isinstance(model, Jointed) and proportional and still and model.size <= LARGEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +99,7 @@ class ContactStepper:
         self.model = model
         self.motion = motion
         self.exact = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+        self.lag = self.exact.lag
         self._modes = _Modes.of(model, self.exact.weight)
         points = model.joints.points
         stiffness = points.weight * points.normal_stiffness
@@ -112,6 +114,10 @@ class ContactStepper:
     def at_rest(self, q: Array, time: float = 0.0) -> State:
         """The state of a structure at rest as the ground begins to move."""
         return self.exact.at_rest(q, time)
+
+    def energy(self, state: State) -> Array:
+        """Kinetic and potential energy of a state, and two zeros (4,) [J]."""
+        return self.exact.energy(state)
 
     def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
         """Yield the steps to the end, many at a time.
@@ -135,7 +141,8 @@ class ContactStepper:
                 state = batch.state(len(batch.times) - 1)
             if not complete:
                 (fallback,) = self.exact.batches(state, dt, state.time + dt)
-                yield fallback
+                passes = fallback.iterations + kernel.ITERATIONS  # those in vain count too
+                yield replace(fallback, iterations=passes, fallback=True)
                 done += 1
                 state = fallback.state(0)
 
@@ -145,27 +152,41 @@ class ContactStepper:
         back = modes.shapes.T @ self.model.mass
         series = np.empty((len(times) + 1, 3, len(modes.squares)))
         series[0] = back @ state.q, back @ state.velocity, back @ state.acceleration
-        share = 1.0 + self.exact.scheme.alpha
-        ground = self.motion.at(times - (1.0 - share) * dt)
+        gaps = np.empty((len(series), len(modes.opening)))
+        gaps[0] = modes.opening @ (series[0, 0] + self.lag * series[0, 1])
         resultants = np.empty((len(times), self.model.joints.points.count, 3))
         iterations = np.zeros(len(times), dtype=np.int64)
         count = kernel.advance(
             series,
+            gaps,
             resultants,
             iterations,
-            modes.weight - ground @ modes.body.T,
+            modes.weight + self._ground(times + self.exact.scheme.alpha * dt),
             (modes.opening, modes.shear, compliance),
             coefficients,
             self._law,
         )
+        ground = self._ground(np.append(times[0] - dt, times[:count]))
         batch = Batch(
             times[:count],
             resultants[:count],
             iterations[:count],
             np.full(count, dt),
+            kernel.energies(
+                series[: count + 1],
+                gaps[: count + 1],
+                (modes.weight, 0.5 * (ground[:-1] + ground[1:])),
+                modes.opening,
+                coefficients,
+                self._law,
+            ),
             lambda k: State(float(times[k]), *(modes.shapes @ x for x in series[k + 1])),
         )
         return batch, count == len(times)
+
+    def _ground(self, times: Array) -> Array:
+        """Modal forces of the ground (steps, n)."""
+        return -self.motion.at(times) @ self._modes.body.T
 
     def _prepared(self, dt: float) -> tuple[_Modes, "kernel.Coefficients", Array]:
         """What a step of this length needs."""
@@ -175,7 +196,7 @@ class ContactStepper:
             numbers = kernel.coefficients(
                 dt,
                 (scheme.beta, scheme.gamma, scheme.alpha),
-                self.exact.lag,
+                self.lag,
                 (modes.squares, self._rates),
             )
             compliance = (modes.opening * (numbers.seen * numbers.gain)) @ modes.opening.T

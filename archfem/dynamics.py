@@ -12,12 +12,14 @@ t_n = k_n <g + β ġ>_-: a continuous law, whose energy stays convex. Damping on
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from archfem.energy import Meter
 from archfem.errors import DidNotConverge
 from archfem.models import Model
 from archfem.motion import Motion
@@ -56,25 +58,30 @@ class Batch:
         resultants: N, V, M of every joint (steps, n_joints, 3) [N, N, N m].
         iterations: of Newton's method, or passes over the open points (steps,).
         smallest: the smallest step that was needed to get there (steps,) [s].
+        energy: kinetic, potential, work and loss of each step, as by `Meter.step` (steps, 4) [J].
         state: gives the state at the end of step k.
+        fallback: whether these steps were given up by the contact stepper, and taken by SNES.
     """
 
     times: Array
     resultants: Array
     iterations: NDArray[np.int64]
     smallest: Array
+    energy: Array
     state: Callable[[int], State]
+    fallback: bool = False
 
     def cut(self, steps: int) -> "Batch":
         """The first steps of the batch."""
         if steps == len(self.times):
             return self
-        return Batch(
-            self.times[:steps],
-            self.resultants[:steps],
-            self.iterations[:steps],
-            self.smallest[:steps],
-            self.state,
+        return replace(
+            self,
+            times=self.times[:steps],
+            resultants=self.resultants[:steps],
+            iterations=self.iterations[:steps],
+            smallest=self.smallest[:steps],
+            energy=self.energy[:steps],
         )
 
 
@@ -87,12 +94,23 @@ class Step:
         contact: u + β v, which the joint law and the blocks' stress see (n,).
         iterations: of Newton's method.
         smallest: the smallest step that was needed to get there [s].
+        energy: kinetic, potential, work and loss, as by `Meter.step` (4,) [J].
     """
 
     state: State
     contact: Array
     iterations: int
     smallest: float
+    energy: Array
+
+    def after(self, first: "Step") -> "Step":
+        """This step as the second half of a longer one."""
+        return replace(
+            self,
+            iterations=first.iterations + self.iterations,
+            smallest=min(first.smallest, self.smallest),
+            energy=self.energy + np.append(np.zeros(2), first.energy[2:]),
+        )
 
 
 class Stepper:
@@ -113,10 +131,11 @@ class Stepper:
         self.motion = motion
         self.scheme = scheme or Newmark()
         self.lag = damping.stiffness if damping and damping.joints == "closed" else 0.0
-        self._damping = _damping_matrix(model, damping)
+        self.damping = _damping_matrix(model, damping)
         self.weight = self_weight(model)
         self._scale = magnitude(self.weight)
         self._solver = Solver(model.size, newton)
+        self._meter = Meter(model, self.weight, self.damping, self.lag)
         self._kept: tuple[float, sparse.csr_matrix, sparse.csr_matrix] | None = None
 
     def at_rest(self, q: Array, time: float = 0.0) -> State:
@@ -127,7 +146,7 @@ class Stepper:
         """The same state with the acceleration that its forces give."""
         forces = (
             self._load(state.time)
-            - self._damping @ state.velocity
+            - self.damping @ state.velocity
             - self.model.force(self.contact(state))
         )
         return replace(state, acceleration=splu(self.model.mass.tocsc()).solve(forces))
@@ -135,6 +154,11 @@ class Stepper:
     def contact(self, state: State) -> Array:
         """What the joint law sees, u + β v."""
         return state.q + self.lag * state.velocity
+
+    def energy(self, state: State) -> Array:
+        """Kinetic and potential energy of a state, and two zeros (4,) [J]."""
+        now = (state.q, state.velocity)
+        return self._meter.step(now, now, np.zeros(2))
 
     def steps(self, start: State, dt: float, end: float) -> Iterator[Step]:
         """Yield one step after another until the end.
@@ -151,8 +175,9 @@ class Stepper:
         first = start.time
         for number in range(1, round((end - first) / dt) + 1):
             target = first + number * dt
-            state, iterations, smallest = self._advance(state, target, 0)
-            yield Step(state, self.contact(state), iterations, smallest)
+            step = self._advance(state, target, 0)
+            state = step.state
+            yield step
 
     def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
         """Yield the same steps with their resultants, in batches of one."""
@@ -162,13 +187,14 @@ class Stepper:
                 self.model.resultants(step.contact)[None],
                 np.array([step.iterations]),
                 np.array([step.smallest]),
-                lambda _, state=step.state: state,
+                step.energy[None],
+                partial(_given, step.state),
             )
 
     def _load(self, time: float) -> Array:
         return self.weight - self.model.body @ self.motion.at(time)[0]
 
-    def _advance(self, state: State, target: float, halvings: int) -> tuple[State, int, float]:
+    def _advance(self, state: State, target: float, halvings: int) -> Step:
         """Reach a time in one step, or in halves of it where that fails."""
         dt = target - state.time
         try:
@@ -180,13 +206,15 @@ class Stepper:
                     "the structure may have fallen apart; try a smaller dt or HHT",
                     last=state,
                 ) from error
-            middle, first, small = self._advance(state, state.time + dt / 2.0, halvings + 1)
-            new, second, smaller = self._advance(middle, target, halvings + 1)
-            return new, first + second, min(small, smaller)
-        return replace(new, time=target), iterations, dt
+            first = self._advance(state, state.time + dt / 2.0, halvings + 1)
+            return self._advance(first.state, target, halvings + 1).after(first)
+        new = replace(new, time=target)
+        ground = self.motion.at(np.array([state.time, target])).mean(axis=0)
+        energy = self._meter.step((state.q, state.velocity), (new.q, new.velocity), ground)
+        return Step(new, self.contact(new), iterations, dt, energy)
 
     def _try(self, state: State, dt: float) -> tuple[State, int]:
-        trial = _Trial(self.model, self.scheme, self._damping, self.lag, state, dt)
+        trial = _Trial(self.model, self.scheme, self.damping, self.lag, state, dt)
         load = self._load(state.time + trial.share * dt)
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
         solved = self._solver.solve(
@@ -282,3 +310,8 @@ def _damping_matrix(model: Model, damping: Rayleigh | None) -> sparse.csr_matrix
     elif damping.joints == "none":
         matrix.data += damping.stiffness * model.blocks.data
     return matrix
+
+
+def _given(state: State, _: int) -> State:
+    """The state of a batch of one."""
+    return state

@@ -2,8 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass
 
 import numpy as np
 from tqdm import tqdm
@@ -12,19 +11,25 @@ from archfem.contact import LARGEST, ContactStepper, applies
 from archfem.criteria import FAILURES, HINGE, counted_mechanism
 from archfem.dynamics import Batch, State, Stepper
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.history import SIGNS, History
+from archfem.guard import Guard
+from archfem.history import History
 from archfem.models import Model
+from archfem.models.jointed import Jointed
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.resultants import joint_dataset
 from archfem.schemes import Rayleigh, Scheme
 from archfem.statics import Equilibrium, dead_load
 from archfem.structure import Array, Structure
+from archfem.tape import Tape
 
 logger = logging.getLogger("archfem")
 
 Event = Callable[[Structure, Array], str | None]
 """Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
+
+STEP = 0.005
+"""Time step where none is given [s]."""
 
 METHODS = ("auto", "contact", "snes")
 
@@ -75,66 +80,11 @@ class CountedMechanism:
         return f"a mechanism: joints {found.joints} of the {found.part}" if found else None
 
 
-@dataclass
-class _Tape:
-    """What has been recorded so far."""
-
-    model: Model
-    record: Record
-    method: str
-    times: list[float] = field(default_factory=list)
-    resultants: list[Array] = field(default_factory=list)
-    effort: list[tuple[int, float]] = field(default_factory=list)
-    frames: list[float] = field(default_factory=list)
-    fields: list[Array] = field(default_factory=list)
-
-    def add(self, first: int, batch: Batch) -> None:
-        """Keep of a batch, whose steps count from `first`, what was asked for."""
-        for k, number in enumerate(range(first, first + len(batch.times))):
-            if number % self.record.every == 0:
-                self.times.append(batch.times[k])
-                self.resultants.append(batch.resultants[k])
-                self.effort.append((batch.iterations[k], batch.smallest[k]))
-            if self.record.fields_every and number % self.record.fields_every == 0:
-                self.frames.append(batch.times[k])
-                self.fields.append(batch.state(k).q)
-
-    def history(self, motion: Motion, state: State, outcome: str) -> History:
-        """Everything as one dataset."""
-        times = np.array(self.times)
-        dataset = joint_dataset(self.model.structure, np.array(self.resultants), times)
-        ground = motion.at(times)
-        dataset["ground"] = (
-            ("time", "axis"),
-            ground,
-            {"units": "m/s2", "long_name": "acceleration of the ground"},
-        )
-        dataset.coords["axis"] = ["x", "y"]
-        iterations, smallest = zip(*self.effort, strict=True)
-        dataset["iterations"] = ("time", list(iterations), {"long_name": "Newton iterations"})
-        dataset["smallest_step"] = ("time", list(smallest), {"units": "s"})
-        if self.fields:
-            dataset.coords["frame_time"] = ("frame", self.frames, {"units": "s"})
-            dataset["q"] = (("frame", "coordinate"), np.array(self.fields))
-        for name in ("q", "velocity", "acceleration"):
-            dataset[f"last_{name}"] = ("coordinate", getattr(state, name))
-        dataset.attrs = {
-            "title": f"time history of {self.model.structure.name} under {motion.name or 'motion'}",
-            "outcome": outcome,
-            "fidelity": self.model.fidelity,
-            "method": self.method,
-            "last_time": state.time,
-            "signs": SIGNS,
-            "versions": versions(),
-        }
-        return History(dataset)
-
-
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
     model: Model,
     motion: Motion,
     *,
-    dt: float = 0.005,
+    dt: float | None = None,
     start: Equilibrium | State | None = None,
     damping: Rayleigh | None = None,
     scheme: Scheme | None = None,
@@ -152,7 +102,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     Args:
         model: any rung of the ladder.
         motion: of the ground.
-        dt: time step [s]; ground accelerations between samples are interpolated.
+        dt: time step [s], by default 0.005, or that for which the model was chosen; ground
+            accelerations between samples are interpolated.
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
         damping: None is undamped.
@@ -171,24 +122,26 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         InvalidInput: dt cannot be meant.
         DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
     """
+    predicted = getattr(model, "prediction", None)
+    if dt is None:
+        dt = STEP if predicted is None else predicted.dt
     if not 0.0 < dt <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
     stepper = _stepper(method, model, motion, damping, scheme, newton)
     if not isinstance(start, State):
         start = stepper.at_rest((start or dead_load(model, newton)).q)
-    tape = _Tape(model, record or Record(), stepper.name)
-    lag = damping.stiffness if damping and damping.joints == "closed" else 0.0
-    contact = start.q + lag * start.velocity
-    tape.add(0, _first(start, model.resultants(contact), dt))
+    first = _first(stepper, start, dt)
+    tape = _tape(stepper, first, dt, record or Record())
+    tape.add(0, first)
     number, state, outcome = 0, start, "reached the end of the motion"
     try:
         with _bar(start, motion, dt) as bar:
             for batch in stepper.batches(start, dt, motion.duration):
                 reason, size = _reason(until, model, batch)
                 batch = batch.cut(size)
+                state = batch.state(size - 1)
                 tape.add(number + 1, batch)
                 number += size
-                state = batch.state(size - 1)
                 bar.update(size)
                 if reason:
                     outcome = f"ended at {state.time:.4g} s by {reason}"
@@ -219,20 +172,28 @@ def _stepper(
             f"the contact stepper needs blocks between joints, at most {LARGEST} coordinates "
             f"(here {model.size}), and damping on closed or initial joints: use method='snes'"
         )
-    if method == "snes" or not fits:
+    if method == "snes" or not (fits and isinstance(model, Jointed)):
         return Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
     return ContactStepper(model, motion, damping=damping, scheme=scheme, newton=newton)
 
 
-def _first(start: State, resultants: Array, dt: float) -> Batch:
+def _first(stepper: Stepper | ContactStepper, start: State, dt: float) -> Batch:
     """The start, as a batch of one."""
+    contact = start.q + stepper.lag * start.velocity
     return Batch(
         np.array([start.time]),
-        resultants[None],
+        stepper.model.resultants(contact)[None],
         np.zeros(1, dtype=np.int64),
         np.array([dt]),
+        stepper.energy(start)[None],
         lambda _: start,
     )
+
+
+def _tape(stepper: Stepper | ContactStepper, first: Batch, dt: float, record: Record) -> Tape:
+    """An empty tape, and a guard over it."""
+    guard = Guard(stepper.model, first)
+    return Tape(stepper.model, stepper.name, dt, record.every, record.fields_every, guard)
 
 
 def _bar(start: State, motion: Motion, dt: float) -> tqdm:
@@ -247,17 +208,6 @@ def _reason(until: Event | None, model: Model, batch: Batch) -> tuple[str | None
             if reason := until(model.structure, resultants):
                 return reason, k + 1
     return None, len(batch.times)
-
-
-def versions() -> str:
-    """Versions of the libraries that results depend on."""
-    found = []
-    for name in ("archfem", "numpy", "scipy", "petsc4py", "fenics-dolfinx", "gmsh"):
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            continue
-    return ", ".join(found)
 
 
 def last_state(history: History) -> State:
