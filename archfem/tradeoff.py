@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 from tqdm import tqdm
 
+from archfem.errors import DidNotConverge
 from archfem.ladder import Setting, envelope, finest, largest_difference
 from archfem.motion import Motion
 from archfem.runs import time_history
@@ -28,7 +29,8 @@ class Trial:
         setting: the model and the time step.
         size: coordinates.
         seconds: to step through the motion, once the model is built [s].
-        error: in the largest |e| of the worst joint, against the reference [-].
+        error: in the largest |e| of the worst joint, against the reference [-]; infinite where
+            the run failed.
     """
 
     setting: Setting
@@ -80,7 +82,7 @@ class Accuracy:
                 str(trial.size),
                 f"{trial.seconds:.3f}",
                 f"{self.duration / trial.seconds:.0f}",
-                f"{trial.error:.5f}",
+                f"{trial.error:.5f}" if np.isfinite(trial.error) else "failed",
                 "*" if trial in front else "",
             ]
             for trial in sorted(self.trials, key=lambda trial: trial.seconds)
@@ -115,16 +117,14 @@ def accuracy(
 
     Raises:
         InvalidInput: a rung, rule or step is not known.
-        DidNotConverge: a setting's run failed.
+        DidNotConverge: the reference itself failed.
     """
     best = finest(structure)
     reference = envelope(best.build(structure), motion, damping, best.dt)
     coarse = Setting(
         best.fidelity, (best.cells[0] // 2, best.cells[1] // 2), best.quadrature, 2.0 * best.dt
     )
-    doubt = largest_difference(
-        envelope(coarse.build(structure), motion, damping, coarse.dt), reference
-    )
+    doubt = _trial(coarse, structure, motion, damping, reference).error
     settings = list(_settings(rungs, cells, rules, steps))
     trials = [
         _trial(setting, structure, motion, damping, reference)
@@ -159,6 +159,8 @@ def _trial(
     model = setting.build(structure)
     time_history(model, motion.cut(0.0, 2.0 * setting.dt), damping=damping, dt=setting.dt)
     start = perf_counter()
-    found = envelope(model, motion, damping, setting.dt)
-    seconds = perf_counter() - start
-    return Trial(setting, model.size, seconds, largest_difference(found, reference))
+    try:
+        error = largest_difference(envelope(model, motion, damping, setting.dt), reference)
+    except DidNotConverge:
+        error = np.inf
+    return Trial(setting, model.size, perf_counter() - start, error)

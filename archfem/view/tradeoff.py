@@ -29,8 +29,10 @@ def draw_accuracy(found: Accuracy) -> Figure:
     axes.tick_params(which="both", labelsize=SMALL)
     floor = max(found.doubt / 10.0, 1e-7)
     for trial in found.trials:
-        _mark(axes, trial, floor)
-    front = np.array([(trial.seconds, max(trial.error, floor)) for trial in found.front])
+        if np.isfinite(trial.error):
+            _mark(axes, trial, floor)
+    reached = [trial for trial in found.front if np.isfinite(trial.error)]
+    front = np.array([(trial.seconds, max(trial.error, floor)) for trial in reached])
     axes.step(*front.T, where="post", color=EDGE, lw=1.1, zorder=2, label="Pareto front")
     axes.axhline(found.tolerance, color=RED, lw=0.9, ls="--", label="tolerance")
     axes.axhline(max(found.doubt, floor), color=FAINT, lw=0.9, ls=":", label="doubt of reference")
