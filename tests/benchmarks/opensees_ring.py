@@ -10,7 +10,7 @@ equations (all nodes, nodal springs, lumped mass), and with a converged solution
 from dataclasses import dataclass
 
 import numpy as np
-import opensees_model as opensees
+import opensees_model as opensees  # before archfem: its own MPI breaks after PETSc's
 from setting import DAMPING, DT, ground_motion, largest, lumped, options, ring
 from stepping import Run, warm_up
 from timing import Clock, least, table

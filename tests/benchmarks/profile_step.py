@@ -48,7 +48,7 @@ def functions(run: Run) -> str:
 
 def _name(path: str, line: int, function: str) -> str:
     """Short name of a profiled function."""
-    return f"{Path(path).name}:{line} {function}" if line else function.replace("|", "/")
+    return f"{Path(path).name}:{line} {function}" if line else function
 
 
 def parts(run: Run, repeat: int) -> str:

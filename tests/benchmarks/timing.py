@@ -40,9 +40,9 @@ def watched(action: Callable[[], object]) -> Callable[[], tuple[float, float]]:
     return run
 
 
-def table(head: list[str], rows: list[list[object]]) -> str:
+def table(head: list[object], rows: list[list[object]]) -> str:
     """Write rows as a Markdown table, the first column to the left, the others to the right."""
-    cells = [head, *([_cell(value) for value in row] for row in rows)]
+    cells = [[_cell(value) for value in row] for row in (head, *rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     rule = [":" + "-" * (widths[0] - 1), *("-" * (width - 1) + ":" for width in widths[1:])]
     lines = [_line(cells[0], widths), _line(rule, widths)]
@@ -50,7 +50,8 @@ def table(head: list[str], rows: list[list[object]]) -> str:
 
 
 def _cell(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return text.replace("|", r"\|")
 
 
 def _line(cells: list[str], widths: list[int]) -> str:
