@@ -125,8 +125,28 @@ def _assemble(closed, joints, opened, matrix, first):
 
 
 @compiled
+def _known(state, dt, rate, x1, x2):
+    """What mass and damping multiply on the right of a step."""
+    q, v, a = state
+    for k in range(len(q)):
+        x2[k] = 2.0 / dt * q[k] + v[k]
+        x1[k] = 4.0 / dt**2 * q[k] + 4.0 / dt * v[k] + a[k] + rate * x2[k]
+
+
+@compiled
+def _finish(state, new, dt):
+    """Make a state the one at the end of its step."""
+    q, v, a = state
+    for k in range(len(q)):
+        moved = new[k] - q[k]
+        a[k] = 4.0 / dt**2 * moved - 4.0 / dt * v[k] - a[k]
+        v[k] = 2.0 / dt * moved - v[k]
+        q[k] = new[k]
+
+
+@compiled
 def shake(bands, joints, loads, ground, state, dt):
-    """Take all steps; returns how often A was factorised.
+    """Take all steps of dt; returns how often A was factorised.
 
     Args:
         bands: M, β K₀ and A with all joints closed.
@@ -134,12 +154,11 @@ def shake(bands, joints, loads, ground, state, dt):
         loads: self-weight, force per ground acceleration, damping by mass.
         ground: horizontal acceleration at the end of each step.
         state: q, velocity and acceleration, overwritten (3, n).
-        dt: time step.
     """
     mass, damping, closed = bands
     rows, columns, values, _ = joints
     weight, body, rate = loads
-    q, v, a = state
+    q = state[0]
     opened = np.zeros(len(rows) - 1, dtype=np.bool_)
     factor, matrix = np.zeros_like(closed), closed.copy()
     _changed(rows, columns, values, q, opened)
@@ -150,9 +169,8 @@ def shake(bands, joints, loads, ground, state, dt):
     padded = np.zeros((4, band + len(q)))
     x1, x2, right, new = padded[0, band:], padded[1, band:], padded[2, band:], padded[3, band:]
     for step in range(len(ground)):
+        _known(state, dt, rate, x1, x2)
         for k in range(len(q)):
-            x2[k] = 2.0 / dt * q[k] + v[k]
-            x1[k] = 4.0 / dt**2 * q[k] + 4.0 / dt * v[k] + a[k] + rate * x2[k]
             right[k] = weight[k] - body[k] * ground[step]
         _add_products(mass, padded[0], damping, padded[1], padded[2])
         for _ in range(PASSES):
@@ -165,11 +183,7 @@ def shake(bands, joints, loads, ground, state, dt):
             _assemble(closed, joints, opened, matrix, first)
             _factorise(matrix, factor, first)
             count += 1
-        for k in range(len(q)):
-            moved = new[k] - q[k]
-            a[k] = 4.0 / dt**2 * moved - 4.0 / dt * v[k] - a[k]
-            v[k] = 2.0 / dt * moved - v[k]
-            q[k] = new[k]
+        _finish(state, new, dt)
     return count
 
 
