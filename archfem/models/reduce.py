@@ -148,7 +148,7 @@ def modal(model: Jointed, below: float) -> Jointed:
         model: any rung.
         below: modes up to this frequency are kept [Hz].
     """
-    closed = model.tangent(np.zeros(model.size)).tocsc()
+    closed = model.closed().tocsc()
     solve = splu(closed).solve
     attachments = solve(np.column_stack([_joint_loads(model), model.body]))
     vectors = np.column_stack([_modes(model, closed, below), attachments])
@@ -161,15 +161,19 @@ def modal(model: Jointed, below: float) -> Jointed:
 
 
 def _joint_loads(model: Jointed) -> Array:
-    """Generalised forces of a unit N, V and M of each joint, spread linearly (n, 3 joints)."""
-    points = model.joints.points
-    columns = []
-    for number in range(points.count):
-        own = (points.joint == number) * points.weight
+    """Generalised forces of each joint when it closes, turns while closed, and slips (n, 3 joints).
+
+    They are those of the joint's own law, whatever integrates it: the basis then holds all rigid
+    motions of the blocks, without which no mechanism could form.
+    """
+    joints, columns = model.joints, []
+    for number in range(joints.points.count):
+        own = (joints.points.joint == number).astype(float)
+        turned = own * (joints.points.arm - 2.0 * np.abs(joints.points.arm).max())
         columns += [
-            model.joints.opening.T @ own,
-            model.joints.slip.T @ own,
-            model.joints.opening.T @ (own * points.arm),
+            joints.opening.T @ joints.law.forces(-own),
+            joints.opening.T @ joints.law.forces(turned),
+            joints.slip.T @ (joints.law.shear @ own),
         ]
     return np.column_stack(columns)
 
