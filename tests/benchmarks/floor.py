@@ -161,7 +161,6 @@ def shake(bands, joints, loads, ground, state, dt):
     q = state[0]
     opened = np.zeros(len(rows) - 1, dtype=np.bool_)
     factor, matrix = np.zeros_like(closed), closed.copy()
-    factor, matrix = np.zeros_like(closed), closed.copy()
     _changed(rows, columns, values, q, opened)
     _assemble(closed, joints, opened, matrix, 0)
     _factorise(matrix, factor, 0)
