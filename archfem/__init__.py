@@ -45,6 +45,7 @@ from archfem.structure import Structure as Structure
 
 if TYPE_CHECKING:
     from archfem.capacity import minimum_thickness as minimum_thickness
+    from archfem.events import CountedMechanism as CountedMechanism
     from archfem.history import History as History
     from archfem.ladder import build as build
     from archfem.limit import collapse_factor as collapse_factor
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
     from archfem.mechanism import verified_mechanism as verified_mechanism
     from archfem.newton import Newton as Newton
     from archfem.push import pushover as pushover
-    from archfem.runs import CountedMechanism as CountedMechanism
     from archfem.runs import Record as Record
     from archfem.runs import time_history as time_history
     from archfem.statics import dead_load as dead_load
@@ -64,6 +64,7 @@ __version__ = "0.1.0"
 
 _LATER = {
     "minimum_thickness": "capacity",
+    "CountedMechanism": "events",
     "History": "history",
     "collapse_factor": "limit",
     "stands": "limit",
@@ -72,7 +73,6 @@ _LATER = {
     "build": "ladder",
     "Newton": "newton",
     "pushover": "push",
-    "CountedMechanism": "runs",
     "Record": "runs",
     "time_history": "runs",
     "dead_load": "statics",

@@ -95,7 +95,7 @@ def verified_mechanism(
             f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
         )
     blocks = RigidBlocks(structure)
-    motion = blocks.motion(_largest_motion(blocks, *_freedoms(joints, limit)))
+    motion = blocks.motion(_largest_motion(blocks, *freedoms(joints, limit)))
     size = np.abs(motion * [1.0, 1.0, blocks.length]).max(axis=1)
     moving = tuple(int(number) for number in np.flatnonzero(size > MOVING))
     parts = list(dict.fromkeys(structure.blocks[number].part for number in moving))
@@ -103,6 +103,24 @@ def verified_mechanism(
     time = float(joints["time"]) if "time" in joints.coords else None
     moved = Mechanism(mechanism_kind(parts), " + ".join(parts), numbers, time, moving)
     return VerifiedMechanism(moved, counted_mechanism(joints, limit), motion)
+
+
+def freedoms(joints: xr.Dataset, limit: float = HINGE) -> tuple[Array, Array]:
+    """What each joint may do: of both openings, intrados ends first, and of the slip.
+
+    Args:
+        joints: as made by `joint_dataset`.
+        limit: of |e| for a hinge [-].
+
+    Returns:
+        Openings (…, 2 n_joints), 1 where an end may open. Slips (…, n_joints), the sense in which
+        a joint may slide, 1 or -1; 0 where it may not, and 2 for either sense.
+    """
+    side, apart = hinged(joints, limit).values, opened(joints).values
+    ends = np.concatenate([(side > 0) | apart, (side < 0) | apart], axis=-1)
+    sense, slides = np.sign(joints["V"].values), sliding(joints).values
+    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+    return ends.astype(float), np.where(either, 2.0, np.where(slides, sense, 0.0))
 
 
 def first_verified_mechanism(
@@ -115,27 +133,13 @@ def first_verified_mechanism(
         joints: over time and joint.
         limit: of |e| for a hinge [-].
     """
-    freedoms = np.concatenate(_freedoms(joints.transpose("time", "joint"), limit), axis=1)
-    changed = [True, *(bool(np.any(a != b)) for a, b in pairwise(freedoms))]
-    for instant in np.flatnonzero(freedoms.any(axis=1) & changed):
+    free = np.concatenate(freedoms(joints.transpose("time", "joint"), limit), axis=1)
+    changed = [True, *(bool(np.any(a != b)) for a, b in pairwise(free))]
+    for instant in np.flatnonzero(free.any(axis=1) & changed):
         found = verified_mechanism(structure, joints.isel(time=int(instant)), limit)
         if found.moved.blocks:
             return found
     return None
-
-
-def _freedoms(joints: xr.Dataset, limit: float) -> tuple[Array, Array]:
-    """What each joint may do: of both openings, intrados ends first, and of the slip.
-
-    Returns:
-        Openings (…, 2 n_joints), 1 where an end may open. Slips (…, n_joints), the sense in which
-        a joint may slide, 1 or -1; 0 where it may not, and 2 for either sense.
-    """
-    side, apart = hinged(joints, limit).values, opened(joints).values
-    ends = np.concatenate([(side > 0) | apart, (side < 0) | apart], axis=-1)
-    sense, slides = np.sign(joints["V"].values), sliding(joints).values
-    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
-    return ends.astype(float), np.where(either, 2.0, np.where(slides, sense, 0.0))
 
 
 def _largest_motion(blocks: RigidBlocks, openings: Array, slips: Array) -> Array:

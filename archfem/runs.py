@@ -1,32 +1,27 @@
 """A whole time history: from dead load to the end of the motion, recorded as asked."""
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from tqdm import tqdm
 
 from archfem.contact import LARGEST, ContactStepper, applies
-from archfem.criteria import FAILURES, HINGE, counted_mechanism
 from archfem.dynamics import Batch, State, Stepper
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.events import CountedMechanism as CountedMechanism
+from archfem.events import Event
 from archfem.guard import Guard
 from archfem.history import History
 from archfem.models import Model
 from archfem.models.jointed import Jointed
 from archfem.motion import Motion
 from archfem.newton import Newton
-from archfem.resultants import joint_dataset
 from archfem.schemes import Rayleigh, Scheme
 from archfem.statics import Equilibrium, dead_load
-from archfem.structure import Array, Structure
 from archfem.tape import Tape
 
 logger = logging.getLogger("archfem")
-
-Event = Callable[[Structure, Array], str | None]
-"""Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
 
 STEP = 0.005
 """Time step where none is given [s]."""
@@ -53,31 +48,6 @@ class Record:
             value = getattr(self, key)
             if value is not None and value < 1:
                 raise InvalidInput(f"record {key} = {value}: keep every 1st, 2nd, … step")
-
-
-@dataclass(frozen=True, kw_only=True)
-class CountedMechanism:
-    """Event: so many joints of one part hinge, slide or have come apart at once.
-
-    Attributes:
-        limit: of |e| for a hinge [-].
-        failures: how many make a mechanism.
-    """
-
-    limit: float = HINGE
-    failures: int = FAILURES
-
-    def __call__(self, structure: Structure, resultants: Array) -> str | None:
-        """Say which joints have failed, or None."""
-        normal, shear, moment = np.abs(resultants.T)
-        depth = np.array([joint.depth for joint in structure.joints])
-        friction = np.array([joint.contact.friction for joint in structure.joints])
-        down = (moment >= self.limit * normal * depth) | (shear > friction * normal)
-        if down.sum() < self.failures:
-            return None
-        joints = joint_dataset(structure, resultants)
-        found = counted_mechanism(joints, self.limit, self.failures)
-        return f"a mechanism: joints {found.joints} of the {found.part}" if found else None
 
 
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)

@@ -19,7 +19,7 @@ LAYERS = [
     "kinematics spectra",
     "equilibrium measures",
     "matching mechanism sliding",
-    "limit suite",
+    "limit suite events",
     "capacity ground",
     "_fenicsx",
     "mesh",

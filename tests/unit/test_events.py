@@ -1,0 +1,94 @@
+"""Events that end a run, on joints whose state is known and in whole runs."""
+
+import numpy as np
+import pytest
+
+from archfem import events
+from archfem.events import CountedMechanism, MovingMechanism
+from archfem.mechanism import first_verified_mechanism, verified_mechanism
+from archfem.models.rigid import rigid
+from archfem.motion import Motion
+from archfem.runs import time_history
+from archfem.schemes import Rayleigh
+from archfem.shapes import arch_on_piers, circular_arch, column
+
+WEIGHT = 1e4
+
+
+def ring():
+    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+
+
+def on_piers():
+    return arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=15, pier_breadth=1.2, courses=[0.5] * 2
+    )
+
+
+def state(structure, hinges=(), sliding=()):
+    """N, V, M with some joints hinging {joint: e} or sliding {joint: V/N}."""
+    resultants = np.zeros((len(structure.joints), 3))
+    resultants[:, 0] = WEIGHT
+    for joint, e in dict(hinges).items():
+        resultants[joint, 2] = e * WEIGHT * structure.joints[joint].depth
+    for joint, ratio in dict(sliding).items():
+        resultants[joint, 1] = ratio * WEIGHT
+    return resultants
+
+
+ALTERNATING = {0: -0.5, 6: 0.5, 12: -0.5, 17: 0.5}
+SAME_SIDE = {0: -0.5, 6: -0.5, 12: -0.5, 17: -0.5}
+
+
+def test_both_events_see_four_alternating_hinges():
+    for event in (CountedMechanism(), MovingMechanism()):
+        reason = event(ring(), state(ring(), ALTERNATING))
+        assert "motion and count agree: by motion local (arch)" in reason
+        assert "(0, 6, 12, 17)" in reason
+
+
+def test_four_hinges_on_one_face_are_counted_and_do_not_move():
+    counted = CountedMechanism()(ring(), state(ring(), SAME_SIDE))
+    assert "motion and count disagree: by motion none, by count local (arch)" in counted
+    assert MovingMechanism()(ring(), state(ring(), SAME_SIDE)) is None
+
+
+def test_one_sliding_joint_moves_a_block_that_nobody_counts():
+    stack = column(breadth=1.0, heights=[1.0, 1.0])
+    sliding = state(stack, sliding={1: 0.6})
+    assert CountedMechanism()(stack, sliding) is None
+    assert "disagree: by motion local" in MovingMechanism()(stack, sliding)
+
+
+def test_a_run_may_wait_for_a_wider_class():
+    """Three hinges of the ring and one at the foot of the right pier: a ring and a pier move."""
+    hinges = state(on_piers(), {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
+    assert "agree: by motion semi-global (arch + right pier)" in MovingMechanism()(
+        on_piers(), hinges
+    )
+    for event in (CountedMechanism, MovingMechanism):
+        assert event(kinds=("semi-global",))(on_piers(), hinges)
+        assert event(kinds=("local", "global"))(on_piers(), hinges) is None
+
+
+def test_nothing_is_asked_while_no_joint_fails_and_nothing_twice(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        events, "verified_mechanism", lambda *given: asked.append(1) or verified_mechanism(*given)
+    )
+    event, structure = MovingMechanism(), ring()
+    for resultants in (state(structure), state(structure, SAME_SIDE), state(structure, SAME_SIDE)):
+        assert event(structure, resultants) is None
+    assert len(asked) == 1
+
+
+def test_a_run_ends_when_its_blocks_can_move():
+    """The instant is that of the record of the whole run, looked through afterwards."""
+    model, motion = rigid(ring()), Motion.synthetic(duration=3.0, pga=6.0, seed=2)
+    damping = Rayleigh(0.05, (8.0, 16.0))
+    whole = time_history(model, motion, damping=damping)
+    expected = first_verified_mechanism(model.structure, whole.joints)
+    halted = time_history(model, motion, damping=damping, until=MovingMechanism())
+    assert halted.time[-1] == pytest.approx(expected.moved.time)
+    assert "a mechanism that moves" in halted.outcome
+    assert str(expected) in halted.outcome
