@@ -14,15 +14,15 @@ the equilibrium solves of `dynamics`, to rounding.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
 
 from archfem import kernel
+from archfem.batches import in_batches
 from archfem.dynamics import Batch, State, Stepper
 from archfem.joints import Facets
-from archfem.models import Model
 from archfem.models.jointed import Jointed
 from archfem.motion import Motion
 from archfem.newton import Newton
@@ -32,15 +32,16 @@ from archfem.structure import Array
 LARGEST = 1200
 """Coordinates up to which all modes are computed and kept."""
 
-BATCH = 128
-"""Steps between two looks at events, Ctrl-C and the progress bar."""
 
-
-def applies(model: Model, damping: Rayleigh | None) -> bool:
+def applies(model: Jointed, damping: Rayleigh | None) -> bool:
     """Whether the closed structure falls into modes, few enough to keep all of them."""
     proportional = damping is None or damping.joints != "none"
-    still = not model.supports.any()  # the modes are those about joints closed at q = 0
-    return isinstance(model, Jointed) and proportional and still and model.size <= LARGEST
+    return proportional and model.joints.offset is None and model.size <= LARGEST
+
+
+def work(model: Jointed) -> float:
+    """About how many multiplications a step takes."""
+    return float(model.joints.opening.shape[0] + 8) * model.size
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,7 @@ class _Modes:
 
     Attributes:
         shapes: Φ, unit modal masses (n, n).
+        back: M Φ, from displacements to modes (n, n).
         squares: ω² (n,) [1/s²].
         opening: B = G Φ (p, n).
         shear: shear resultant of each joint (n_joints, n).
@@ -57,6 +59,7 @@ class _Modes:
     """
 
     shapes: Array
+    back: Array
     squares: Array
     opening: Array
     shear: Array
@@ -65,12 +68,12 @@ class _Modes:
 
     @classmethod
     def of(cls, model: Jointed, weight: Array) -> "_Modes":
-        closed = model.tangent(np.zeros(model.size))
-        squares, shapes = eigh(closed.toarray(), model.mass.toarray())
+        squares, shapes = eigh(model.closed().toarray(), model.mass.toarray())
         joints = model.joints
         shear = joints.sums[0] @ (joints.law.shear @ (joints.slip @ shapes))
         return cls(
             shapes,
+            model.mass @ shapes,
             squares,
             np.ascontiguousarray(joints.opening @ shapes),
             np.ascontiguousarray(shear),
@@ -130,28 +133,13 @@ class ContactStepper:
         Raises:
             DidNotConverge: SNES failed as well; `last` is the state before.
         """
-        total = round((end - start.time) / dt)
-        state, done = start, 0
-        while done < total:
-            times = start.time + dt * np.arange(done + 1, min(done + BATCH, total) + 1)
-            batch, complete = self._batch(state, dt, times)
-            if len(batch.times):
-                yield batch
-                done += len(batch.times)
-                state = batch.state(len(batch.times) - 1)
-            if not complete:
-                (fallback,) = self.exact.batches(state, dt, state.time + dt)
-                passes = fallback.iterations + kernel.ITERATIONS  # those in vain count too
-                yield replace(fallback, iterations=passes, fallback=True)
-                done += 1
-                state = fallback.state(0)
+        return in_batches(self._batch, self.exact, start, dt=dt, end=end)
 
     def _batch(self, state: State, dt: float, times: Array) -> tuple[Batch, bool]:
         """Take steps up to these times, or up to one whose open points do not settle."""
         modes, coefficients, compliance = self._prepared(dt)
-        back = modes.shapes.T @ self.model.mass
         series = np.empty((len(times) + 1, 3, len(modes.squares)))
-        series[0] = back @ state.q, back @ state.velocity, back @ state.acceleration
+        series[0] = np.stack([state.q, state.velocity, state.acceleration]) @ modes.back
         gaps = np.empty((len(series), len(modes.opening)))
         gaps[0] = modes.opening @ (series[0, 0] + self.lag * series[0, 1])
         resultants = np.empty((len(times), self.model.joints.points.count, 3))

@@ -306,7 +306,7 @@ def _damping_matrix(model: Model, damping: Rayleigh | None) -> sparse.csr_matrix
         return matrix
     matrix.data = damping.mass * model.mass.data
     if damping.joints == "initial":
-        matrix.data += damping.stiffness * model.tangent(np.zeros(model.size)).data
+        matrix.data += damping.stiffness * model.closed().data
     elif damping.joints == "none":
         matrix.data += damping.stiffness * model.blocks.data
     return matrix

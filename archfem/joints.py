@@ -234,9 +234,9 @@ class JointOperator:
     def couplings(self) -> sparse.csr_matrix:
         """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
         first, second = self.law.entries
-        opening, slip = abs(self.opening), abs(self.slip)
+        opening, slip = _ones(self.opening), _ones(self.slip)
         across = opening[first].T @ opening[second]
-        return (across + slip.T @ self.law.shear @ slip).tocsr()
+        return (across + slip.T @ _ones(self.law.shear) @ slip).tocsr()
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint (n_joints, 3) [N, N, N m].
@@ -280,6 +280,11 @@ class JointOperator:
         )
         offset = None if self.offset is None else self.offset[:, kept]
         return JointOperator(Facets(chosen), self.opening[kept], self.slip[kept], offset)
+
+
+def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A matrix of ones wherever another stores an entry, zero or not."""
+    return sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), matrix.shape)
 
 
 def law_of(rule: Quadrature, points: JointPoints) -> Law:

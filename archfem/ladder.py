@@ -18,8 +18,10 @@ from archfem.errors import DidNotConverge
 from archfem.models import Model
 from archfem.models import build as plain
 from archfem.models.jointed import Jointed, Prediction
+from archfem.models.rigid import rigid
 from archfem.models.soft import soft_blocks
 from archfem.motion import Motion
+from archfem.quadrature import Quadrature
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import equilibrium, self_weight
@@ -235,16 +237,17 @@ def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
 
 def _usual_damping(structure: Structure) -> Rayleigh:
     """Five per cent at the first closed frequency and at three times that."""
-    model = plain.build(structure, fidelity="rigid", quadrature="exact")
-    closed = model.tangent(np.zeros(model.size)).tocsc()
-    square = eigsh(closed, 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False)[0]
+    model = rigid(structure, rule=Quadrature("exact"))
+    square = eigsh(
+        model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
+    )[0]
     first = float(np.sqrt(square) / (2.0 * np.pi))
     return Rayleigh(0.05, (first, 3.0 * first))
 
 
 def _probe(structure: Structure) -> Motion:
     """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
-    model = plain.build(structure, fidelity="rigid", quadrature="exact")
+    model = rigid(structure, rule=Quadrature("exact"))
     weight, low, high = self_weight(model), 0.0, 2.0
     for _ in range(10):
         middle = 0.5 * (low + high)

@@ -144,6 +144,6 @@ def _jumps(entries: list[tuple[Array, Nodes]], count: int) -> sparse.csr_matrix:
 def _component(jumps: sparse.csr_matrix, directions: Array) -> sparse.csc_matrix:
     """Rows for the component of the jump along a direction (p, 2)."""
     x, y = (sparse.diags(directions[:, axis]) @ jumps for axis in range(2))
-    joined = sparse.kron(x, [[1.0, 0.0]]) + sparse.kron(y, [[0.0, 1.0]])
+    joined = (sparse.kron(x, [[1.0, 0.0]]) + sparse.kron(y, [[0.0, 1.0]])).tocsc()
     joined.eliminate_zeros()
-    return joined.tocsc()
+    return joined

@@ -45,6 +45,9 @@ class Model(Protocol):
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Derivative of `force`; the very same object as before where nothing has changed."""
 
+    def closed(self) -> sparse.csr_matrix:
+        """Tangent with every joint closed over its whole depth."""
+
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints, whose gradient is `force` [J]."""
 

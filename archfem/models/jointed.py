@@ -107,6 +107,11 @@ class Jointed:
             self._last = (stiffness, matrix)
         return self._last[1]
 
+    def closed(self) -> sparse.csr_matrix:
+        """Tangent with every joint closed over its whole depth."""
+        whole = self.joints.law.stiffness(np.full(self.joints.opening.shape[0], -1.0))
+        return self._pattern.matrix(self._always + self._across @ whole)
+
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints [J]."""
         return 0.5 * float(q @ (self.blocks @ q)) + self.joints.energy(q)

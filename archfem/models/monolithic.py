@@ -36,6 +36,7 @@ class Monolithic:
         self._pattern = Pattern.of(linear.mass, self._assembled(np.zeros(self.size)))
         self.mass = self._pattern.spread(linear.mass)
         self.blocks = self._pattern.spread(linear.blocks)
+        self._closed = linear.closed()
 
     def settled(self, settlement: Settlement) -> "Monolithic":
         """The same model with a support that has moved, further than before."""
@@ -67,6 +68,10 @@ class Monolithic:
 
     def _assembled(self, q: Array) -> sparse.csr_matrix:
         return self._forms.tangent(self._spread(q))[self._free][:, self._free]
+
+    def closed(self) -> sparse.csr_matrix:
+        """Tangent with every joint closed over its whole depth."""
+        return self._pattern.spread(self._closed)
 
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints [J]."""
