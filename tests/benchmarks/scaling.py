@@ -14,24 +14,19 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from floor import Floor
 from setting import DAMPING, ring
 from stepping import Run, warm_up
-from timing import Clock, least, table, watched
+from timing import table
 
 import archfem as af
 from archfem.contact import applies
 
 SIZES = [17, 34, 68, 125, 250, 500]
 CASES = [
-    (fidelity, method)
-    for fidelity in ("rigid", "faces", "condensed", "full")
-    for method in ("contact", "snes", "floor")
+    *((rung, method) for rung in ("rigid", "faces") for method in ("contact", "chain", "snes")),
+    ("condensed", "chain"),
 ]
-"""Fidelity and method; "floor" is the bare loop of `floor.py`."""
-
-STEPPER = {"floor": "snes"}
-"""Stepper that prepares the matrices where the method is none itself."""
+"""Fidelity and method."""
 
 DURATION = 1.0
 """Of the motion [s]."""
@@ -46,25 +41,16 @@ def peak() -> float:
 def measured(fidelity: str, method: str, voussoirs: int, repeat: int) -> dict | None:
     """Time a step and find the memory, in this process; None where the method does not apply."""
     motion = af.Motion.synthetic(duration=DURATION, pga=2.0, seed=3, vertical_ratio=0.0)
-    if method == "contact":
-        warm_up(motion)
+    warm_up(motion)
     small = af.build(ring(3), fidelity=fidelity, cells=(4, 4), quadrature="nodal")
-    _clock(Run(small, motion.cut(0.0, 0.1), STEPPER.get(method, method)), method, 1)
+    Run(small, motion.cut(0.0, 0.1), method).clock(1)
     before = peak()
     model = af.build(ring(voussoirs), fidelity=fidelity, cells=(4, 4), quadrature="nodal")
     if method == "contact" and not applies(model, DAMPING):
         return None
-    run = Run(model, motion, STEPPER.get(method, method))
-    clock = _clock(run, method, repeat)
+    run = Run(model, motion, method)
+    clock = run.clock(repeat)
     return {"step": clock.cpu, "setup": run.setup, "memory": peak() - before}
-
-
-def _clock(run: Run, method: str, repeat: int) -> Clock:
-    """Time a step of a run, or of the bare loop on its matrices."""
-    if method != "floor":
-        return run.clock(repeat)
-    floor = Floor.of(run)
-    return least(watched(lambda: floor.go(floor.state())), run.steps, repeat)
 
 
 def in_own_process(fidelity: str, method: str, voussoirs: int, repeat: int) -> dict | None:

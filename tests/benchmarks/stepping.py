@@ -5,11 +5,12 @@ from setting import DAMPING, DT
 from timing import Clock, least, stopwatch, watched
 
 import archfem as af
+from archfem.chain import ChainStepper
 from archfem.contact import ContactStepper
 from archfem.dynamics import State, Stepper
 from archfem.models.jointed import Jointed
 
-STEPPERS = {"snes": Stepper, "contact": ContactStepper}
+STEPPERS = {"snes": Stepper, "contact": ContactStepper, "chain": ChainStepper}
 
 
 class Run:
