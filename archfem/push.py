@@ -33,6 +33,7 @@ class Pushover:
             weights on a unit of the settlement, as `collapse_factor` has it [N m].
         joints: N, V, M and what follows over step and joint.
         hinges: joints in the order in which they first hinge, with the face that stays in contact.
+        hinge_steps: the step at which each of them does.
         outcome: the rule by which it ended, in words.
         limit: factor that the curve tends to, by extrapolation [-]; undefined (NaN) where it is
             still too steep to tell.
@@ -42,6 +43,7 @@ class Pushover:
     curve: xr.Dataset
     joints: xr.Dataset
     hinges: tuple[tuple[int, str], ...]
+    hinge_steps: tuple[int, ...]
     outcome: str
     limit: float
     uncertainty: float
@@ -124,16 +126,28 @@ def _read(path: Path, outcome: str) -> Pushover:
         {"step": np.arange(count)},
     )
     limit, uncertainty = _extrapolated(path.displacements, factors)
-    return Pushover(curve, joints, _hinge_order(joints), outcome, limit, uncertainty)
+    return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 
-def _hinge_order(joints: xr.Dataset) -> tuple[tuple[int, str], ...]:
-    """Joints by the step at which they first hinge; within a step, those nearer the edge first."""
-    side = hinged(joints, HINGE).transpose("step", "joint").values
+def hinge_order(
+    joints: xr.Dataset, limit: float = HINGE
+) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
+    """Sort joints by the step at which they first hinge; in a step, those nearer the edge first.
+
+    Args:
+        joints: over step and joint, as of a `Pushover`.
+        limit: of |e| for a hinge [-].
+
+    Returns:
+        Joints with the face that stays in contact, and the steps.
+    """
+    side = hinged(joints, limit).transpose("step", "joint").values
     first = np.argmax(side != 0, axis=0)
     e = np.abs(joints["eccentricity"].transpose("step", "joint").values)
     order = sorted(np.flatnonzero(side.any(axis=0)), key=lambda j: (first[j], -e[first[j], j]))
-    return tuple((int(j), "extrados" if side[first[j], j] > 0 else "intrados") for j in order)
+    faces = {1: "extrados", -1: "intrados"}
+    hinges = tuple((int(j), faces[int(side[first[j], j])]) for j in order)
+    return hinges, tuple(int(first[j]) for j in order)
 
 
 def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:

@@ -22,7 +22,8 @@ from archfem.actions import BodyForce, Settlement
 from archfem.capacity import minimum_thickness, ring_capacity
 from archfem.limit import collapse_factor
 from archfem.shapes import circular_arch
-from archfem.view.capacity import capacity_figure, collapse_figure, structure_figure
+from archfem.view.capacity import capacity_figure, collapse_figure
+from archfem.view.plots import draw_structure
 
 # %% [markdown]
 # ## The structure
@@ -36,7 +37,7 @@ def semicircle(thickness):
     return circular_arch(radius=1.0, thickness=thickness, embrace=180.0, voussoirs=50)
 
 
-structure_figure(semicircle(0.15))
+draw_structure(semicircle(0.15))
 
 # %% [markdown]
 # ## The equation

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.criteria import HINGE, hinged, opened, sliding
+from archfem.equilibrium import RigidBlocks
+from archfem.kinematics import motion_of
 from archfem.models import Model
 from archfem.resultants import thrust_line
 from archfem.structure import Array, Structure
@@ -15,6 +17,12 @@ from archfem.structure import Array, Structure
 ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
 ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])
 """Outline of an arrow of length 1 along x (7, 2)."""
+
+SWING = 0.06
+"""Largest displacement in a picture, relative to the size of the structure."""
+
+STILL = 1e-4
+"""Displacement too small to be drawn, relative to the size of the structure."""
 
 LENGTH, APART = 0.55, 0.14
 """Length of the arrows of a slip, and their distance from the joint, relative to its depth."""
@@ -112,3 +120,18 @@ def joint_ends(model: Model) -> sparse.csr_matrix:
         for end in joint.ends
     ]
     return sparse.vstack(rows, format="csr")
+
+
+def swung(structure: Structure, motion: Array) -> Array:
+    """A motion of all blocks, as large as it is drawn (n_blocks, 3) [m, m, rad]."""
+    return motion * SWING * structure.size / RigidBlocks(structure).reach(motion)
+
+
+def displaced(structure: Structure, motion: Array) -> list[Array]:
+    """Outlines of the blocks that move, where a motion (n_blocks, 3) takes them [m]."""
+    outlines = []
+    for block, own in zip(structure.blocks, motion, strict=True):
+        by = motion_of(block.drawn(), block.centroid) @ own
+        if np.abs(by).max() > STILL * structure.size:
+            outlines.append(block.drawn() + by)
+    return outlines

@@ -16,7 +16,7 @@ from archfem.criteria import hinged, opened, sliding
 from archfem.history import History
 from archfem.view.shades import Scale
 from archfem.view.stage import Image, Setting
-from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, SLIP, THRUST, dress
+from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
 WIDE, DENSE, COARSE = 12.8, 100.0, 60.0
 """Width of a page [inch], and the least of its dots per inch: a smaller page is narrower."""
@@ -79,8 +79,9 @@ class Page:
         by = f"displacements × {setting.magnification:g}"
         middle = (below - 0.5 * FOOT) / self._inches[1]
         self._figure.legend(
-            handles=_symbols(film=run is not None), loc="center left", ncols=5, frameon=False,
-            fontsize=TYPE, bbox_to_anchor=(0.01, middle), columnspacing=1.4, handletextpad=0.5,
+            handles=_symbols(run is not None, bool(setting.outlines)), loc="center left", ncols=6,
+            frameon=False, fontsize=TYPE, bbox_to_anchor=(0.01, middle), columnspacing=1.4,
+            handletextpad=0.5,
         )  # fmt: skip
         self._figure.text(0.985, middle, by, fontsize=TYPE, ha="right", va="center", color=INK)
 
@@ -153,14 +154,16 @@ def _sentence(joints: xr.Dataset) -> str:
     return "    ".join(words)
 
 
-def _symbols(*, film: bool) -> list[Line2D]:
-    """What the marks mean."""
+def _symbols(film: bool, motion: bool) -> list[Line2D]:
+    """What the marks mean, with traces in a film and a mechanism where one moves."""
+    moving = [Line2D([], [], color=MOVED, lw=2.4, label="mechanism")] if motion else []
     past = [_symbol("has hinged", "o", HINGE, alpha=0.3)] if film else []
     return [
         Line2D([], [], color=THRUST, lw=2.4, label="thrust line"),
         _symbol("hinge", "o", HINGE),
         *past,
         _symbol("sliding joint", r"$\rightleftharpoons$", SLIP, size=15),
+        *moving,
     ]
 
 

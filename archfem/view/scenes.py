@@ -15,10 +15,11 @@ from tqdm import tqdm
 from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
 from archfem.structure import Array
-from archfem.view.marks import joint_ends, joint_marks
+from archfem.view.marks import displaced, joint_ends, joint_marks, swung
 from archfem.view.page import Page
 from archfem.view.shades import check_colour
 from archfem.view.stage import Image, Setting, Stage
@@ -29,7 +30,7 @@ SMALLEST = (480, 320)
 """Least width and height of a picture [pixels]: type would not fit into less."""
 
 
-def animate(
+def animate(  # noqa: PLR0913  (what is filmed, and how)
     model: Model,
     run: History,
     path: str | Path,
@@ -39,6 +40,7 @@ def animate(
     fps: float = 20.0,
     seconds: float | None = None,
     size: tuple[int, int] = (1280, 720),
+    mechanism: VerifiedMechanism | None = None,
 ) -> Path:
     """Film a time history: blocks move, the thrust line wanders, hinges come and go.
 
@@ -56,6 +58,8 @@ def animate(
         fps: frames a second, at most; fewer where the run has fewer fields.
         seconds: how long the film lasts [s]; by default as long as the run.
         size: width and height, even numbers [pixels].
+        mechanism: as found by `first_verified_mechanism`: from its instant on, the outlines of the
+            blocks that it moves are drawn where it takes them.
 
     Raises:
         InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
@@ -69,7 +73,7 @@ def animate(
     draft = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         with _writer(draft, fps) as film:
-            for shot in _shots(setting, run, frames, size):
+            for shot in _shots(_with(setting, mechanism), run, frames, size):
                 film.append_data(shot)
         os.replace(draft, target)
     finally:
@@ -111,6 +115,15 @@ def picture(
         return page.compose(stage.photograph(q, marks, np.zeros((0, 2))), joints)
 
 
+def _with(setting: Setting, mechanism: VerifiedMechanism | None) -> Setting:
+    """Let a mechanism be seen from its instant on."""
+    if mechanism is None or not mechanism.moved.blocks:
+        return setting
+    structure = setting.model.structure
+    outlines = displaced(structure, swung(structure, mechanism.motion))
+    return setting.with_outlines(outlines, mechanism.moved.time or 0.0)
+
+
 def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
     """Every frame of a film, one after another; on a terminal a bar shows progress."""
     structure, carriers = setting.model.structure, joint_ends(setting.model)
@@ -119,14 +132,16 @@ def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int])
     been = _been(run.joints)
     still = np.array([joint.ends for joint in structure.joints])
     page = Page(setting, size, run)
-    shown = zip(steps, run.dataset["q"].values[frames], strict=True)
+    shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
+    bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
     with Stage(setting, page.room) as stage:
-        for step, q in tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False):
+        for time, step, q in bar:
             joints = run.joints.isel(time=int(step))
             shift = _shift(setting, carriers, q)
             marks = joint_marks(structure, joints, shift=shift)
             past = (still + shift)[been[step]]
-            yield page.compose(stage.photograph(q, marks, past), joints)
+            moving = setting.outlines if time >= setting.since else ()
+            yield page.compose(stage.photograph(q, marks, past, moving), joints)
 
 
 def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:

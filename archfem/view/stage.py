@@ -2,7 +2,9 @@
 
 import os
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import TracebackType
 from typing import Self
 
@@ -13,15 +15,12 @@ from numpy.typing import NDArray
 from archfem.models import Model
 from archfem.models.shape import Shape
 from archfem.structure import Array
-from archfem.view.marks import Marks
+from archfem.view.marks import SWING, Marks
 from archfem.view.shades import Scale, scale_for, shade
-from archfem.view.style import EDGE, GHOST, HINGE, SLIP, SUPPORT, THRUST
+from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
 Image = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
-
-SWING = 0.06
-"""Largest displacement in a picture, relative to the size of the structure."""
 
 DISC = 0.0125
 """Radius of a hinge in a picture, relative to the size of the structure."""
@@ -35,7 +34,7 @@ MARGIN = 0.02
 TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 
-REST, EDGES, PAST, HALO, LINE, ARROWS, RIMS, HINGES = -1, *range(1, 8)
+REST, EDGES, MOTION, PAST, HALO, LINE, ARROWS, RIMS, HINGES = -1, *range(1, 9)
 """Layers of a picture, from the blocks upwards."""
 
 
@@ -49,6 +48,8 @@ class Setting:
         scale: from a number to a colour.
         low: lower left corner of what is seen (2,) [m].
         high: upper right corner of what is seen (2,) [m].
+        outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+        since: when they are first shown [s].
     """
 
     model: Model
@@ -56,6 +57,8 @@ class Setting:
     scale: Scale
     low: Array
     high: Array
+    outlines: tuple[Array, ...] = ()
+    since: float = 0.0
 
     @classmethod
     def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
@@ -76,6 +79,12 @@ class Setting:
         room = MARGIN * structure.size
         scale = scale_for(shape, fields, colour)
         return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
+
+    def with_outlines(self, outlines: list[Array], since: float) -> Self:
+        """The same with outlines, each (k, 2) [m], to be shown from a time on [s]."""
+        points = np.concatenate([[self.low, self.high], *outlines])
+        low, high = points.min(axis=0), points.max(axis=0)
+        return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
 
 
 def _magnification(displacement: float) -> float:
@@ -129,13 +138,16 @@ class Stage:
         """Free the plotter."""
         self._plotter.close()
 
-    def photograph(self, q: Array, marks: Marks, past: Array) -> Image:
+    def photograph(
+        self, q: Array, marks: Marks, past: Array, outlines: Sequence[Array] = ()
+    ) -> Image:
         """Move the structure and take a picture (height, width, 3).
 
         Args:
             q: coordinates (n,).
             marks: of the joints, as moved.
             past: where hinges have been, as moved (n, 2) [m].
+            outlines: of blocks as a mechanism moves them, each (k, 2) [m].
         """
         setting, shape = self._setting, self._setting.model.shape
         places = shape.places + setting.magnification * shape.displacement(q)
@@ -148,6 +160,7 @@ class Stage:
             self._meshes[name].dataset = _lines(points, pairs)
         dots = marks.thrust[np.isfinite(marks.thrust[:, 0])]
         self._meshes["dots"].dataset = self._discs(dots, LINE, 0.35)
+        self._meshes["motion"].dataset = self._loops(outlines)
         self._meshes["past"].dataset = self._discs(past, PAST, 1.0)
         self._meshes["slips"].dataset = self._polygons(marks.slips, ARROWS)
         self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
@@ -167,6 +180,7 @@ class Stage:
         self._add(rest, GHOST)
         self._add(self._outlines, EDGE, 1.5)
         self._meshes = {
+            "motion": self._add(pv.PolyData(), MOVED, 3.0),
             "past": self._add(pv.PolyData(), HINGE, opacity=0.3),
             "halo": self._add(pv.PolyData(), "white", 6.0),
             "thrust": self._add(pv.PolyData(), THRUST, 3.0),
@@ -220,6 +234,17 @@ class Stage:
         numbers = np.arange(count * corners).reshape(count, corners)
         faces = np.insert(numbers, 0, corners, axis=1).ravel()
         return pv.PolyData(self._flat(outlines.reshape(-1, 2), layer), faces=faces).triangulate()
+
+    def _loops(self, outlines: Sequence[Array]) -> pv.PolyData:
+        """Closed lines, each (k, 2) [m]."""
+        if not outlines:
+            return pv.PolyData()
+        starts = np.cumsum([0, *map(len, outlines)])
+        pairs = [
+            np.column_stack([np.arange(a, b), np.roll(np.arange(a, b), -1)])
+            for a, b in pairwise(starts)
+        ]
+        return _lines(self._flat(np.concatenate(outlines), MOTION), np.concatenate(pairs))
 
     def _discs(self, centres: Array, layer: float, size: float) -> pv.PolyData:
         """Discs about points (n, 2), of a size relative to a hinge's."""

@@ -14,6 +14,7 @@ from archfem.structure import Structure
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
 INK, FAINT, GHOST = "#1b1b1b", "#8d8d8d", "#cfcac0"
 THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
+MOVED = "#009e73"
 LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 """Colours of lines that share axes; they stay apart for all common kinds of colour blindness."""
 

@@ -7,18 +7,22 @@ import pytest
 from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.mechanism import verified_mechanism
 from archfem.models.build import build
 from archfem.motion import Motion
+from archfem.resultants import joint_dataset
 from archfem.runs import Record, time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import dead_load
+from archfem.view.marks import SWING
 from archfem.view.scenes import animate, picture
 from archfem.view.shades import COLOURS, scale_for, shade
-from archfem.view.stage import SWING, Setting, Stage
-from archfem.view.style import HINGE
+from archfem.view.stage import Setting, Stage
+from archfem.view.style import HINGE, MOVED
 
 SIZE = (640, 400)  # small: rendering takes the time
 RED = np.array([int(HINGE[k : k + 2], 16) for k in (1, 3, 5)])
+GREEN = np.array([int(MOVED[k : k + 2], 16) for k in (1, 3, 5)])
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +78,22 @@ def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps)
     with imageio.get_reader(path) as film:
         assert film.count_frames() == frames
         assert film.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
+
+
+def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
+    """Four hinges that alternate, as if found at 0.2 s: green lines in the later frames alone."""
+    resultants = np.zeros((18, 3))
+    resultants[:, 0] = 1e4
+    resultants[[0, 6, 12, 17], 2] = 0.5e4 * 0.55 * np.array([-1.0, 1.0, -1.0, 1.0])
+    joints = joint_dataset(model.structure, resultants).assign_coords(time=0.2)
+    found = verified_mechanism(model.structure, joints)
+    path = animate(model, run, tmp_path / "film.gif", fps=20, size=SIZE, mechanism=found)
+    green = [
+        int((np.abs(frame[40:-170, :-130, :3].astype(int) - GREEN).max(axis=-1) < 40).sum())
+        for frame in imageio.mimread(path)
+    ]
+    assert max(green[:4]) == 0
+    assert min(green[4:]) > 500
 
 
 def test_hinges_are_red_where_there_are_some(model, run):

@@ -7,7 +7,7 @@ from archfem.actions import BodyForce, PointLoad
 from archfem.capacity import ring_capacity
 from archfem.limit import collapse_factor
 from archfem.shapes import circular_arch
-from archfem.view.capacity import capacity_figure, collapse_figure, structure_figure
+from archfem.view.capacity import capacity_figure, collapse_figure
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +45,6 @@ def test_an_arch_that_falls_has_no_thrust_line():
     thin = circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
     axes = collapse_figure(thin, collapse_factor(thin, live=BodyForce(1.0))).axes[0]
     assert set(lines_of(axes)) == {"hinge"}
-
-
-def test_structure_is_drawn_block_by_block(ring):
-    axes = structure_figure(ring).axes[0]
-    assert len(axes.collections[0].get_paths()) == len(ring.blocks)
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):

@@ -1,0 +1,94 @@
+"""The picture of a pushover: what is resisted over displacement, hinges in order, the limit."""
+
+from collections.abc import Mapping
+from typing import cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from archfem.errors import InvalidInput
+from archfem.push import Pushover
+from archfem.units import mm
+from archfem.view.style import COLUMN, HINGE, INK, LINES, SMALL, dress, legend
+
+NEAR = 0.98
+"""Share of the way to the last factor after which a curve is nearly flat."""
+
+
+def draw_pushover(
+    pushes: Mapping[str, Pushover],
+    *,
+    limits: Mapping[str, float] | None = None,
+    reach: float | None = None,
+    axes: Axes | None = None,
+) -> Figure:
+    """Draw factors over displacements; discs mark where joints first hinge.
+
+    Where there is one curve, each disc has the joints' numbers and the face that stays in contact.
+
+    Args:
+        pushes: what to call each pushover, and the pushover.
+        limits: what to call known limits, and their factors, drawn as dashed lines.
+        reach: of the displacement axis [m]; by default where the curves have become flat.
+        axes: where to draw; by default a new figure.
+
+    Raises:
+        InvalidInput: there is no pushover, or too many to tell apart.
+    """
+    if not 1 <= len(pushes) <= len(LINES):
+        raise InvalidInput(f"{len(pushes)} pushovers in one picture: give 1 to {len(LINES)}")
+    page = Figure(figsize=(COLUMN, 3.8), layout="constrained")
+    axes = page.add_subplot() if axes is None else axes
+    units = {push.curve["factor"].attrs["units"] for push in pushes.values()}
+    what = "load factor λ [-]" if units == {"1"} else "work on a unit of settlement [N m]"
+    dress(axes, "displacement [mm]", what)
+    reach = reach or max(_flat(push) for push in pushes.values())
+    for (label, push), colour in zip(pushes.items(), LINES, strict=False):
+        axes.plot(push.curve["displacement"] / mm, push.curve["factor"], color=colour, label=label)
+        _mark(axes, push, reach, named=len(pushes) == 1)
+    axes.plot([], [], "o", color=HINGE, ms=6.0, mec="white", label="joint hinges")
+    falls = any(push.factor < float(push.curve["factor"][0]) for push in pushes.values())
+    for name, value in (limits or {}).items():
+        axes.axhline(value, color=INK, ls="--", lw=1.0, zorder=1)
+        axes.annotate(
+            f"{name}: {value:.4g}",
+            (0.0 if falls else 1.0, value),
+            xycoords=("axes fraction", "data"),
+            xytext=(4 if falls else -4, 3),
+            textcoords="offset points",
+            fontsize=SMALL,
+            ha="left" if falls else "right",
+        )
+    axes.set_xlim(0.0, reach / mm)
+    legend(axes)
+    return cast(Figure, axes.figure)
+
+
+def _flat(push: Pushover) -> float:
+    """Displacement by which a curve has become flat, and some more [m]."""
+    factor = push.curve["factor"].values
+    way = np.abs(factor - factor[0])
+    first = int(np.argmax(way >= NEAR * way[-1]))
+    return 1.3 * float(push.curve["displacement"][first])
+
+
+def _mark(axes: Axes, push: Pushover, reach: float, *, named: bool) -> None:
+    """Put discs where joints first hinge, one for all joints of a step."""
+    steps: dict[int, list[tuple[int, str]]] = {}
+    for (joint, side), step in zip(push.hinges, push.hinge_steps, strict=True):
+        steps.setdefault(step, []).append((joint, side))
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    for step, hinges in steps.items():
+        place = float(push.curve["displacement"][step]) / mm, float(push.curve["factor"][step])
+        if place[0] > reach / mm:
+            continue
+        axes.plot(*place, "o", color=HINGE, ms=6.0, mec="white", mew=0.8, zorder=5)
+        if named:
+            faces = {side: [str(j) for j, own in hinges if own == side] for _, side in hinges}
+            words = "; ".join(f"{', '.join(joints)} {side}" for side, joints in faces.items())
+            note = axes.annotate(
+                words, place, (7, -9), textcoords="offset points", fontsize=SMALL, color=INK
+            )
+            note.set_path_effects(halo)
