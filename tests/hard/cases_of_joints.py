@@ -1,0 +1,83 @@
+"""Hard joints: stiff, soft, slippery; and the two steppers against each other."""
+
+import numpy as np
+
+import archfem as af
+from archfem.criteria import sliding as sliding_joints
+from archfem.newton import Newton
+from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, ring, shaken
+
+
+@case("joints 1000 × softer", "dead load compresses by centimetres", stiffer=1e-3, quick=True)
+@case("joints 10 × softer", "the ring's own periods lengthen", stiffer=0.1)
+@case("joints 10 × stiffer", "contact faster than the step", stiffer=10.0)
+@case("joints 1000 × stiffer", "contact far faster than the step", stiffer=1e3, tolerance=0.05)
+def stiffness(stiffer, fidelity="rigid", tolerance=0.01):
+    """Against a fifth of the step."""
+    model = af.build(ring(contact=joints(stiffer)), fidelity=fidelity)
+    dead = af.dead_load(model)
+    run, fine = (shaken(model, quake(1.0), start=dead, dt=dt) for dt in (DT, DT / 5))
+    return answer(run, float(np.abs(peaks(run) - peaks(fine)).max()), tolerance)
+
+
+@case("joints 1000 × softer, full", "stone a million times as stiff", stiffer=1e-3)
+@case("joints 1000 × stiffer, full", "joints stiffer than the stone", stiffer=1e3)
+def stiffness_of_elastic_stones(stiffer):
+    """The contact stepper against equilibrium solves."""
+    model = af.build(ring(contact=joints(stiffer)), cells=(2, 2))
+    given = {"newton": Newton(tolerance=1e-12), "start": af.dead_load(model)}
+    run, exact = (
+        shaken(model, quake(0.5, duration=3.0), method=m, **given) for m in ("contact", "snes")
+    )
+    return answer(run, off(run, exact), 1e-6)
+
+
+@case("friction 0.01", "slides everywhere", quick=True)
+def slippery():
+    """All joints are flagged; shear is elastic, so forces are those with friction."""
+    low, high = (
+        shaken(af.build(ring(contact=joints(friction=mu)), fidelity="rigid"), quake(1.0))
+        for mu in (0.01, 0.6)
+    )
+    sliding = sliding_joints(low.joints).any("time").values
+    found = answer(low, off(low, high), 1e-12, f"; {sliding.sum()} of 18 joints flagged")
+    return Found(found.outcome, found.right and bool(sliding.all()), found.error, low)
+
+
+def _compared(rung, rule, pga, **given):
+    model = af.build(ring(), fidelity=rung, quadrature=rule, cells=(2, 2))
+    newton = Newton(tolerance=1e-13)
+    given = {"newton": newton, "start": af.dead_load(model, newton), **given}
+    motion = quake(pga, duration=3.0, seed=5)
+    return [shaken(model, motion, method=m, **given) for m in ("contact", "snes")]
+
+
+def steppers(rung, rule, **given):
+    """The same history by both steppers, joints opening and closing."""
+    run, exact = _compared(rung, rule, 2.5, **given)
+    return answer(run, off(run, exact), 1e-8)
+
+
+for _rule in ("lobatto", "nodal", "gauss", "exact"):
+    for _rung in ("rigid", "modal", "faces", "condensed", "full"):
+        case(
+            f"contact stepper, {_rung}, {_rule}",
+            "active set against SNES",
+            quick=_rung == "faces",
+            rung=_rung,
+            rule=_rule,
+        )(steppers)
+
+
+@case("contact stepper at 1.2 g, lobatto", "active set cycles?", rule="lobatto")
+@case("contact stepper at 1.2 g, nodal", "active set cycles?", rule="nodal")
+@case("contact stepper at 1.2 g, gauss", "active set cycles?", rule="gauss")
+@case("contact stepper at 1.2 g, exact", "active set cycles?", rule="exact")
+def violent(rule):
+    """Chaotic: until rounding has grown to 1e-6 both agree, then both must stay sound."""
+    run, exact = _compared("faces", rule, 12.0)
+    apart = np.abs(run.joints["N"] - exact.joints["N"]).max("joint").values
+    apart /= np.abs(exact.joints["N"].values).max()
+    until = run.time[int(np.argmax(apart > 1e-6))] if (apart > 1e-6).any() else run.time[-1]
+    early = float(apart[run.time <= 0.5].max())
+    return answer(run, early, 1e-8, f"; the same to 1e-6 until {until:.2f} s")

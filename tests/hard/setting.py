@@ -1,0 +1,182 @@
+"""What a hard case is, what it must leave behind, and the structures that many of them shake."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+import archfem as af
+from archfem.materials import STONE_TO_STONE
+
+DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
+DT = 0.005
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a case.
+
+    Attributes:
+        outcome: in words.
+        right: whether that is what it should be.
+        error: against what is known, or None.
+        run: the history that the effort is read from, or None for statics.
+    """
+
+    outcome: str
+    right: bool
+    error: float | None = None
+    run: af.History | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the table.
+
+    Attributes:
+        name: of the case.
+        hard: what is hard about it.
+        study: does it, and judges what came of it.
+        quick: a second or so, and part of the default tests.
+    """
+
+    name: str
+    hard: str
+    study: Callable[[], Found]
+    quick: bool
+
+    def row(self) -> tuple[list[str], bool]:
+        """Cells of the table, and whether all is as it should be."""
+        start = perf_counter()
+        try:
+            found = self.study()
+        except af.ArchfemError as error:
+            found = Found(f"{type(error).__name__}: {error}", False, run=_history(error))
+        except (ArithmeticError, ValueError, AssertionError, np.linalg.LinAlgError) as error:
+            found = Found(f"crashed with {type(error).__name__}: {error}", False)
+        taken = perf_counter() - start
+        cells = [self.name, self.hard, found.outcome if found.right else f"**{found.outcome}**"]
+        return [*cells, *effort(found.run), _number(found.error), f"{taken:.1f}"], found.right
+
+
+CASES: list[Case] = []
+HEAD = [
+    "case",
+    "what is hard",
+    "outcome",
+    "iterations",
+    "smallest step [s]",
+    "halved",
+    "left to SNES",
+    "energy drift",
+    "error",
+    "time [s]",
+]
+
+
+def case(name: str, hard: str, *, quick: bool = False, **given: object) -> Callable:
+    """Make a function that returns a `Found` one line of the table, with arguments given here."""
+
+    def keep(study: Callable[..., Found]) -> Callable[..., Found]:
+        CASES.append(Case(name, hard, lambda: study(**given), quick))
+        return study
+
+    return keep
+
+
+def _history(error: af.ArchfemError) -> af.History | None:
+    return getattr(error, "history", None)
+
+
+def effort(run: af.History | None) -> list[str]:
+    """Most iterations in a step, smallest step, steps halved, left to SNES, drift of energy."""
+    if run is None:
+        return ["", "", "", "", ""]
+    told = run.dataset.attrs
+    return [
+        str(int(run.dataset["iterations"].max())),
+        f"{float(run.dataset['smallest_step'].min()):.3g}",
+        str(told["halved_steps"]),
+        str(told["fallback_steps"]),
+        f"{100.0 * told['energy_drift']:+.1g} %",
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.2g}"
+
+
+def sound(run: af.History) -> None:
+    """Nothing stored may be nonsense: numbers throughout, e undefined in open joints alone."""
+    for name in ("N", "V", "M", "energy_drift", "last_q", "last_velocity", "last_acceleration"):
+        assert np.isfinite(run.dataset[name].values).all(), f"{name} is not a number somewhere"
+    e, normal = run.joints["eccentricity"].values, run.joints["N"].values
+    assert (np.isnan(e) == (normal <= 0.0)).all(), "e is undefined in a closed joint"
+    assert np.nanmax(np.abs(e)) <= 0.5 + 1e-9, "the thrust leaves a joint"
+    assert (normal >= 0.0).all(), "a joint holds tension"
+
+
+def shaken(model, motion: af.Motion, *, dt: float = DT, damping=DAMPING, **given) -> af.History:
+    """Run a time history and look whether what it stored makes sense."""
+    run = af.time_history(model, motion, dt=dt, damping=damping, **given)
+    sound(run)
+    return run
+
+
+def peaks(run: af.History) -> np.ndarray:
+    """Largest |e| of every joint (n_joints,)."""
+    return np.nanmax(np.abs(run.joints["eccentricity"].values), axis=0)
+
+
+def off(run: af.History, other: af.History) -> float:
+    """Largest difference of N, V and M, relative to the largest of each; the same times."""
+    worst = 0.0
+    for key in ("N", "V", "M"):
+        first, second = run.joints[key].values, other.joints[key].values
+        worst = max(worst, float(np.abs(first - second).max() / np.abs(second).max()))
+    return worst
+
+
+def answer(run: af.History, error: float, tolerance: float, words: str = "") -> Found:
+    """An answer, right where its error is within the tolerance."""
+    said = f"max e {peaks(run).max():.3f}{words}"
+    if error > tolerance:
+        said += f"; error above {tolerance:.2g}"
+    return Found(said, error <= tolerance, error, run)
+
+
+def refused(study: Callable[[], object], kind: type[af.ArchfemError], says: str) -> Found:
+    """Right where archfem gives a named error that says so."""
+    try:
+        study()
+    except kind as error:
+        told = str(error).split(": ")[0]
+        return Found(f"{kind.__name__}: {told}", says in str(error), run=_history(error))
+    return Found("numbers, where there is no answer", False)
+
+
+def ring(**given) -> af.Structure:
+    """The validation ring, or one like it."""
+    lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
+    return af.circular_arch(**{**lengths, **given})
+
+
+def joints(stiffer: float = 1.0, friction: float = 0.6) -> af.Contact:
+    """Dry joints so many times stiffer than those of the validation ring."""
+    return replace(
+        STONE_TO_STONE,
+        normal_stiffness=stiffer * STONE_TO_STONE.normal_stiffness,
+        shear_stiffness=stiffer * STONE_TO_STONE.shear_stiffness,
+        friction=friction,
+    )
+
+
+def quake(pga: float, duration: float = 6.0, seed: int = 3, vertical: float = 2 / 3) -> af.Motion:
+    """An artificial motion [m/s², s]."""
+    return af.Motion.synthetic(duration=duration, pga=pga, seed=seed, vertical_ratio=vertical)
+
+
+def still(duration: float) -> af.Motion:
+    """No motion at all."""
+    return af.Motion(np.zeros(round(duration / DT) + 1), DT)
