@@ -4,6 +4,7 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from archfem.dynamics import Batch, State
@@ -102,7 +103,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     tape.add(0, first)
     number, state, outcome = 0, start, "reached the end of the motion"
     try:
-        with _bar(start, motion, dt) as bar:
+        # Steps are too small for threads, which only get in each other's way.
+        with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
             for batch in stepper.batches(start, dt, motion.duration):
                 reason, size = _reason(until, model, batch)
                 batch = batch.cut(size)
