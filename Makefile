@@ -36,6 +36,9 @@ test: .venv/ready  ## the default tests
 test-slow: .venv/ready  ## the tests that take minutes
 	$(PYTHON) -m pytest -m slow
 
+hard: .venv/ready  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
+	cd tests && ../$(PYTHON) -m hard
+
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py
 
