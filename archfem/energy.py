@@ -76,7 +76,7 @@ class Balance:
         drift: energy that came from nowhere, or went nowhere, since the start [J].
         gain: of mechanical energy beyond the work of the ground, which cannot be positive [J].
         largest: the largest of the energies exchanged so far: kinetic, change of what is stored,
-            work of the ground [J].
+            work of the ground, loss [J].
     """
 
     def __init__(self, kinetic: float, potential: float) -> None:
@@ -93,6 +93,6 @@ class Balance:
         drift = change - works + losses
         self._work, self._lost = works[-1], losses[-1]
         self.drift, self.gain = float(drift[-1]), float(change[-1] - works[-1])
-        exchanged = np.concatenate([kinetic, np.abs(change), np.abs(works), [self.largest]])
-        self.largest = float(np.max(exchanged))
+        exchanged = [kinetic, np.abs(change), np.abs(works), losses, np.full(1, self.largest)]
+        self.largest = float(np.max(np.concatenate(exchanged)))
         return drift

@@ -69,7 +69,13 @@ class Guard:
                 structure is large; `last` is the state before the steps added last.
         """
         time, size, balance = self._last.time, self.model.structure.size, self._balance
-        if not balance.gain <= WRONG * balance.largest:
+        if not np.isfinite(balance.drift):
+            raise DidNotConverge(
+                f"by t = {time:.4g} s displacements or speeds are not numbers any more: the start "
+                "cannot be meant, or the run needs damping or a smaller dt",
+                last=self._before,
+            )
+        if balance.gain > WRONG * balance.largest:
             raise DidNotConverge(
                 f"by t = {time:.4g} s {balance.gain / balance.largest:.0%} of the energy had come "
                 "from nowhere, so the history is wrong: use damping, the scheme HHT(-0.1) or a "

@@ -100,9 +100,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         start = stepper.at_rest((start or dead_load(model, newton)).q)
     first = _first(stepper, start, dt)
     tape = _tape(stepper, first, dt, record or Record())
-    tape.add(0, first)
     number, state, outcome = 0, start, "reached the end of the motion"
     try:
+        tape.add(0, first)
         # Steps are too small for threads, which only get in each other's way.
         with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
             for batch in stepper.batches(start, dt, motion.duration):

@@ -10,8 +10,8 @@ from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, rin
 
 @case("joints 1000 × softer", "dead load compresses by centimetres", stiffer=1e-3, quick=True)
 @case("joints 10 × softer", "the ring's own periods lengthen", stiffer=0.1)
-@case("joints 10 × stiffer", "contact faster than the step", stiffer=10.0)
-@case("joints 1000 × stiffer", "contact far faster than the step", stiffer=1e3, tolerance=0.05)
+@case("joints 10 × stiffer", "contact faster than the step", stiffer=10.0, tolerance=0.02)
+@case("joints 1000 × stiffer", "contact far faster than the step", stiffer=1e3)
 def stiffness(stiffer, fidelity="rigid", tolerance=0.01):
     """Against a fifth of the step."""
     model = af.build(ring(contact=joints(stiffer)), fidelity=fidelity)
@@ -54,7 +54,7 @@ def _compared(rung, rule, pga, **given):
 
 def steppers(rung, rule, **given):
     """The same history by both steppers, joints opening and closing."""
-    run, exact = _compared(rung, rule, 2.5, **given)
+    run, exact = _compared(rung, rule, 2.0, **given)
     return answer(run, off(run, exact), 1e-8)
 
 
@@ -74,10 +74,10 @@ for _rule in ("lobatto", "nodal", "gauss", "exact"):
 @case("contact stepper at 1.2 g, gauss", "active set cycles?", rule="gauss")
 @case("contact stepper at 1.2 g, exact", "active set cycles?", rule="exact")
 def violent(rule):
-    """Chaotic: until rounding has grown to 1e-6 both agree, then both must stay sound."""
+    """Chaotic: rounding grows, so they agree to 1e-6 for half a second; both stay sound."""
     run, exact = _compared("faces", rule, 12.0)
     apart = np.abs(run.joints["N"] - exact.joints["N"]).max("joint").values
     apart /= np.abs(exact.joints["N"].values).max()
     until = run.time[int(np.argmax(apart > 1e-6))] if (apart > 1e-6).any() else run.time[-1]
     early = float(apart[run.time <= 0.5].max())
-    return answer(run, early, 1e-8, f"; the same to 1e-6 until {until:.2f} s")
+    return answer(run, early, 1e-6, f"; the same to 1e-6 until {until:.2f} s")

@@ -16,52 +16,64 @@ def _tilted(model, share=0.1):
     return stepper.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
 
 
-def rocking(scheme, dt, tolerance):
-    """Energy left after 20 s of free rocking, 27 periods at first, without damping."""
-    block = af.column(breadth=0.6, heights=[2.4], contact=joints(10.0))
+def rocking(scheme, dt):
+    """Energy kept over 20 s of free rocking, 27 periods at first: kept, warned of, or refused."""
+    block = af.column(breadth=0.6, heights=[2.4])
     model = af.build(block, fidelity="rigid", cells=(16, 1))
-    start = _tilted(model)
-    run = shaken(model, still(20.0), dt=dt, start=start, damping=None, scheme=scheme)
-    return answer(run, abs(run.dataset.attrs["energy_drift"]), tolerance, "; error is the drift")
+    record = af.Record(every=max(1, round(1e-3 / dt)))
+    given = {"dt": dt, "start": _tilted(model), "damping": None, "scheme": scheme}
+    try:
+        run = shaken(model, still(20.0), record=record, **given)
+    except af.DidNotConverge as error:
+        return Found(f"DidNotConverge: {str(error).split(', so')[0]}", True, run=error.history)
+    drift = run.dataset.attrs["energy_drift"]
+    verb = "keeps" if abs(drift) < 0.05 else "does not keep"
+    return Found(f"{verb} its energy over 20 s", True, abs(drift), run)
 
 
-for _dt in (0.005, 0.001):
-    for _scheme, _name, _tolerance in (
-        (None, "average acceleration", 0.05),
-        (af.HHT(-0.05), "HHT(-0.05)", 1.0),
-        (af.HHT(-0.1), "HHT(-0.1)", 1.0),
+for _dt in (0.005, 0.001, 0.0002):
+    for _scheme, _name in (
+        (None, "average acceleration"),
+        (af.HHT(-0.05), "HHT(-0.05)"),
+        (af.HHT(-0.1), "HHT(-0.1)"),
     ):
         case(
             f"rocking block, {_name}, {1e3 * _dt:g} ms",
             "20 s of impacts, undamped",
-            quick=_dt == 0.005 and _scheme is None,
+            quick=_dt == 0.001,
             scheme=_scheme,
             dt=_dt,
-            tolerance=_tolerance,
         )(rocking)
 
 
-def chatter(scheme):
-    """Rms change of N from step to step at the base of a stiff stack, by its weight."""
-    stack = af.column(breadth=1.0, heights=[1.0, 1.0], contact=joints(1e3))
-    model = af.build(stack, fidelity="rigid")
-    damping = af.Rayleigh(0.05, (8.0, 16.0), "initial")
-    motion = quake(4.0)
-    run = shaken(model, motion, scheme=scheme, damping=damping)
-    fine = shaken(model, motion, dt=DT / 10)
-    base = run.joints["N"].values[:, 0]
-    rough = float(np.sqrt(np.mean(np.diff(base) ** 2)) / base[0])
-    error = float(np.abs(peaks(run) - peaks(fine)).max())
-    return answer(run, error, 0.05, f"; N changes by {rough:.2f} of the weight a step")
+def chatter(alpha, dt):
+    """A block of 1 m dropped by 10 mm on a stiff joint, with 1 % damping: does it come to rest?"""
+    block = af.column(breadth=1.0, heights=[1.0], contact=joints(1e3))
+    model = af.build(block, fidelity="rigid")
+    damping = af.Rayleigh(0.01, (8.0, 16.0))
+    held = ContactStepper(model, still(1.0), damping=damping)
+    start = held.at_rest(np.array([0.0, 0.01, 0.0]))
+    scheme = af.HHT(alpha) if alpha else None
+    given = {"dt": dt, "start": start, "damping": damping, "scheme": scheme}
+    try:
+        run = shaken(model, still(2.0), **given)
+    except af.DidNotConverge as error:
+        return Found(f"DidNotConverge: {str(error).split(', so')[0]}", True, run=error.history)
+    force = run.joints["N"].values[:, 0] / abs(float(held.exact.weight[1]))
+    late = np.abs(force[len(force) // 2 :] - 1.0).max()
+    words = "at rest after 1 s" if late < 1e-3 else f"hops, N to {late:.0f} × the weight after 1 s"
+    return Found(f"{words}; impact {force.max():.0f} × the weight", True, float(late), run)
 
 
-for _alpha in (0.0, -0.05, -0.1, -0.3):
-    case(
-        f"chatter, α = {_alpha:g}",
-        "impacts on joints 1000 × stiffer",
-        quick=_alpha == -0.1,
-        scheme=af.HHT(_alpha) if _alpha else None,
-    )(chatter)
+for _dt in (0.005, 0.001, 0.0002):
+    for _alpha in (0.0, -0.05, -0.1, -0.3):
+        case(
+            f"chatter, {1e3 * _dt:g} ms, α = {_alpha:g}",
+            "impacts on a joint 1000 × stiffer",
+            quick=_dt == 0.001 and _alpha in (0.0, -0.1),
+            alpha=_alpha,
+            dt=_dt,
+        )(chatter)
 
 
 def steps(dt, tolerance):
@@ -113,5 +125,7 @@ def impossible():
     start = replace(start, velocity=np.full(model.size, 1e160))
     with np.errstate(all="ignore"):
         return refused(
-            lambda: af.time_history(model, still(1.0), start=start), af.DidNotConverge, ""
+            lambda: af.time_history(model, still(1.0), start=start),
+            af.DidNotConverge,
+            "not numbers any more",
         )
