@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from archfem.kernel import ITERATIONS, SETTLED, _integrals, _open_part
+from archfem.kernel import ITERATIONS, SETTLED, finish, integrals, open_part
 
 
 @numba.njit(cache=True)
@@ -54,9 +54,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
             if passes == ITERATIONS:
                 return step
         iterations[step] = passes
-        _finish(series[step], series[step + 1], change, numbers)
-        for k in range(size):
-            contact[k] = series[step + 1, 0, k] + lag * series[step + 1, 1, k]
+        finish(series[step], series[step + 1], change, (beta, gamma, dt, lag), contact)
         if share != 1.0:
             _times(matrices.opening, contact, gap)
         _resultants(resultants[step], gap, matrices.shear, contact, law)
@@ -88,21 +86,6 @@ def _constants(state, matrices, numbers, constant, contact):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _finish(state, new, change, numbers):  # type: ignore
-    """State at the end of the step by Newmark's formulas."""
-    beta, gamma, _, _, dt = numbers
-    for k in range(len(change)):
-        v, a = state[1, k], state[2, k]
-        new[0, k] = state[0, k] + change[k]
-        new[1, k] = (
-            gamma / (beta * dt) * change[k]
-            + (1.0 - gamma / beta) * v
-            + dt * (1.0 - 0.5 * gamma / beta) * a
-        )
-        new[2, k] = change[k] / (beta * dt**2) - v / (beta * dt) - (0.5 / beta - 1.0) * a
-
-
-@numba.njit(cache=True)
 def _times(rows, vector, result):  # type: ignore
     """Product of sparse rows (indptr, indices, data) and a vector."""
     indptr, indices, data = rows
@@ -124,9 +107,9 @@ def _closed(gap, law, stiffness):  # type: ignore
     for row in range(0, len(gap), 2):
         a, b, low, high = gap[row], gap[row + 1], 0.0, 1.0
         if a > 0.0 or b > 0.0:
-            opens, ends = _open_part(a, b)
+            opens, ends = open_part(a, b)
             low, high = (ends, 1.0) if a > 0.0 else (0.0, opens)
-        first, mixed, second = _integrals(low, high)
+        first, mixed, second = integrals(low, high)
         stiffness[row, 0] = whole[row] * first
         stiffness[row, 1] = stiffness[row + 1, 1] = whole[row] * mixed
         stiffness[row + 1, 0] = whole[row] * second

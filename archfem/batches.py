@@ -4,9 +4,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archfem.dynamics import Batch, State, Stepper
+from archfem.joints import Facets
 from archfem.kernel import ITERATIONS
+from archfem.models.jointed import Jointed
 from archfem.structure import Array
 
 BATCH = 128
@@ -46,3 +49,18 @@ def in_batches(
             yield replace(fallback, iterations=passes, fallback=True)
             done += 1
             state = fallback.state(0)
+
+
+def compiled_law(model: Jointed) -> tuple[bool, Array, Array, NDArray[np.intp]]:
+    """The joint law as the compiled loops take it.
+
+    Returns:
+        Whether facets are exact, and for each point its stiffness (p,) [N/m], that of the whole
+        facet where facets are exact, its arm (p,) [m] and its joint (p,).
+    """
+    points = model.joints.points
+    stiffness = points.weight * points.normal_stiffness
+    facets = isinstance(model.joints.law, Facets)
+    if facets:
+        stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
+    return facets, stiffness, points.arm, points.joint

@@ -14,9 +14,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem import band
-from archfem.batches import in_batches
+from archfem.batches import compiled_law, in_batches
 from archfem.dynamics import Batch, State, Stepper
-from archfem.joints import Facets
 from archfem.models.jointed import Jointed
 from archfem.motion import Motion
 from archfem.newton import Newton
@@ -101,12 +100,7 @@ class ChainStepper:
         self._order, self._width = order(model)
         self._weight = self.exact.weight[self._order]
         self._body = model.body[self._order]
-        points = model.joints.points
-        stiffness = points.weight * points.normal_stiffness
-        facets = isinstance(model.joints.law, Facets)
-        if facets:
-            stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
-        self._law = (facets, stiffness, points.arm, points.joint)
+        self._law = compiled_law(model)
         self._step: tuple[float, Matrices, tuple[float, ...]] | None = None
 
     def at_rest(self, q: Array, time: float = 0.0) -> State:

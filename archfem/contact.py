@@ -20,9 +20,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from archfem import kernel
-from archfem.batches import in_batches
+from archfem.batches import compiled_law, in_batches
 from archfem.dynamics import Batch, State, Stepper
-from archfem.joints import Facets
+from archfem.modal_energy import energies
 from archfem.models.jointed import Jointed
 from archfem.motion import Motion
 from archfem.newton import Newton
@@ -104,12 +104,7 @@ class ContactStepper:
         self.exact = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
         self.lag = self.exact.lag
         self._modes = _Modes.of(model, self.exact.weight)
-        points = model.joints.points
-        stiffness = points.weight * points.normal_stiffness
-        facets = isinstance(model.joints.law, Facets)
-        if facets:
-            stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
-        self._law = (facets, stiffness, points.arm, points.joint)
+        self._law = compiled_law(model)
         rate = damping.stiffness if damping else 0.0
         self._rates = (damping.mass if damping else 0.0) + rate * self._modes.squares
         self._step: tuple[float, kernel.Coefficients, Array] | None = None
@@ -160,7 +155,7 @@ class ContactStepper:
             resultants[:count],
             iterations[:count],
             np.full(count, dt),
-            kernel.energies(
+            energies(
                 series[: count + 1],
                 gaps[: count + 1],
                 (modes.weight, 0.5 * (ground[:-1] + ground[1:])),

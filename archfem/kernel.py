@@ -67,6 +67,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
         numbers: `Coefficients`.
         law: exact facets?, stiffness (p,), arm (p,) and joint (p,) of the points.
     """
+    scheme = (numbers.beta, numbers.gamma, numbers.dt, numbers.lag)
     opening, shear, compliance = matrices
     size, points = opening.shape[1], opening.shape[0]
     jacobian = np.zeros((points, 2))
@@ -85,7 +86,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
                 for k in range(size):
                     change[k] += numbers.gain[k] * opening[row, k] * force[row]
         iterations[step] = passes
-        _finish(series[step], series[step + 1], change, numbers, contact)
+        finish(series[step], series[step + 1], change, scheme, contact)
         if numbers.share != 1.0:
             gap = opening @ contact
         gaps[step + 1] = gap
@@ -108,9 +109,9 @@ def _free(state, load, numbers, change, contact):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _finish(state, new, change, numbers, contact):  # type: ignore
-    """State at the end of the step by Newmark's formulas, and the contact there."""
-    beta, gamma, dt = numbers.beta, numbers.gamma, numbers.dt
+def finish(state, new, change, scheme, contact):  # type: ignore
+    """State at the end of a step by Newmark's formulas, and the contact there."""
+    beta, gamma, dt, lag = scheme
     for k in range(len(change)):
         v, a = state[1, k], state[2, k]
         new[0, k] = state[0, k] + change[k]
@@ -120,7 +121,7 @@ def _finish(state, new, change, numbers, contact):  # type: ignore
             + dt * (1.0 - 0.5 * gamma / beta) * a
         )
         new[2, k] = change[k] / (beta * dt**2) - v / (beta * dt) - (0.5 / beta - 1.0) * a
-        contact[k] = new[0, k] + numbers.lag * new[1, k]
+        contact[k] = new[0, k] + lag * new[1, k]
 
 
 @numba.njit(cache=True)
@@ -207,15 +208,15 @@ def _jacobians(gap, law, jacobian):  # type: ignore
             jacobian[row, 0] = stiffness[row] if gap[row] > 0.0 else 0.0
         return
     for row in range(0, len(gap), 2):
-        low, high = _open_part(gap[row], gap[row + 1])
-        first, mixed, second = _integrals(low, high)
+        low, high = open_part(gap[row], gap[row + 1])
+        first, mixed, second = integrals(low, high)
         jacobian[row, 0] = stiffness[row] * first
         jacobian[row, 1] = jacobian[row + 1, 1] = stiffness[row] * mixed
         jacobian[row + 1, 0] = stiffness[row] * second
 
 
 @numba.njit(cache=True)
-def _open_part(a, b):  # type: ignore
+def open_part(a, b):  # type: ignore
     """Where a facet of unit length with end gaps a and b is open."""
     if a > 0.0:
         return 0.0, (1.0 if b > 0.0 else a / (a - b))
@@ -223,7 +224,7 @@ def _open_part(a, b):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _integrals(low, high):  # type: ignore
+def integrals(low, high):  # type: ignore
     """∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2)."""
     squares, cubes = 0.5 * (high**2 - low**2), (high**3 - low**3) / 3.0
     return high - low - 2.0 * squares + cubes, squares - cubes, cubes
@@ -240,73 +241,8 @@ def _resultants(result, gap, shear, law):  # type: ignore
         if not facets:
             pull = stiffness[row] * min(gap[row], 0.0)
         elif gap[row] <= 0.0 or gap[row ^ 1] <= 0.0:
-            low, high = _open_part(gap[row], gap[row ^ 1])
-            first, mixed, _ = _integrals(high, 1.0) if low == 0.0 else _integrals(0.0, low)
+            low, high = open_part(gap[row], gap[row ^ 1])
+            first, mixed, _ = integrals(high, 1.0) if low == 0.0 else integrals(0.0, low)
             pull = stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
         result[joint[row], 0] -= pull
         result[joint[row], 2] -= pull * arm[row]
-
-
-@numba.njit(cache=True)
-def energies(series, gaps, loads, opening, numbers, law):  # type: ignore
-    """Energies of steps that `advance` took, as by `energy.Meter.step`.
-
-    Args:
-        series: η and its velocity (steps + 1, 3, n).
-        gaps: openings that the law sees (steps + 1, p).
-        loads: modal weight (n,) and mean modal force of the ground over each step (steps, n).
-        opening: B (p, n).
-        numbers: `Coefficients`.
-        law: as for `advance`.
-
-    Returns:
-        Kinetic and potential energy at the ends of the steps, and over them the work of the ground
-        and what is lost (steps, 4) [J].
-    """
-    weight, ground = loads
-    result = np.zeros((len(ground), 4))
-    place = gaps
-    if numbers.lag > 0.0:
-        place = np.ascontiguousarray(series[:, 0]) @ opening.T
-    pull, extra = np.zeros(gaps.shape[1]), np.zeros((2, gaps.shape[1]))
-    for step in range(len(ground) + 1):
-        _pull(place[step], law, pull)
-        old, new = extra[(step + 1) % 2], extra[step % 2]
-        if numbers.lag > 0.0:
-            _pull(gaps[step], law, new)
-            new -= pull
-        if step > 0:
-            row = result[step - 1]
-            _modal_energies(series[step - 1], series[step], weight, ground[step - 1], numbers, row)
-            for k in range(len(pull)):
-                moved = place[step, k] - place[step - 1, k]
-                row[1] -= 0.5 * place[step, k] * pull[k]
-                row[3] -= 0.5 * moved * (old[k] + new[k])
-    return result
-
-
-@numba.njit(cache=True)
-def _modal_energies(before, after, weight, ground, numbers, row):  # type: ignore
-    """Energies of one step as if all joints were closed and held tension."""
-    for k in range(len(weight)):
-        q, v = after[0, k], after[1, k]
-        moved = q - before[0, k]
-        row[0] += 0.5 * v * v
-        row[1] += (0.5 * numbers.squares[k] * q - weight[k]) * q
-        row[2] += ground[k] * moved
-        row[3] += 0.5 * numbers.rates[k] * moved * (v + before[1, k])
-
-
-@numba.njit(cache=True)
-def _pull(gap, law, force):  # type: ignore
-    """λ = J(z) z: the tension that the closed stiffness would hold where the joint is open."""
-    facets, stiffness = law[0], law[1]
-    for row in range(len(gap)):
-        if not facets:
-            force[row] = stiffness[row] * max(gap[row], 0.0)
-        elif gap[row] > 0.0 or gap[row ^ 1] > 0.0:
-            low, high = _open_part(gap[row], gap[row ^ 1])
-            first, mixed, _ = _integrals(low, high)
-            force[row] = stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
-        else:
-            force[row] = 0.0

@@ -70,7 +70,9 @@ def parts(run: Run, repeat: int) -> str:
         "all closed, in modes": lambda: kernel._free(state, modes.weight, numbers, change, contact),
         "openings from modes": lambda: modes.opening @ contact,
         "open points": lambda: kernel._settle(gap, compliance, law, jacobian, other, force),
-        "Newmark's formulas": lambda: kernel._finish(state, new, change, numbers, contact),
+        "Newmark's formulas": lambda: kernel.finish(
+            state, new, change, (numbers.beta, numbers.gamma, DT, numbers.lag), contact
+        ),
         "shear from modes": lambda: modes.shear @ contact,
         "resultants": lambda: kernel._resultants(rests, gap, slips, law),
     }

@@ -1,8 +1,8 @@
 """The validation ring under its own weight: converged values, balance, invariances.
 
-@article{demirel2021, author={Demirel, I. O. and Aldemir, A.}, title={Simplified approach for seismic
-performance assessment of dry-joint masonry arch bridges}, journal={Buildings}, volume={11},
-year={2021}}
+@article{demirel2021, author={Demirel, I. O. and Aldemir, A.}, title={Simplified approach for
+seismic performance assessment of dry-joint masonry arch bridges}, journal={Buildings},
+volume={11}, year={2021}}
 """
 
 from dataclasses import replace
