@@ -122,6 +122,26 @@ def joint_ends(model: Model) -> sparse.csr_matrix:
     return sparse.vstack(rows, format="csr")
 
 
+def support_shift(model: Model) -> Array:
+    """What moving supports add to the displacements of `joint_ends` (n_joints, 2, 2) [m]."""
+    structure = model.structure
+    shift = np.zeros((len(structure.joints), 2, 2))
+    for number, joint in enumerate(structure.joints):
+        for block in joint.blocks:
+            motion = motion_of(joint.ends, structure.blocks[block].centroid)
+            shift[number] += 0.5 * motion @ model.supports[block]
+    return shift
+
+
+def support_outlines(model: Model, magnification: float) -> list[Array]:
+    """Outlines of the fixed blocks, where they have moved, each (k, 2) [m]."""
+    return [
+        block.drawn() + magnification * motion_of(block.drawn(), block.centroid) @ motion
+        for block, motion in zip(model.structure.blocks, model.supports, strict=True)
+        if block.fixed
+    ]
+
+
 def swung(structure: Structure, motion: Array) -> Array:
     """A motion of all blocks, as large as it is drawn (n_blocks, 3) [m, m, rad]."""
     return motion * SWING * structure.size / RigidBlocks(structure).reach(motion)

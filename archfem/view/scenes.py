@@ -19,7 +19,7 @@ from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
 from archfem.structure import Array
-from archfem.view.marks import displaced, joint_ends, joint_marks, swung
+from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
 from archfem.view.page import Page
 from archfem.view.shades import check_colour
 from archfem.view.stage import Image, Setting, Stage
@@ -146,7 +146,8 @@ def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int])
 
 def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
     """Displacements of the joints' ends, as drawn (n_joints, 2, 2) [m]."""
-    return setting.magnification * (carriers @ q).reshape(-1, 2, 2)
+    moved = (carriers @ q).reshape(-1, 2, 2) + support_shift(setting.model)
+    return setting.magnification * moved
 
 
 def _been(joints: xr.Dataset) -> NDArray[np.bool_]:

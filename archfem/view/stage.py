@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from archfem.models import Model
 from archfem.models.shape import Shape
 from archfem.structure import Array
-from archfem.view.marks import SWING, Marks
+from archfem.view.marks import SWING, Marks, support_outlines
 from archfem.view.shades import Scale, scale_for, shade
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
@@ -73,7 +73,7 @@ class Setting:
         shape, structure = model.shape, model.structure
         moves = np.array([shape.displacement(q) for q in fields])
         by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
-        still = [block.drawn() for block in structure.blocks if block.fixed]
+        still = support_outlines(model, by)
         moved = shape.places + by * moves
         points = np.concatenate([*still, shape.places, moved.min(axis=0), moved.max(axis=0)])
         room = MARGIN * structure.size
@@ -170,8 +170,7 @@ class Stage:
 
     def _build(self) -> None:
         """Put everything on the stage, marks still empty."""
-        fixed = [block.drawn() for block in self._setting.model.structure.blocks if block.fixed]
-        for outline in fixed:
+        for outline in support_outlines(self._setting.model, self._setting.magnification):
             self._add(self._polygons(outline[None], 0), SUPPORT)
             around = np.arange(len(outline))
             edges = np.column_stack([around, np.roll(around, -1)])

@@ -4,6 +4,7 @@ import imageio.v2 as imageio
 import numpy as np
 import pytest
 
+from archfem.actions import Settlement
 from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
@@ -14,7 +15,7 @@ from archfem.resultants import joint_dataset
 from archfem.runs import Record, time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import dead_load
-from archfem.view.marks import SWING
+from archfem.view.marks import SWING, joint_ends, support_shift
 from archfem.view.scenes import animate, picture
 from archfem.view.shades import COLOURS, scale_for, shade
 from archfem.view.stage import Setting, Stage
@@ -78,6 +79,21 @@ def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps)
     with imageio.get_reader(path) as film:
         assert film.count_frames() == frames
         assert film.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
+
+
+def test_a_support_that_moved_is_drawn_where_it_is(model):
+    """All of the ring 5 cm to the left, supports too: the same picture, moved with its frame."""
+    moved = model
+    for block in (0, 18):
+        moved = moved.settled(Settlement(block, (-0.05, 0.0, 0.0)))
+    dead = dead_load(moved)
+    settings = [
+        Setting.of(state.model, state.q[None], "displacement", 1.0)
+        for state in (dead_load(model), dead)
+    ]
+    np.testing.assert_allclose(settings[1].low, settings[0].low - [0.05, 0.0], atol=1e-4)
+    ends = (joint_ends(moved) @ dead.q).reshape(-1, 2, 2) + support_shift(moved)
+    np.testing.assert_allclose(ends[..., 0], -0.05, atol=5e-4)  # the dead load moves by 0.3 mm
 
 
 def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
