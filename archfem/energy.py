@@ -75,8 +75,8 @@ class Balance:
     Attributes:
         drift: energy that came from nowhere, or went nowhere, since the start [J].
         gain: of mechanical energy beyond the work of the ground, which cannot be positive [J].
-        largest: the largest of the energies exchanged so far: kinetic, change of what is stored,
-            work of the ground, loss [J].
+        largest: the largest mechanical energy exchanged so far: kinetic, change of what is stored,
+            work of the ground [J].
     """
 
     def __init__(self, kinetic: float, potential: float) -> None:
@@ -93,6 +93,11 @@ class Balance:
         drift = change - works + losses
         self._work, self._lost = works[-1], losses[-1]
         self.drift, self.gain = float(drift[-1]), float(change[-1] - works[-1])
-        exchanged = [kinetic, np.abs(change), np.abs(works), losses, np.full(1, self.largest)]
+        exchanged = [kinetic, np.abs(change), np.abs(works), np.full(1, self.largest)]
         self.largest = float(np.max(np.concatenate(exchanged)))
         return drift
+
+    @property
+    def fraction(self) -> float:
+        """Drift as a fraction of the largest energy exchanged or lost [-]."""
+        return self.drift / max(self.largest, self._lost)

@@ -4,10 +4,10 @@ import logging
 
 import numpy as np
 
-from archfem.dynamics import Batch, State
 from archfem.energy import Balance
 from archfem.errors import DidNotConverge
 from archfem.models import Model
+from archfem.states import Batch, State
 from archfem.structure import Array
 
 logger = logging.getLogger("archfem")
@@ -48,7 +48,7 @@ class Guard:
     def add(self, batch: Batch) -> Array:
         """Look at the next steps; the drift of energy after each (steps,) [J]."""
         drift = self._balance.add(batch.energy)
-        fraction = self._balance.drift / self._balance.largest
+        fraction = self._balance.fraction
         if not abs(fraction) <= abs(self.worst):
             self.worst = fraction
         for k in range(-self._steps % LOOK, len(batch.times), LOOK):
@@ -89,7 +89,7 @@ class Guard:
                 "at its mechanism, with until=CountedMechanism()",
                 last=self._before,
             )
-        share = balance.drift / balance.largest
+        share = balance.fraction
         if abs(share) > DOUBTFUL:
             what = "came from nowhere" if share > 0.0 else "was lost to the scheme"
             self._tell(

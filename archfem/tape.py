@@ -5,12 +5,12 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from archfem.dynamics import Batch, State
 from archfem.guard import Guard
 from archfem.history import SIGNS, History
 from archfem.models import Model
 from archfem.motion import Motion
 from archfem.resultants import joint_dataset
+from archfem.states import Batch, State
 from archfem.structure import Array
 
 _EFFORT = {

@@ -29,12 +29,13 @@ def model(ring):
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize("joints", ["closed", "initial"])
-def test_both_steppers_keep_the_same_balance(ring, rule, joints):
+@pytest.mark.parametrize("fast", ["contact", "chain"])
+def test_all_steppers_keep_the_same_balance(ring, rule, joints, fast):
     """To the 1e-8 within which their histories agree."""
     model = build(ring, fidelity="faces", quadrature=rule, cells=(2, 2))
     given = {"damping": Rayleigh(0.05, (8.0, 16.0), joints), "newton": Newton(tolerance=1e-13)}
     drifts = []
-    for method in ("snes", "contact"):
+    for method in ("snes", fast):
         run = time_history(model, MOTION.cut(0.8, 1.8), method=method, **given)
         drifts.append(run.dataset["energy_drift"].values)
     kinetic = 0.5 * model.mass.diagonal().sum() * 0.01**2  # of the ring at 1 cm/s [J]
@@ -60,7 +61,7 @@ def test_drift_falls_with_the_step(model):
 def test_balance_is_exact_while_joints_stay_closed(stack):
     """Average acceleration keeps it, with damping and with work of the ground, to a millionth."""
     model = build(stack, fidelity="rigid")
-    for method in ("snes", "contact"):
+    for method in ("snes", "contact", "chain"):
         run = time_history(model, MOTION.scaled(0.05), damping=DAMPING, method=method)
         assert run.dataset["iterations"].max() <= 1
         assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
@@ -159,7 +160,7 @@ def test_numbers_that_overflow_end_in_an_error():
     stiff = Contact(1e16, 1e16)
     model = build(column(breadth=1.0, heights=[1.0], contact=stiff), fidelity="rigid")
     state = State(0.0, np.zeros(3), np.array([0.0, 1e200, 0.0]), np.zeros(3))
-    for method in ("snes", "contact"):
+    for method in ("snes", "contact", "chain"):
         with (
             np.errstate(all="ignore"),
             pytest.raises(DidNotConverge, match="not numbers any more") as caught,

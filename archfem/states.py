@@ -1,0 +1,90 @@
+"""What passes between steppers and those who run them: a state, a step, some steps."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem.structure import Array
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where a structure is and how it moves, relative to the ground.
+
+    Attributes:
+        time: since the motion began [s].
+        q: coordinates (n,).
+        velocity: their rates (n,).
+        acceleration: the rates of those (n,).
+    """
+
+    time: float
+    q: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some steps of a run, one after another.
+
+    Attributes:
+        times: at their ends (steps,) [s].
+        resultants: N, V, M of every joint (steps, n_joints, 3) [N, N, N m].
+        iterations: of Newton's method, or passes over the open points (steps,).
+        smallest: the smallest step that was needed to get there (steps,) [s].
+        energy: kinetic, potential, work and loss of each step, as by `Meter.step` (steps, 4) [J].
+        state: gives the state at the end of step k.
+        fallback: whether these steps were given up by the contact stepper, and taken by SNES.
+    """
+
+    times: Array
+    resultants: Array
+    iterations: NDArray[np.int64]
+    smallest: Array
+    energy: Array
+    state: Callable[[int], State]
+    fallback: bool = False
+
+    def cut(self, steps: int) -> "Batch":
+        """The first steps of the batch."""
+        if steps == len(self.times):
+            return self
+        return replace(
+            self,
+            times=self.times[:steps],
+            resultants=self.resultants[:steps],
+            iterations=self.iterations[:steps],
+            smallest=self.smallest[:steps],
+            energy=self.energy[:steps],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a run.
+
+    Attributes:
+        state: at its end.
+        contact: u + β v, which the joint law and the blocks' stress see (n,).
+        iterations: of Newton's method.
+        smallest: the smallest step that was needed to get there [s].
+        energy: kinetic, potential, work and loss, as by `Meter.step` (4,) [J].
+    """
+
+    state: State
+    contact: Array
+    iterations: int
+    smallest: float
+    energy: Array
+
+    def after(self, first: "Step") -> "Step":
+        """This step as the second half of a longer one."""
+        return replace(
+            self,
+            iterations=first.iterations + self.iterations,
+            smallest=min(first.smallest, self.smallest),
+            energy=self.energy + np.append(np.zeros(2), first.energy[2:]),
+        )
