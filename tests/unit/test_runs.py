@@ -115,6 +115,7 @@ def test_files_that_are_no_history(tmp_path):
 
 
 def test_ctrl_c_keeps_what_was_computed(model, motion):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored here
     seen = []
 
     def press(structure, resultants):
@@ -122,7 +123,10 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
         if len(seen) == 300:
             os.kill(os.getpid(), signal.SIGINT)
 
-    run = time_history(model, motion, damping=DAMPING, until=press)
+    try:
+        run = time_history(model, motion, damping=DAMPING, until=press)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert "interrupted at" in run.outcome
     assert 0.5 < run.time[-1] < 1.6
     assert run.joints["N"].notnull().all()
