@@ -272,10 +272,11 @@ def _finished(path: Path, stop: Stop, moved: Array) -> str | None:
         return f"the slope fell to {slope:.2g} of the initial one"
     if reached >= stop.displacement * path.model.structure.size:
         return f"the load moved by {reached:.3g} m"
-    joints = joint_dataset(path.model.structure, path.resisted[-1])
-    count = int((hinged(joints) != 0).sum())
-    if stop.hinges is not None and count >= stop.hinges:
-        return f"{count} joints hinge"
+    if stop.hinges is not None:
+        joints = joint_dataset(path.model.structure, path.resisted[-1])
+        count = int((hinged(joints) != 0).sum())
+        if count >= stop.hinges:
+            return f"{count} joints hinge"
     return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
 
 
