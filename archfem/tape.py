@@ -106,6 +106,9 @@ class Tape:
             "signs": SIGNS,
             "versions": versions(),
         }
+        predicted = getattr(self.model, "prediction", None)
+        if predicted is not None:
+            dataset.attrs["predicted_error"] = predicted.error
         return History(dataset)
 
 

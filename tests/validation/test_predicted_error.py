@@ -9,6 +9,7 @@ from archfem.ladder import Setting, _usual_damping, build, envelope, largest_dif
 from archfem.materials import BACKFILL, Contact
 from archfem.models.build import build as plain
 from archfem.motion import Motion
+from archfem.runs import time_history
 from archfem.shapes import circular_arch, column
 from archfem.tradeoff import accuracy
 
@@ -70,7 +71,9 @@ def test_a_soft_block_keeps_its_nodes():
 def test_without_a_motion_a_severe_one_is_assumed(ring):
     model = build(ring, fidelity="auto", tolerance=0.02)
     assert model.prediction.met
-    assert model.prediction.dt in (0.005, 0.0025)
+    run = time_history(model, Motion.synthetic(duration=1.0, pga=1.0, seed=1))
+    assert run.dataset.attrs["predicted_error"] == model.prediction.error
+    assert np.diff(run.time) == pytest.approx(model.prediction.dt)
 
 
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
