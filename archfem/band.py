@@ -57,7 +57,8 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
         finish(series[step], series[step + 1], change, (beta, gamma, dt, lag), contact)
         if share != 1.0:
             _times(matrices.opening, contact, gap)
-        _resultants(resultants[step], gap, matrices.shear, contact, law)
+            _closed(gap, law, new)
+        _resultants(resultants[step], gap, new, matrices.shear, contact, law)
     return len(loads)
 
 
@@ -206,11 +207,9 @@ def _right(result, load, constant, joints, opening, law):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _resultants(result, gap, shear, contact, law):  # type: ignore
-    """N, V, M of every joint from the gaps at its points."""
+def _resultants(result, gap, stiffness, shear, contact, law):  # type: ignore
+    """N, V, M of every joint from the gaps at its points and the stiffness that belongs to them."""
     facets, _, arm, joint = law
-    stiffness = np.zeros((len(gap), 2))
-    _closed(gap, law, stiffness)
     result[:] = 0.0
     _times(shear, contact, result[:, 1])
     for row in range(len(gap)):

@@ -57,9 +57,9 @@ def applies(model: Jointed) -> bool:
 
 
 def work(model: Jointed) -> float:
-    """About how many multiplications a step takes, if joints change status in half of them."""
+    """About how many multiplications of `contact` a step is worth, with joints that open often."""
     width = order(model)[1]
-    return model.size * (0.25 * width**2 + 10.0 * width) + 3.0 * model.joints.opening.nnz
+    return model.size * (0.5 * width**2 + 20.0 * width) + 6.0 * model.joints.opening.nnz
 
 
 def order(model: Jointed) -> tuple[Array, int]:
