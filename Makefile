@@ -23,6 +23,8 @@ setup: .venv/ready  ## install what is needed (system packages, .venv)
 	@dpkg -s $(APT) >/dev/null 2>&1 || { $(SUDO) apt-get update -q \
 		&& DEBIAN_FRONTEND=noninteractive $(SUDO) apt-get install -y -q --no-install-recommends $(APT); } \
 		|| { echo "the packages could not be installed (Debian 12 has them all): $(APT)"; exit 1; }
+	@/usr/bin/python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "archfem needs Python 3.11, as on Debian 12; /usr/bin/python3 here is older"; exit 1; }
 	/usr/bin/python3 -m venv --system-site-packages .venv
 	.venv/bin/pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
