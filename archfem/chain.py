@@ -51,14 +51,13 @@ WIDEST = 64
 """Bandwidth up to which a factor is made anew whenever a joint opens."""
 
 
-def applies(model: Jointed) -> bool:
-    """Whether the blocks follow one another closely enough."""
-    return model.joints.offset is None and order(model)[1] <= WIDEST
+def applies(model: Jointed, width: int) -> bool:
+    """Whether the blocks follow one another closely enough, their bandwidth being this."""
+    return model.joints.offset is None and width <= WIDEST
 
 
-def work(model: Jointed) -> float:
+def work(model: Jointed, width: int) -> float:
     """About how many multiplications of `contact` a step is worth, with joints that open often."""
-    width = order(model)[1]
     return model.size * (0.5 * width**2 + 20.0 * width) + 6.0 * model.joints.opening.nnz
 
 

@@ -41,7 +41,7 @@ def stepper_for(
     """
     if method not in METHODS:
         raise InvalidInput(f"method '{method}' is not known: use one of {METHODS}")
-    fitting = _fitting(model, damping)
+    fitting = {} if method == "snes" else _fitting(model, damping)
     if method == "auto":
         chosen = min(fitting, key=lambda name: fitting[name], default="snes")
     elif method == "snes" or method in fitting:
@@ -66,6 +66,7 @@ def _fitting(model: Model, damping: Rayleigh | None) -> dict[str, float]:
     fitting = {}
     if contact.applies(model, damping):
         fitting["contact"] = contact.work(model)
-    if chain.applies(model):
-        fitting["chain"] = chain.work(model)
+    _, width = chain.order(model)
+    if chain.applies(model, width):
+        fitting["chain"] = chain.work(model, width)
     return fitting
