@@ -5,18 +5,9 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING
 
-from archfem.case import Case
-from archfem.errors import ArchfemError, DidNotConverge
-from archfem.motion import Motion
-
-if TYPE_CHECKING:
-    from archfem.history import History
-    from archfem.statics import Equilibrium
-    from archfem.suite import Suite
+from archfem import commands
+from archfem.errors import ArchfemError
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
@@ -43,10 +34,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="archfem", description="Does a dry-stone arch or bridge survive an earthquake?"
     )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    chosen = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def case_command(name: str, about: str) -> argparse.ArgumentParser:
-        command = commands.add_parser(name, help=about, description=about)
+        command = chosen.add_parser(name, help=about, description=about)
         command.add_argument("case", metavar="CASE.toml", help="the case file")
         command.add_argument(
             "--set",
@@ -60,16 +51,16 @@ def _parser() -> argparse.ArgumentParser:
 
     run = case_command("run", "dead load, time histories, tables and pictures")
     run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    run.set_defaults(command=_run)
+    run.set_defaults(command=commands.run)
     check = case_command("check", "read a case, build its model and find its dead load")
-    check.set_defaults(command=_check)
+    check.set_defaults(command=commands.check)
     mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
     mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
-    mesh.set_defaults(command=_mesh)
+    mesh.set_defaults(command=commands.mesh)
     study = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
     study.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    study.set_defaults(command=_accuracy)
-    _motion_command(commands.add_parser("motion", help="measures and pictures of ground motions"))
+    study.set_defaults(command=commands.accuracy)
+    _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
 
 
@@ -82,209 +73,4 @@ def _motion_command(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
     )
-    command.set_defaults(command=_motion)
-
-
-def _check(given: argparse.Namespace) -> None:
-    case = Case.read(given.case, given.changes)
-    dead = _dead_load(case)
-    if case.suite is not None:
-        _tell_motions(case.ground_suite())
-    elif case.motion is not None:
-        motion = case.ground_motion()
-        print(f"motion: {motion.name}, {motion.duration:.2f} s, peak {motion.pga:.3f} m/s²")
-    print(f"{given.case}: ready; dead load in {dead.iterations} iterations")
-
-
-def _motion(given: argparse.Namespace) -> None:
-    from archfem.summary import motion_table
-    from archfem.view.results import named_apart, write_motions
-
-    options = {"column": given.column, "units": given.units, "dt": given.dt}
-    motions = named_apart(
-        [Motion.read(path, **options) for path in given.files],
-        [Path(path).name for path in given.files],
-    )
-    print(motion_table(motions))
-    _tell_written(write_motions(motions, Path(given.out)))
-
-
-def _accuracy(given: argparse.Namespace) -> None:
-    from archfem.tradeoff import accuracy
-    from archfem.view.style import save
-    from archfem.view.tradeoff import draw_accuracy
-
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
-    found = accuracy(
-        case.structure,
-        case.ground_motion(),
-        damping=case.damping,
-        tolerance=case.model.get("tolerance", 0.005),
-    )
-    chosen = found.chosen.setting.label if found.chosen else "none: a finer model is needed"
-    lines = [
-        found.table(),
-        "",
-        f"reference: {found.reference.label}, in doubt by {found.doubt:.2g}",
-        f"chosen for an error of {found.tolerance:g}: {chosen}",
-    ]
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "accuracy.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    print("\n".join(lines))
-    _tell_written([folder / "accuracy.txt", save(draw_accuracy(found), folder / "accuracy.png")])
-
-
-def _mesh(given: argparse.Namespace) -> None:
-    from archfem.mesh import Meshing, write_mesh
-
-    case = Case.read(given.case, given.changes)
-    through, along = case.model.get("cells", [4, 4])
-    meshing = Meshing(through, along, case.model.get("cell", "quadrilateral"))
-    write_mesh(case.structure, given.out, meshing)
-    print(f"wrote {given.out}")
-
-
-def _run(given: argparse.Namespace) -> None:
-    from archfem.view.results import write_dead, write_run
-
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "case.toml").write_text(case.text(), encoding="utf-8")
-    dead = _dead_load(case)
-    _tell_written([write_dead(dead, folder)])
-    if case.suite is not None:
-        _run_suite(case, dead, folder)
-    elif case.motion is not None:
-        run = _shake(case, case.ground_motion(), dead, folder=folder)
-        _tell(run, dead, folder)
-        _tell_written(write_run(case, run, dead, folder))
-
-
-def _run_suite(case: Case, dead: "Equilibrium", folder: Path) -> None:
-    """Run all pairs of a suite, each to its own folder; those finished before are kept."""
-    from archfem.analysis import complete
-    from archfem.summary import pair_table
-    from archfem.view.results import write_envelopes, write_suite
-
-    suite = case.ground_suite()
-    _tell_motions(suite)
-    _tell_written(write_suite(suite, case.target, folder))
-    runs: dict[str, History] = {}
-    for motion in suite.motions:
-        run = _run_pair(case.alone(motion.name), motion, dead, folder=folder / motion.name)
-        runs[motion.name] = run
-        if run.outcome.startswith("interrupted"):
-            break
-    table = pair_table(runs)
-    (folder / "suite.txt").write_text(table + "\n", encoding="utf-8")
-    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{table}")
-    _tell_written(write_envelopes(runs, dead, folder))
-    if run.outcome.startswith("interrupted"):
-        print("run the same command again to go on with the pairs that are left", file=sys.stderr)
-        raise KeyboardInterrupt
-    broken = [name for name, run in runs.items() if not complete(run)]
-    if broken:
-        raise DidNotConverge(
-            f"{len(broken)} of {len(runs)} pairs have no equilibrium at some step: "
-            f"{', '.join(broken)}; what was computed is kept"
-        )
-
-
-def _run_pair(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
-    """Run one pair, or take what an earlier command left of it; a failed step ends the pair only.
-
-    Raises:
-        DidNotConverge: not even the first step could be made.
-    """
-    from archfem.analysis import finished
-    from archfem.view.results import write_motion, write_run
-
-    summary = folder / "summary.txt"  # written last
-    run = finished(folder / "history.nc", case, motion)
-    if run is not None:
-        print(f"{motion.name}: finished before, kept {folder / 'history.nc'}")
-        if summary.is_file():
-            return run
-    else:
-        summary.unlink(missing_ok=True)
-        try:
-            run = _shake(case, motion, dead, folder=folder)
-        except DidNotConverge as error:
-            if error.history is None:
-                raise
-            print(f"archfem: {motion.name}: {error}", file=sys.stderr)
-            run = error.history
-    _tell_written([*write_motion(motion, folder), *write_run(case, run, dead, folder)])
-    _tell(run, dead, folder)
-    return run
-
-
-def _dead_load(case: Case) -> "Equilibrium":
-    from archfem.analysis import at_rest
-
-    print(case.title)
-    start = perf_counter()
-    dead = at_rest(case)
-    model, worst = dead.model, abs(dead.joints["eccentricity"])
-    print(
-        f"model: {model.fidelity}, {len(case.structure.free)} blocks, "
-        f"{len(case.structure.joints)} joints, {model.size} coordinates "
-        f"({perf_counter() - start:.2f} s with the dead load)"
-    )
-    print(
-        f"dead load: |e| ≤ {float(worst.max()):.3f}, "
-        f"V/N ≤ {float(dead.joints['friction'].max()):.3f}, "
-        f"N ≥ {float(dead.joints['N'].min()) / 1e3:.2f} kN"
-    )
-    return dead
-
-
-def _shake(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
-    """Run a time history and keep it in its folder, also where it fails."""
-    from archfem.analysis import shaken
-
-    start = perf_counter()
-    try:
-        run = shaken(case, motion, dead)
-    except DidNotConverge as error:
-        if error.history is not None:
-            error.history.save(folder / "history.nc")
-            print(f"what was computed is kept in {folder / 'history.nc'}", file=sys.stderr)
-        raise
-    taken = perf_counter() - start
-    print(
-        f"time history: {motion.name}, peak {motion.pga:.2f} m/s², "
-        f"{float(run.time[-1]):.2f} s in {taken:.1f} s; {run.outcome}"
-    )
-    _tell_written([run.save(folder / "history.nc")])
-    return run
-
-
-def _tell(run: "History", dead: "Equilibrium", folder: Path) -> None:
-    """Print the table of joints and the mechanism, and keep them as text."""
-    from archfem.summary import joint_table
-
-    found = run.mechanism
-    lines = [joint_table(run.joints, dead.joints), ""]
-    if found is None:
-        lines.append("no mechanism: never four failed joints at once in one part")
-    else:
-        lines.append(
-            f"{found.kind} mechanism by count at {found.time:.3f} s: "
-            f"joints {', '.join(map(str, found.joints))} of {found.part}"
-        )
-    text = "\n".join(lines)
-    (folder / "summary.txt").write_text(text + "\n", encoding="utf-8")
-    print(text)
-
-
-def _tell_motions(suite: "Suite") -> None:
-    """Print what matching did, or how strong the motions are."""
-    from archfem.summary import match_table, motion_table
-
-    print(match_table(suite.matches) if suite.matches else motion_table(suite.motions))
-
-
-def _tell_written(files: Sequence[Path]) -> None:
-    for path in files:
-        print(f"wrote {path}")
+    command.set_defaults(command=commands.motion)

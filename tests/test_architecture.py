@@ -14,7 +14,8 @@ LAYERS = [
     "errors units laws criteria _petsc",
     "materials quadrature quantities schemes signals oscillator records",
     "structure synthetic codes settings",
-    "actions shapes sparsity resultants motion",
+    "actions assembly sparsity resultants motion",
+    "shapes",
     "joints",
     "kinematics spectra",
     "equilibrium measures",
@@ -39,6 +40,7 @@ LAYERS = [
     "tradeoff case",
     "analysis",
     "view",
+    "commands",
     "cli",
     "__main__",
 ]
