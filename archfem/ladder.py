@@ -19,11 +19,11 @@ from archfem.models import Model
 from archfem.models import build as plain
 from archfem.models.jointed import Jointed, Prediction
 from archfem.models.rigid import rigid
-from archfem.models.soft import soft_blocks
 from archfem.motion import Motion
 from archfem.quadrature import Quadrature
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
+from archfem.soft import soft_blocks
 from archfem.statics import equilibrium, self_weight
 from archfem.structure import Array, Structure
 

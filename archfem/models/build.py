@@ -7,8 +7,8 @@ from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.reduce import modal, reduced
 from archfem.models.rigid import rigid
-from archfem.models.soft import soft_blocks, softness
 from archfem.quadrature import Quadrature
+from archfem.soft import soft_blocks, softness
 from archfem.structure import Structure
 
 logger = logging.getLogger("archfem")
