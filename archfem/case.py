@@ -5,7 +5,7 @@ not known, a wrong unit or an impossible geometry is an error that names the key
 """
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,32 +15,13 @@ import tomli_w
 from archfem import ground
 from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.materials import CONTACTS, MATERIALS, Contact, Material
 from archfem.motion import Motion
+from archfem.plans import planned
 from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
-from archfem.settings import Table, change, checked, refuse_unknown
-from archfem.shapes import circular_arch, column
+from archfem.settings import Table, change, checked, merged, refuse_unknown
 from archfem.structure import Structure
 from archfem.suite import Suite
 
-RING = {
-    "radius": "m",
-    "embrace": "degree",
-    "span": "m",
-    "rise": "m",
-    "thickness": "m",
-    "voussoirs": int,
-    "chords": int,
-    "width": "m",
-    "gravity": "m/s**2",
-}
-COLUMN = {"breadth": "m", "heights": ["m"], "width": "m", "gravity": "m/s**2"}
-SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
-    "circular_arch": (circular_arch, RING),
-    "column": (column, COLUMN),
-}
-MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
-CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
 MODEL = {
     "fidelity": str,
     "cells": [int],
@@ -96,6 +77,9 @@ class Case:
     def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Case":
         """Read a case file.
 
+        With `base = "other.toml"` a file says only what differs from another one: its tables go
+        over those of the other, key by key. Relative names in them start from the file's folder.
+
         Args:
             path: a TOML file.
             changes: "section.key=value" each, instead of what the file says.
@@ -105,12 +89,7 @@ class Case:
             InvalidStructure: lengths that do not make a structure.
         """
         path = Path(path)
-        if not path.is_file():
-            raise InvalidInput(f"there is no case file {path}")
-        try:
-            settings = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InvalidInput(f"{path} is not TOML: {error}") from error
+        settings = _tables(path, ())
         for text in changes:
             change(settings, text)
         try:
@@ -133,7 +112,7 @@ class Case:
         motion, suite = settings.get("motion"), settings.get("suite")
         case = cls(
             title=str(settings.get("title", "case")),
-            structure=_structure(settings),
+            structure=planned(settings),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
@@ -208,42 +187,24 @@ class Case:
         return tomli_w.dumps(self.settings)
 
 
-def _structure(settings: Table) -> Structure:
-    """Build the structure that a case describes."""
-    given = dict(settings.get("structure", {}))
-    name = given.pop("shape", None)
-    if name not in SHAPES:
-        raise InvalidInput(f"structure.shape = {name!r} is not known: use one of {list(SHAPES)}")
-    shape, keys = SHAPES[name]
-    stone = _material(settings, given.pop("material", "stone"))
-    contact = _contact(settings, given.pop("contact", "stone to stone"))
+def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
+    """Tables of a case file over those of its base.
+
+    Args:
+        path: the file.
+        above: files that are based on it, one on the other.
+    """
+    if not path.is_file():
+        raise InvalidInput(f"there is no case file {path}")
+    if path.resolve() in above:
+        raise InvalidInput(f"{path} is its own base: base must name another file")
     try:
-        return shape(material=stone, contact=contact, **checked(given, keys, "structure"))
-    except TypeError as error:
-        raise InvalidInput(f"structure of shape {name!r}: {error}") from error
-
-
-def _material(settings: Table, name: str) -> Material:
-    """A named material: a preset, changed or made by the case's own table."""
-    return _named(settings, "materials", name, MATERIAL, (MATERIALS, Material))
-
-
-def _contact(settings: Table, name: str) -> Contact:
-    """A named contact, likewise."""
-    return _named(settings, "contacts", name, CONTACT, (CONTACTS, Contact))
-
-
-def _named(settings: Table, section: str, name: str, keys: Table, kind: tuple[Any, type]) -> Any:
-    presets, make = kind
-    own = settings.get(section, {})
-    if name not in presets and name not in own:
-        raise InvalidInput(
-            f"'{name}' is not among the {section} {sorted(set(presets) | set(own))}: "
-            f'name one of them or write a table [{section}."{name}"]'
-        )
-    base = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
-    values = {**base, **checked(own.get(name, {}), keys, f"{section}.{name}")}
-    try:
-        return make(**values, name=name)
-    except TypeError as error:
-        raise InvalidInput(f"{section}.{name}: {error}") from error
+        settings = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path} is not TOML: {error}") from error
+    base = settings.pop("base", None)
+    if base is None:
+        return settings
+    if not isinstance(base, str):
+        raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
+    return merged(_tables(path.parent / base, (*above, path.resolve())), settings)

@@ -47,6 +47,16 @@ def refuse_unknown(given: Table, keys: Iterable[str], section: str = "") -> None
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 
+def merged(below: Table, above: Table) -> dict[str, Any]:
+    """Tables of one case over those of another: what both have is taken from `above`."""
+    result = dict(below)
+    for key, value in above.items():
+        under = result.get(key)
+        both = isinstance(under, Mapping) and isinstance(value, Mapping)
+        result[key] = merged(under, value) if both else value  # type: ignore[arg-type]
+    return result
+
+
 def change(settings: dict[str, Any], text: str) -> None:
     """Set one value from "section.key=value", read as TOML, or as a word.
 

@@ -1,4 +1,4 @@
-"""Parametric structures: give a few lengths, get blocks and joints."""
+"""Single rings and columns, and a ring on two piers."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,0 +1,174 @@
+"""Structures as tables describe them: shapes and their lengths, materials and contacts by name."""
+
+from collections.abc import Callable
+from typing import Any
+
+from archfem.errors import InvalidInput
+from archfem.materials import CONTACTS, MATERIALS, Contact, Material
+from archfem.settings import Table, checked
+from archfem.shapes import (
+    Arch,
+    Backfill,
+    Paving,
+    Pier,
+    Sidewall,
+    arch_on_piers,
+    bridge,
+    circular_arch,
+    column,
+)
+from archfem.structure import Structure
+
+COMMON = {"width": "m", "gravity": "m/s**2"}
+RING = {
+    "radius": "m",
+    "embrace": "degree",
+    "span": "m",
+    "rise": "m",
+    "thickness": "m",
+    "voussoirs": int,
+    "chords": int,
+    **COMMON,
+}
+COLUMN = {"breadth": "m", "heights": ["m"], **COMMON}
+PIERS = {
+    "radius": "m",
+    "thickness": "m",
+    "voussoirs": int,
+    "pier_breadth": "m",
+    "courses": ["m"],
+    "chords": int,
+    **COMMON,
+}
+BRIDGE = {
+    "arches": dict,
+    "piers": dict,
+    "sidewalls": dict,
+    "backfill": dict,
+    "paving": dict,
+    "chords": int,
+    **COMMON,
+}
+SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
+    "circular_arch": (circular_arch, RING),
+    "column": (column, COLUMN),
+    "arch_on_piers": (arch_on_piers, PIERS),
+    "bridge": (bridge, BRIDGE),
+}
+SEVERAL: dict[str, tuple[Callable[..., Any], Table]] = {
+    "arches": (
+        Arch,
+        {"span": "m", "rise": "m", "embrace": "degree", "thickness": "m", "voussoirs": int},
+    ),
+    "piers": (Pier, {"gap": "m", "height": "m", "course": "m"}),
+    "sidewalls": (
+        Sidewall,
+        {
+            "length": "m",
+            "height": "m",
+            "course": "m",
+            "above": "m",
+            "setback": "m",
+            "state": str,
+        },
+    ),
+}
+"""Parts of a bridge of which there may be several, from left to right, each under its name."""
+FILL = {
+    "cover": "m",
+    "erosion": "m",
+    "hump": "m",
+    "spandrels": "m",
+    "material": str,
+    "contact": str,
+}
+PAVING = {"thickness": "m", "length": "m"}
+MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
+CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
+
+
+def planned(settings: Table) -> Structure:
+    """Build the structure that a case describes.
+
+    Args:
+        settings: tables "structure", "materials" and "contacts".
+
+    Raises:
+        InvalidInput: a shape, key, material or contact is not known, or a value cannot be meant.
+        InvalidStructure: the lengths do not make a structure.
+    """
+    given = dict(settings.get("structure", {}))
+    name = given.pop("shape", None)
+    if name not in SHAPES:
+        raise InvalidInput(f"structure.shape = {name!r} is not known: use one of {list(SHAPES)}")
+    shape, keys = SHAPES[name]
+    stone = _material(settings, given.pop("material", "stone"))
+    contact = _contact(settings, given.pop("contact", "stone to stone"))
+    values = checked(given, keys, "structure")
+    if name == "bridge":
+        values = _parts(values, settings)
+    return _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
+
+
+def _parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
+    """Parts of a bridge from their tables."""
+    parts = dict(values)
+    for key, (make, keys) in SEVERAL.items():
+        if key in parts:
+            parts[key] = _several(make, keys, parts[key], f"structure.{key}")
+    if "backfill" in parts:
+        fill = checked(parts["backfill"], FILL, "structure.backfill")
+        fill["material"] = _material(settings, fill.pop("material", "backfill"))
+        fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
+        parts["backfill"] = _made(Backfill, "structure.backfill", **fill)
+    if "paving" in parts:
+        paving = checked(parts["paving"], PAVING, "structure.paving")
+        parts["paving"] = _made(Paving, "structure.paving", **paving)
+    return parts
+
+
+def _several(make: Callable[..., Any], keys: Table, given: Table, section: str) -> list[Any]:
+    """Parts of one kind: what the table says of all, and each subtable of the part it names."""
+    each = {name: own for name, own in given.items() if isinstance(own, dict)}
+    if not each:
+        raise InvalidInput(
+            f'{section} names no part: write a table [{section}."its name"] for each'
+        )
+    common = checked({k: v for k, v in given.items() if k not in each}, keys, section)
+    return [
+        _made(
+            make, f"{section}.{name}", name=name, **common | checked(own, keys, f"{section}.{name}")
+        )
+        for name, own in each.items()
+    ]
+
+
+def _made(make: Callable[..., Any], section: str, **values: Any) -> Any:
+    """Make something of the values of a table, naming the table where a value is missing."""
+    try:
+        return make(**values)
+    except TypeError as error:
+        raise InvalidInput(f"{section}: {error}") from error
+
+
+def _material(settings: Table, name: str) -> Material:
+    """A named material: a preset, changed or made by the case's own table."""
+    return _named(settings, "materials", name, MATERIAL, (MATERIALS, Material))
+
+
+def _contact(settings: Table, name: str) -> Contact:
+    """A named contact, likewise."""
+    return _named(settings, "contacts", name, CONTACT, (CONTACTS, Contact))
+
+
+def _named(settings: Table, section: str, name: str, keys: Table, kind: tuple[Any, type]) -> Any:
+    presets, make = kind
+    own = settings.get(section, {})
+    if name not in presets and name not in own:
+        raise InvalidInput(
+            f"'{name}' is not among the {section} {sorted(set(presets) | set(own))}: "
+            f'name one of them or write a table [{section}."{name}"]'
+        )
+    base = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
+    values = {**base, **checked(own.get(name, {}), keys, f"{section}.{name}")}
+    return _made(make, f"{section}.{name}", **values, name=name)
