@@ -21,9 +21,12 @@ MOTION = {
     "start": "s",
     "end": "s",
     "scale": "1",
+    "reversed": bool,
 }
 SUITE = {
     "name": str,
+    "folder": str,
+    "reversed": bool,
     "target": dict,
     "matched": bool,
     "scale": "1",
@@ -80,6 +83,7 @@ def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion
         motion = motion.with_vertical(other)
     if "start" in settings or "end" in settings:
         motion = motion.cut(settings.get("start", 0.0), settings.get("end"))
+    motion = motion.reversed() if settings.get("reversed", False) else motion
     return motion.scaled(settings.get("scale", 1.0))
 
 
@@ -137,14 +141,15 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
 
     Args:
         settings: as checked by `suite_settings`.
-        folder: where relative file names start.
+        folder: where relative file names start, or the name of the suite's own folder.
 
     Raises:
         InvalidInput: a file cannot be read or a pair not be matched.
         DidNotConverge: a pair did not come near the target.
     """
+    files = folder / settings.get("folder", "")
     pairs = tuple(
-        replace(ground_motion(pair, folder, f"suite.pairs.{name}"), name=name, transverse=None)
+        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
         for name, pair in settings["pairs"].items()
     )
     suite = Suite(
@@ -154,7 +159,8 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
         reduction=settings.get("reduction", 1.0),
     )
     target = target_spectrum(settings)
-    return suite.matched(target) if target and settings.get("matched", False) else suite
+    suite = suite.matched(target) if target and settings.get("matched", False) else suite
+    return suite.reversed() if settings.get("reversed", False) else suite
 
 
 def _source_settings(given: Any, keys: Table, section: str) -> dict[str, Any]:

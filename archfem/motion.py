@@ -203,6 +203,11 @@ class Motion:
         """Multiply all components by a factor [-]; a negative one turns them round."""
         return self._each(lambda samples: factor * samples)
 
+    def reversed(self) -> "Motion":
+        """Turn the horizontal components round, as if the structure faced the other way."""
+        turned = {name: -self.component(name) for name in self.components if name != "vertical"}
+        return replace(self, **turned)  # type: ignore[arg-type]
+
     def scaled_to_pga(self, pga: float) -> "Motion":
         """Scale all components by the one factor that gives the horizontal this peak [m/s²]."""
         if self.pga == 0.0 or not pga > 0.0:

@@ -101,6 +101,10 @@ class Suite:
         matches = tuple(matched(pair, spectrum) for pair in self.pairs)
         return replace(self, pairs=tuple(match.motion for match in matches), matches=matches)
 
+    def reversed(self) -> "Suite":
+        """Turn the horizontals round, as if the structure faced the other way."""
+        return replace(self, pairs=tuple(pair.reversed() for pair in self.pairs))
+
     @property
     def motions(self) -> tuple[Motion, ...]:
         """The motions to apply: the pairs times scale over reduction."""
