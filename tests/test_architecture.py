@@ -12,7 +12,7 @@ import archfem
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
     "errors units laws criteria _petsc",
-    "materials quadrature quantities schemes signals oscillator records",
+    "materials quadrature quantities schemes signals oscillator records _slepc",
     "structure synthetic codes settings",
     "actions assembly sparsity resultants motion soft",
     "shapes",
@@ -20,6 +20,7 @@ LAYERS = [
     "joints skeleton",
     "kinematics spectra",
     "equilibrium measures",
+    "loops",
     "matching mechanism sliding",
     "limit suite events",
     "capacity ground",
@@ -28,11 +29,11 @@ LAYERS = [
     "space",
     "forms",
     "models",
-    "newton energy states freebody",
+    "newton energy states freebody eigen",
     "statics history",
     "dynamics path verdicts kernel",
     "batches guard modal_energy summary",
-    "contact band stress",
+    "contact band stress modal",
     "chain",
     "steppers",
     "tape",
@@ -52,6 +53,7 @@ ONLY_IN = {
     "dolfinx": {"_fenicsx", "forms"},
     "ufl": {"_fenicsx", "forms"},
     "petsc4py": {"_petsc"},
+    "slepc4py": {"_slepc"},
     "pint": {"quantities"},
 }
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer.split()}

@@ -1,0 +1,106 @@
+"""The lowest vibrations of sparse matrices, by SLEPc, with nothing missed and nothing made up.
+
+K x = ω² M x is solved by shift-and-invert and the Krylov-Schur method (Stewart, SIAM J. Matrix
+Anal. Appl. 23 (2002) 601). By Sylvester's law of inertia the negative pivots of K - σ M are as many
+as there are ω² below σ: that tells of negative stiffness, and of a mode that was stepped over.
+"""
+
+import numpy as np
+from scipy import sparse
+
+from archfem._slepc import PETSc, SLEPc
+from archfem.errors import DidNotConverge
+from archfem.structure import Array
+
+ROUNDING = 1e-13
+"""Of the largest ω² of a coordinate by itself: what rounding makes of a zero stays well below."""
+
+ACCURACY = 1e-12
+"""Residual of a pair, relative to its inverted eigenvalue, at which SLEPc is content."""
+
+APART = 1e-6
+"""Eigenvalues nearer than this, relative to their size, count as equal."""
+
+ITERATIONS = 200
+
+
+def lowest(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int) -> tuple[Array, Array]:
+    """Find the lowest ω² and their shapes, so that φᵀ M φ = 1.
+
+    Args:
+        stiffness: K (n, n), symmetric.
+        mass: M (n, n), symmetric and positive.
+        count: how many, from 1 to n.
+
+    Returns:
+        ω² in ascending order (count,) [1/s²], shapes (n, count).
+
+    Raises:
+        DidNotConverge: K is singular or negative, or SLEPc did not find all pairs.
+    """
+    zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
+    operators = _matrix(stiffness), _matrix(mass)
+    solver = _solver(operators, count, -zero)
+    solver.solve()
+    found = solver.getConverged()
+    if found < count:
+        raise DidNotConverge(
+            f"SLEPc found {found} of {count} modes in {solver.getIterationNumber()} iterations "
+            f"(reason {int(solver.getConvergedReason())}): ask for fewer, or check units"
+        )
+    vector = PETSc.Vec().createSeq(len(stiffness.indptr) - 1)
+    squares, shapes = np.empty(found), np.empty((vector.size, found))
+    for number in range(found):
+        squares[number] = solver.getEigenpair(number, vector).real
+        shapes[:, number] = vector.array_r
+    order = np.argsort(squares)[:count]
+    squares, shapes = squares[order], shapes[:, order]
+    if _negative(solver) or squares[0] <= zero:
+        raise DidNotConverge(
+            f"the stiffness is singular or negative, with ω² = {squares[0]:.1e} 1/s² where "
+            f"rounding makes up to {zero:.0e}: a mechanism; check supports and joints, or take "
+            "another state"
+        )
+    edge = float(squares[-1]) * (1.0 - APART)
+    below, missed = int(np.sum(squares < edge)), _below(operators, edge)
+    if missed != below:
+        raise DidNotConverge(
+            f"SLEPc found {below} modes below {np.sqrt(edge) / (2.0 * np.pi):.4g} Hz where there "
+            f"are {missed}: ask for a few more or fewer"
+        )
+    return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
+
+
+def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    made = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data))
+    made.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return made
+
+
+def _solver(operators: tuple[PETSc.Mat, PETSc.Mat], count: int, shift: float) -> SLEPc.EPS:
+    """A solver for the pairs nearest a shift, by a Cholesky factor of K - σ M."""
+    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    solver.setOperators(*operators)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setDimensions(count)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(shift)
+    solver.setTolerances(ACCURACY, ITERATIONS)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    linear = transform.getKSP()
+    linear.setType(PETSc.KSP.Type.PREONLY)
+    linear.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    return solver
+
+
+def _negative(solver: SLEPc.EPS) -> int:
+    """Number of negative pivots of the solver's factor."""
+    return int(solver.getST().getKSP().getPC().getFactorMatrix().getInertia()[0])
+
+
+def _below(operators: tuple[PETSc.Mat, PETSc.Mat], square: float) -> int:
+    """Number of ω² below a value."""
+    solver = _solver(operators, 1, square)
+    solver.setUp()
+    return _negative(solver)
