@@ -18,7 +18,7 @@ from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
 from archfem.plans import planned
 from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
-from archfem.settings import Table, change, checked, merged, refuse_unknown
+from archfem.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.structure import Structure
 from archfem.suite import Suite
 
@@ -78,7 +78,8 @@ class Case:
         """Read a case file.
 
         With `base = "other.toml"` a file says only what differs from another one: its tables go
-        over those of the other, key by key. Relative names in them start from the file's folder.
+        over those of the other, key by key, after `without = ["section.key", …]` has taken out
+        what the other has and this one has not. Relative names start from the file's folder.
 
         Args:
             path: a TOML file.
@@ -207,4 +208,7 @@ def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
         return settings
     if not isinstance(base, str):
         raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
-    return merged(_tables(path.parent / base, (*above, path.resolve())), settings)
+    below = _tables(path.parent / base, (*above, path.resolve()))
+    for key in settings.pop("without", []):
+        remove(below, key)
+    return merged(below, settings)

@@ -57,6 +57,21 @@ def merged(below: Table, above: Table) -> dict[str, Any]:
     return result
 
 
+def remove(settings: dict[str, Any], path: str) -> None:
+    """Take out the table or value at "section.key".
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    *parents, last = path.split(".")
+    table: Any = settings
+    for parent in parents:
+        table = table.get(parent, {}) if isinstance(table, dict) else {}
+    if not isinstance(table, dict) or last not in table:
+        raise InvalidInput(f"without = '{path}': the base has no such key")
+    del table[last]
+
+
 def change(settings: dict[str, Any], text: str) -> None:
     """Set one value from "section.key=value", read as TOML, or as a word.
 
