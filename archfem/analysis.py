@@ -8,9 +8,11 @@ import numpy as np
 from archfem.case import Case
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import History
-from archfem.ladder import build
+from archfem.ladder import build, finest
+from archfem.modal_damping import effective_range
 from archfem.motion import Motion
 from archfem.runs import CountedMechanism, Record, time_history
+from archfem.schemes import EffectiveRayleigh, Rayleigh
 from archfem.statics import Equilibrium, dead_load
 
 FRAMES = 10
@@ -40,16 +42,42 @@ def _wanted(case: Case) -> dict[str, Any]:
         motion = case.ground_motion()
     elif case.suite is not None:
         motion = case.ground_suite().motions[0]
-    return {"motion": motion, "damping": case.damping}
+    return {"motion": motion, "damping": expected_damping(case)}
 
 
-def shaken(case: Case, motion: Motion, dead: Equilibrium) -> History:
+def expected_damping(case: Case) -> Rayleigh | None:
+    """Damping of a case whose model is not yet chosen: as the finest model has it."""
+    if isinstance(case.damping, EffectiveRayleigh):
+        return damping_of(case, dead_load(finest(case.structure).build(case.structure)))[0]
+    return case.damping
+
+
+def damping_of(case: Case, dead: Equilibrium) -> tuple[Rayleigh | None, str]:
+    """Damping of a case about its dead load, and in words how it was found.
+
+    Raises:
+        InvalidInput: it is to be that of the effective modes, and fewer than two are.
+    """
+    damping, how = case.damping, ""
+    if isinstance(damping, EffectiveRayleigh):
+        found = effective_range(dead.model, dead, share=damping.share)
+        damping, how = damping.between(found.frequencies), f"; {found.text}"
+    if damping is None:
+        return None, "damping: none"
+    low, high = damping.frequencies
+    return damping, f"damping: {100.0 * damping.ratio:g} % at {low:.2f} and {high:.2f} Hz{how}"
+
+
+def shaken(
+    case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None = None
+) -> History:
     """Run the time history of a case under a motion; the history carries the case.
 
     Args:
         case: tells steps, scheme, damping, and what to record.
         motion: of the ground.
         dead: where it starts.
+        damping: as by `damping_of`, which is asked where it is not given.
 
     Raises:
         DidNotConverge: a step failed; `history` is the record up to it.
@@ -62,7 +90,7 @@ def shaken(case: Case, motion: Motion, dead: Equilibrium) -> History:
             motion,
             dt=case.analysis.get("dt"),
             start=dead,
-            damping=case.damping,
+            damping=damping or damping_of(case, dead)[0],
             scheme=case.scheme,
             record=Record(
                 every=output.get("every", 1), fields_every=output.get("fields_every", animated)
@@ -86,7 +114,7 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
         motion: to compare with the ground motion in the file.
     """
     try:
-        run = History.read(path)
+        run = History.read(path, case.structure)
     except InvalidInput:
         return None
     if not complete(run) or run.dataset.attrs.get("case") != case.text():

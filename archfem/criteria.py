@@ -1,7 +1,7 @@
 """When a joint has failed: hinging, sliding, opening; and when failures make a mechanism."""
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -92,11 +92,11 @@ class Mechanism:
 
     Attributes:
         kind: one of `KINDS`: "local" in one ring or one pier, "semi-global" in one ring and one
-            pier, "global" in more; "none" where nothing moves.
+            pier, "global" in more; "none" where no ring and no pier moves.
         part: the rings and piers concerned, joined by " + ".
         joints: numbers of the failed joints.
         time: when [s]; None for a static state.
-        blocks: numbers of the blocks that move; empty where failures were only counted.
+        blocks: numbers of the blocks that can move; empty where none can, or nobody asked.
     """
 
     kind: str
@@ -111,7 +111,7 @@ def part_role(part: str) -> str:
 
     A ring is called an arch or a ring ("main arch"), a pier a pier or a column ("north pier").
     Without a name a part counts as a ring. Anything else, such as backfill, side walls or
-    abutments, follows what carries it and does not count.
+    abutments, follows what carries it and is not judged.
     """
     words = {word.rstrip("0123456789") for word in re.split(r"[\s_-]+", part.lower())}
     if words & RING_WORDS or not part:
@@ -119,8 +119,23 @@ def part_role(part: str) -> str:
     return "pier" if words & PIER_WORDS else "other"
 
 
+def judged_parts(parts: Iterable[str]) -> tuple[str, ...]:
+    """Those parts whose failures and motions are judged: rings and piers, in the order given.
+
+    Where there is neither, as in a wall by itself, every part is judged.
+    """
+    names = tuple(dict.fromkeys(parts))
+    return tuple(name for name in names if part_role(name) != "other") or names
+
+
+def judged(joints: xr.Dataset) -> xr.Dataset:
+    """Those joints that are judged, as `judged_parts` says; they keep their numbers."""
+    part = joints["part"].values.astype(str)
+    return joints.isel(joint=np.isin(part, judged_parts(part)))
+
+
 def mechanism_kind(parts: Collection[str]) -> str:
-    """Class of a mechanism in these parts: "none", "local", "semi-global" or "global"."""
+    """Class of a mechanism in these judged parts: "none", "local", "semi-global" or "global"."""
     roles = sorted(role for part in set(parts) if (role := part_role(part)) != "other")
     if len(roles) < 2:
         return "local" if parts else "none"
@@ -141,7 +156,7 @@ def counted_mechanism(
     at the instant; ask for `kinds=("local",)` to find four in one ring whatever else fails.
 
     Args:
-        joints: over joint, or over time and joint; `part_role` tells which are of rings, of piers.
+        joints: over joint, or over time and joint; those of `judged` are counted.
         limit: of |e| for a hinge [-].
         failures: how many make a mechanism.
         kinds: classes to look for.
@@ -156,7 +171,7 @@ def counted_mechanism(
         flags = flags.expand_dims("time")
     flags = flags.transpose("time", "joint")
     part, up = flags["part"].values.astype(str), flags.values
-    names = [name for name in dict.fromkeys(part) if part_role(name) != "other"]
+    names = judged_parts(part)
     counts = np.array([up[:, part == name].sum(axis=1) for name in names]).reshape(-1, len(up)).T
     for instant in np.flatnonzero(counts.sum(axis=1) >= failures):
         count = dict(zip(names, counts[instant], strict=True))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.criteria import FAILURES, HINGE, KINDS, USED_UP, counted_mechanism
-from archfem.mechanism import freedoms, verified_mechanism
+from archfem.criteria import FAILURES, HINGE, KINDS, USED_UP, counted_mechanism, judged_parts
+from archfem.mechanism import Verifier
 from archfem.resultants import joint_dataset
 from archfem.structure import Array, Structure
 
@@ -30,16 +30,22 @@ class CountedMechanism:
     limit: float = HINGE
     failures: int = FAILURES
     kinds: tuple[str, ...] = KINDS
+    _watches: dict[int, "_Watch"] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def __call__(self, structure: Structure, resultants: Array) -> str | None:
         """Say which joints have failed, or None."""
-        if _down(structure, resultants, self.limit).sum() < self.failures:
+        watch = _watch(self._watches, structure)
+        state = watch.state(resultants, watch.judged, self.limit)
+        if np.count_nonzero(state) < self.failures or state.tobytes() in watch.idle:
             return None
         joints = joint_dataset(structure, resultants)
         found = counted_mechanism(joints, self.limit, self.failures, self.kinds)
         if found is None:
+            watch.idle.add(state.tobytes())
             return None
-        motion = verified_mechanism(structure, joints, self.limit)
+        motion = watch.verifier.verified(joints, self.limit)
         return f"a mechanism: joints {found.joints} of the {found.part}; {motion}"
 
 
@@ -56,27 +62,57 @@ class MovingMechanism:
 
     limit: float = HINGE
     kinds: tuple[str, ...] = KINDS
-    _known: dict[bytes, str | None] = field(
+    _watches: dict[int, "_Watch"] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
     def __call__(self, structure: Structure, resultants: Array) -> str | None:
         """Say which joints permit which motion, or None."""
-        if not _down(structure, resultants, self.limit).any():
+        watch = _watch(self._watches, structure)
+        state = watch.state(resultants, watch.skeleton, self.limit)
+        if not state.any() or state.tobytes() in watch.idle:
             return None
-        joints = joint_dataset(structure, resultants)
-        state = np.concatenate(freedoms(joints, self.limit)).tobytes()
-        if state not in self._known:
-            found = verified_mechanism(structure, joints, self.limit)
-            words = f"a mechanism that moves: joints {found.moved.joints}; {found}"
-            self._known[state] = words if found.kind in self.kinds else None
-        return self._known[state]
+        found = watch.verifier.moving(joint_dataset(structure, resultants), self.limit)
+        if found is None or found.kind not in self.kinds:
+            watch.idle.add(state.tobytes())
+            return None
+        return f"a mechanism that moves: joints {found.moved.joints}; {found}"
 
 
-def _down(structure: Structure, resultants: Array, limit: float) -> NDArray[np.bool_]:
-    """Whether each joint hinges, slides or has come apart: a quick look at every step."""
-    normal, shear, moment = np.abs(resultants.T)
-    depth = np.array([joint.depth for joint in structure.joints])
-    friction = np.array([joint.contact.friction for joint in structure.joints])
-    used_up = shear >= (1.0 - USED_UP) * friction * normal
-    return (moment >= limit * normal * depth) | used_up | (resultants[:, 0] <= 0.0)
+class _Watch:
+    """A quick look at the joints of one structure at every step.
+
+    Attributes:
+        verifier: of mechanisms of the structure.
+        judged: numbers of the joints that are judged.
+        skeleton: numbers of the joints that can be part of a mechanism.
+        idle: states of joints that are known to be no event, so that nobody looks twice.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        joints = structure.joints
+        parts = judged_parts(joint.part for joint in joints)
+        self.verifier = Verifier(structure)
+        self.judged = np.array([k for k, joint in enumerate(joints) if joint.part in parts])
+        self.skeleton = np.array(self.verifier.skeleton.joints)
+        self.idle: set[bytes] = set()
+        self._depth = np.array([joint.depth for joint in joints])
+        self._friction = np.array([joint.contact.friction for joint in joints])
+
+    def state(
+        self, resultants: Array, numbers: NDArray[np.int64], limit: float
+    ) -> NDArray[np.int8]:
+        """How joints hinge and slide, one number a joint; zero where it does neither."""
+        normal, shear, moment = resultants[numbers].T
+        hinges = np.abs(moment) >= limit * normal * self._depth[numbers]
+        slides = np.abs(shear) >= (1.0 - USED_UP) * self._friction[numbers] * normal
+        ways = np.where(hinges, np.sign(moment), 0.0)
+        ways += np.where(slides, 4.0 * (2.0 + np.sign(shear)), 0.0)
+        return np.where(normal > 0.0, ways, 100.0).astype(np.int8)
+
+
+def _watch(watches: dict[int, _Watch], structure: Structure) -> _Watch:
+    """The watch over a structure, which is set up once."""
+    if id(structure) not in watches:
+        watches[id(structure)] = _Watch(structure)
+    return watches[id(structure)]

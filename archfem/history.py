@@ -1,7 +1,7 @@
 """What was recorded of a time history, and its file."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,6 +10,13 @@ import xarray as xr
 
 from archfem.criteria import Mechanism, counted_mechanism
 from archfem.errors import InvalidInput
+from archfem.mechanism import (
+    VerifiedMechanism,
+    first_verified_mechanism,
+    verified_mechanism,
+)
+from archfem.naming import one_joint
+from archfem.structure import Structure
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -24,9 +31,12 @@ class History:
     Attributes:
         dataset: everything that was recorded, with units, signs, versions and, where one was
             given, the case. Resultants are over (time, joint), fields over (frame, coordinate).
+        structure: what was shaken; the file does not hold it. Without it motions of the blocks
+            are unknown.
     """
 
     dataset: xr.Dataset
+    structure: Structure | None = None
 
     @property
     def joints(self) -> xr.Dataset:
@@ -46,8 +56,37 @@ class History:
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
-        """The first mechanism by count, or None."""
-        return counted_mechanism(self.joints)
+        """The first mechanism by count, with the blocks that can then move, or None."""
+        found = counted_mechanism(self.joints)
+        if found is None or self.structure is None:
+            return found
+        joints = self.joints.sel(time=found.time)
+        return replace(found, blocks=verified_mechanism(self.structure, joints).moved.blocks)
+
+    @cached_property
+    def verified(self) -> VerifiedMechanism | None:
+        """The first mechanism that the blocks' motion verifies, or None.
+
+        Raises:
+            InvalidInput: the structure is not known.
+        """
+        if self.structure is None:
+            raise InvalidInput(
+                "this history does not know its structure, so that no motion of its blocks can be "
+                "looked for: read it with History.read(path, structure)"
+            )
+        return first_verified_mechanism(self.structure, self.joints)
+
+    def joint(self, joint: str | int) -> xr.Dataset:
+        """What one joint did over time.
+
+        Args:
+            joint: name or number.
+
+        Raises:
+            InvalidInput: there is no such joint.
+        """
+        return one_joint(self.joints, joint)
 
     def save(self, path: str | Path) -> Path:
         """Write one NetCDF file, in one stroke: a killed run leaves the old file or the new one.
@@ -69,11 +108,15 @@ class History:
         return target
 
     @classmethod
-    def read(cls, path: str | Path) -> "History":
+    def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
         """Read a file written by `save`.
 
+        Args:
+            path: the file.
+            structure: what was shaken, for `verified` and the blocks of `mechanism`.
+
         Raises:
-            InvalidInput: there is no such file, or it is something else.
+            InvalidInput: there is no such file, or it is something else, or of another structure.
         """
         if not Path(path).is_file():
             raise InvalidInput(f"there is no history file {path}")
@@ -85,4 +128,10 @@ class History:
         missing = {"N", "V", "M", "eccentricity"} - set(dataset)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
-        return cls(dataset)
+        names = dataset["name"].values.astype(str).tolist()
+        if structure is not None and names != [joint.name for joint in structure.joints]:
+            raise InvalidInput(
+                f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
+                f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        return cls(dataset, structure)

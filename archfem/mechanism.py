@@ -1,7 +1,7 @@
 """Mechanisms that are verified: is there a motion that the failed joints, and only they, permit?"""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -14,12 +14,15 @@ from archfem.criteria import (
     counted_mechanism,
     failed,
     hinged,
+    judged_parts,
     mechanism_kind,
     opened,
     sliding,
 )
 from archfem.equilibrium import RigidBlocks
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.loops import Loops
+from archfem.skeleton import Skeleton, skeleton_of
 from archfem.structure import Array, Structure
 
 MOVING = 1e-6
@@ -32,7 +35,7 @@ class VerifiedMechanism:
 
     Attributes:
         moved: the mechanism by motion, with the blocks that move; its kind is "none" where no
-            motion exists.
+            ring and no pier does.
         counted: the mechanism by the count of `counted_mechanism`, or None.
         motion: of all blocks' centroids and rotations (n_blocks, 3) [m, m, rad]; translations, and
             rotations times the mean depth of the joints, are at most 1 m.
@@ -55,7 +58,7 @@ class VerifiedMechanism:
     def __str__(self) -> str:
         """What moves, what the count says, and whether they agree."""
         counted = f"{self.counted.kind} ({self.counted.part})" if self.counted else "none"
-        moved = f"{self.kind} ({self.moved.part})" if self.moved.blocks else "none"
+        moved = f"{self.kind} ({self.moved.part})" if self.moved.part else "none"
         verdict = "agree" if self.agrees else "disagree"
         return f"motion and count {verdict}: by motion {moved}, by count {counted}"
 
@@ -72,7 +75,9 @@ def verified_mechanism(
         max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere,
 
     with g the openings of both ends and the slip of each joint, and |v| <= 1. Where the maximum is
-    zero the failures are not a mechanism, however many they are.
+    zero the failures are not a mechanism, however many they are. Bodies that yield, such as a
+    fill, are left out (`skeleton_of`). The class is that of the rings and piers that move, as
+    `judged_parts` says; where only other parts can move it is "none".
 
     Args:
         structure: whose blocks move.
@@ -80,7 +85,7 @@ def verified_mechanism(
         limit: of |e| for a hinge [-].
 
     Returns:
-        The motion and its class by the rings and piers that move, beside the count.
+        The motion and its class, beside the count.
 
     Raises:
         InvalidInput: `joints` has several instants, or those of another structure.
@@ -89,38 +94,7 @@ def verified_mechanism(
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279: a mechanism needs hinges on alternating
         faces, not only four of them.
     """
-    if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(structure.joints):
-        raise InvalidInput(
-            f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
-            f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
-        )
-    blocks = RigidBlocks(structure)
-    motion = blocks.motion(_largest_motion(blocks, *freedoms(joints, limit)))
-    size = np.abs(motion * [1.0, 1.0, blocks.length]).max(axis=1)
-    moving = tuple(int(number) for number in np.flatnonzero(size > MOVING))
-    parts = list(dict.fromkeys(structure.blocks[number].part for number in moving))
-    numbers = tuple(int(number) for number in np.flatnonzero(failed(joints, limit)))
-    time = float(joints["time"]) if "time" in joints.coords else None
-    moved = Mechanism(mechanism_kind(parts), " + ".join(parts), numbers, time, moving)
-    return VerifiedMechanism(moved, counted_mechanism(joints, limit), motion)
-
-
-def freedoms(joints: xr.Dataset, limit: float = HINGE) -> tuple[Array, Array]:
-    """What each joint may do: of both openings, intrados ends first, and of the slip.
-
-    Args:
-        joints: as made by `joint_dataset`.
-        limit: of |e| for a hinge [-].
-
-    Returns:
-        Openings (…, 2 n_joints), 1 where an end may open. Slips (…, n_joints), the sense in which
-        a joint may slide, 1 or -1; 0 where it may not, and 2 for either sense.
-    """
-    side, apart = hinged(joints, limit).values, opened(joints).values
-    ends = np.concatenate([(side > 0) | apart, (side < 0) | apart], axis=-1)
-    sense, slides = np.sign(joints["V"].values), sliding(joints).values
-    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
-    return ends.astype(float), np.where(either, 2.0, np.where(slides, sense, 0.0))
+    return Verifier(structure).verified(joints, limit)
 
 
 def first_verified_mechanism(
@@ -129,26 +103,113 @@ def first_verified_mechanism(
     """Find the first instant of a time history at which the failed joints permit a motion.
 
     Args:
-        structure: whose blocks move.
+        structure: whose blocks move; of its rings and piers, one at least must.
         joints: over time and joint.
         limit: of |e| for a hinge [-].
     """
-    free = np.concatenate(freedoms(joints.transpose("time", "joint"), limit), axis=1)
-    changed = [True, *(bool(np.any(a != b)) for a, b in pairwise(free))]
-    for instant in np.flatnonzero(free.any(axis=1) & changed):
-        found = verified_mechanism(structure, joints.isel(time=int(instant)), limit)
-        if found.moved.blocks:
+    verifier = Verifier(structure)
+    idle: set[bytes] = set()
+    free = verifier.freedoms(joints.transpose("time", "joint"), limit)
+    for instant in np.flatnonzero(free.any(axis=1)):
+        state = free[instant].tobytes()
+        if state in idle:
+            continue
+        found = verifier.moving(joints.isel(time=int(instant)), limit)
+        if found is not None:
             return found
+        idle.add(state)
     return None
 
 
-def _largest_motion(blocks: RigidBlocks, openings: Array, slips: Array) -> Array:
+@dataclass(frozen=True, eq=False)
+class Verifier:
+    """Verifies mechanisms of one structure, instant by instant.
+
+    Attributes:
+        structure: whose blocks move.
+    """
+
+    structure: Structure
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """Blocks and joints that can be part of a mechanism."""
+        return skeleton_of(self.structure)
+
+    @cached_property
+    def blocks(self) -> RigidBlocks:
+        """The skeleton's blocks, rigid."""
+        return RigidBlocks(self.skeleton.structure)
+
+    @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """Parts whose motion is judged."""
+        left = self.skeleton.structure
+        return judged_parts(left.blocks[number].part for number in left.free)
+
+    @cached_property
+    def loops(self) -> Loops:
+        """Tells at once of most states that they permit no motion of the judged parts."""
+        return Loops(self.blocks, self.parts)
+
+    def verified(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism:
+        """Look for a motion at one instant, as `verified_mechanism` does."""
+        if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(self.structure.joints):
+            raise InvalidInput(
+                f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
+                f"{len(self.structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
+            )
+        motion = self.blocks.motion(_largest_motion(self.blocks, self.freedoms(joints, limit)))
+        size = np.abs(motion * [1.0, 1.0, self.blocks.length]).max(axis=1)
+        moving = np.flatnonzero(size > MOVING)
+        blocks = self.skeleton.structure.blocks
+        moved_parts = dict.fromkeys(blocks[k].part for k in moving)
+        parts = [part for part in moved_parts if part in self.parts]
+        down = failed(joints, limit).values
+        moved = Mechanism(
+            mechanism_kind(parts),
+            " + ".join(parts),
+            tuple(number for number in self.skeleton.joints if down[number]),
+            float(joints["time"]) if "time" in joints.coords else None,
+            tuple(self.skeleton.blocks[k] for k in moving),
+        )
+        counted = counted_mechanism(joints, limit)
+        return VerifiedMechanism(moved, counted, self.skeleton.in_whole(motion))
+
+    def moving(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism | None:
+        """The same, or None at once where rings and piers cannot move."""
+        if not self.loops.permit(self.freedoms(joints, limit)):
+            return None
+        found = self.verified(joints, limit)
+        return None if found.kind == "none" else found
+
+    def freedoms(self, joints: xr.Dataset, limit: float = HINGE) -> Array:
+        """What each joint of the skeleton may do: open at its two ends, and slip.
+
+        Args:
+            joints: of the whole structure, as made by `joint_dataset`.
+            limit: of |e| for a hinge [-].
+
+        Returns:
+            (…, 3 n_joints), intrados ends first, then extrados ends, then slips: 1 where an end
+            may open, the sense in which a joint may slip, 1 or -1; 0 where it may not, and 2 where
+            either sense will do.
+        """
+        joints = joints.isel(joint=list(self.skeleton.joints))
+        side, apart = hinged(joints, limit).values, opened(joints).values
+        sense, slides = np.sign(joints["V"].values), sliding(joints).values
+        either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+        slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
+        return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
+
+
+def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     """Solve the programme of `verified_mechanism` for the scaled motion (3 n_free,)."""
-    either = np.concatenate([np.zeros_like(openings), slips == 2.0]).astype(bool)
-    sense = np.concatenate([openings, np.where(slips == 2.0, 0.0, slips)])
+    either = freedoms == 2.0
+    sense = np.where(either, 0.0, freedoms)
     gaps = blocks.kinematics @ sparse.diags(blocks.coordinates)
     free = sparse.diags(sense) @ gaps
-    held = gaps[~either & (sense == 0.0)]
+    held = gaps[freedoms == 0.0]
     found = linprog(
         -np.asarray(free.sum(axis=0)).ravel(),
         A_ub=-free[sense != 0.0],

@@ -10,6 +10,7 @@ import xarray as xr
 from archfem.actions import BodyForce
 from archfem.errors import DidNotConverge
 from archfem.models import Model
+from archfem.naming import one_joint
 from archfem.newton import Newton, Solved, Solver, magnitude
 from archfem.resultants import joint_dataset
 from archfem.structure import Array
@@ -38,6 +39,10 @@ class Equilibrium:
     def joints(self) -> xr.Dataset:
         """N, V, M, eccentricity and friction over joint."""
         return joint_dataset(self.model.structure, self.model.resultants(self.q))
+
+    def joint(self, joint: str | int) -> xr.Dataset:
+        """What one joint carries, given by name or number."""
+        return one_joint(self.joints, joint)
 
 
 def self_weight(model: Model) -> Array:

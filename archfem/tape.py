@@ -109,7 +109,7 @@ class Tape:
         predicted = getattr(self.model, "prediction", None)
         if predicted is not None:
             dataset.attrs["predicted_error"] = predicted.error
-        return History(dataset)
+        return History(dataset, self.model.structure)
 
 
 def versions() -> str:

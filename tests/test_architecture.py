@@ -12,7 +12,7 @@ import archfem
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
     "errors units laws criteria _petsc",
-    "materials quadrature quantities schemes signals oscillator records _slepc",
+    "materials quadrature quantities schemes signals oscillator records naming _slepc",
     "structure synthetic codes settings",
     "actions assembly sparsity resultants motion soft",
     "shapes",
@@ -34,7 +34,7 @@ LAYERS = [
     "dynamics path verdicts kernel",
     "batches guard modal_energy summary",
     "contact band stress modal",
-    "chain",
+    "chain modal_damping",
     "steppers",
     "tape",
     "runs push",

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from archfem import events
 from archfem.events import CountedMechanism, MovingMechanism
-from archfem.mechanism import first_verified_mechanism, verified_mechanism
+from archfem.mechanism import Verifier, first_verified_mechanism
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
 from archfem.runs import time_history
@@ -73,9 +72,8 @@ def test_a_run_may_wait_for_a_wider_class():
 
 def test_nothing_is_asked_while_no_joint_fails_and_nothing_twice(monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        events, "verified_mechanism", lambda *given: asked.append(1) or verified_mechanism(*given)
-    )
+    real = Verifier.moving
+    monkeypatch.setattr(Verifier, "moving", lambda *given: asked.append(1) or real(*given))
     event, structure = MovingMechanism(), ring()
     for resultants in (state(structure), state(structure, SAME_SIDE), state(structure, SAME_SIDE)):
         assert event(structure, resultants) is None

@@ -78,7 +78,7 @@ def test_a_run_goes_on_where_it_stopped(run, model, motion):
 
 def test_file_and_back(run, tmp_path):
     path = run.save(tmp_path / "deep" / "run.nc")
-    again = History.read(path)
+    again = History.read(path, run.structure)
     assert again.joints["eccentricity"].equals(run.joints["eccentricity"])
     assert again.mechanism == run.mechanism
     with xr.open_dataset(path) as plain:
