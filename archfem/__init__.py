@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from archfem.actions import BodyForce as BodyForce
 from archfem.actions import PointLoad as PointLoad
 from archfem.actions import Settlement as Settlement
+from archfem.assembly import assembled as assembled
 from archfem.codes import Eurocode8 as Eurocode8
 from archfem.codes import TableSpectrum as TableSpectrum
 from archfem.codes import Tbec2018 as Tbec2018
@@ -35,7 +36,13 @@ from archfem.resultants import thrust_line as thrust_line
 from archfem.schemes import HHT as HHT
 from archfem.schemes import Newmark as Newmark
 from archfem.schemes import Rayleigh as Rayleigh
+from archfem.shapes import Arch as Arch
+from archfem.shapes import Backfill as Backfill
+from archfem.shapes import Paving as Paving
+from archfem.shapes import Pier as Pier
+from archfem.shapes import Sidewall as Sidewall
 from archfem.shapes import arch_on_piers as arch_on_piers
+from archfem.shapes import bridge as bridge
 from archfem.shapes import circular_arch as circular_arch
 from archfem.shapes import column as column
 from archfem.spectra import response_spectrum as response_spectrum
@@ -45,6 +52,7 @@ from archfem.structure import Structure as Structure
 
 if TYPE_CHECKING:
     from archfem.capacity import minimum_thickness as minimum_thickness
+    from archfem.case import Case as Case
     from archfem.events import CountedMechanism as CountedMechanism
     from archfem.history import History as History
     from archfem.ladder import build as build
@@ -64,6 +72,7 @@ __version__ = "0.1.0"
 
 _LATER = {
     "minimum_thickness": "capacity",
+    "Case": "case",
     "CountedMechanism": "events",
     "History": "history",
     "collapse_factor": "limit",

@@ -144,3 +144,75 @@ def test_mesh_command(tmp_path):
     path = tmp_path / "ring.msh"
     assert main(["mesh", str(RING), "--out", str(path), "--set", "model.cells=[2, 2]"]) == 0
     assert np.any(["voussoir 3" in line for line in path.read_text().splitlines()])
+
+
+BASE = """
+[structure]
+shape = "circular_arch"
+radius = 2.95
+thickness = "0.55 m"
+embrace = 159.0
+voussoirs = 17
+
+[analysis]
+damping = { ratio = 0.05, frequencies = ["8 Hz", "16 Hz"] }
+"""
+
+
+def test_a_case_says_only_what_differs_from_its_base(tmp_path):
+    (tmp_path / "ring.toml").write_text(BASE)
+    (tmp_path / "by_span.toml").write_text(
+        'base = "ring.toml"\nwithout = ["structure.radius", "structure.embrace"]\n'
+        "[structure]\nspan = 4.0\nrise = 1.5\n[analysis.damping]\nratio = 0.02\n"
+    )
+    case = Case.read(tmp_path / "by_span.toml", ["structure.voussoirs=9"])
+    settings = tomllib.loads(case.text())
+    assert settings["structure"] == {
+        "shape": "circular_arch",
+        "thickness": "0.55 m",
+        "voussoirs": 9,
+        "span": 4.0,
+        "rise": 1.5,
+    }
+    assert case.damping.ratio == 0.02
+    assert case.damping.frequencies == (8.0, 16.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('base = "nothing.toml"', "there is no case file"),
+        ('base = "case.toml"', "is its own base"),
+        ("base = 3", "not the name of a file"),
+        ('base = "ring.toml"\nwithout = ["structure.rise"]', "the base has no such key"),
+        ('base = "ring.toml"\n[structure]\nradios = 3.0', "did you mean 'radius'"),
+    ],
+)
+def test_bases_that_cannot_be_meant(text, says, tmp_path):
+    (tmp_path / "ring.toml").write_text(BASE)
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(InvalidInput, match=says):
+        Case.read(tmp_path / "case.toml")
+
+
+@pytest.mark.parametrize("path", sorted(RING.parent.glob("prusias*.toml")), ids=lambda p: p.stem)
+def test_shipped_bridges(path):
+    structure = Case.read(path).structure
+    parts = {block.part for block in structure.blocks}
+    assert {"north arch", "main arch", "south arch", "north pier", "south pier"} <= parts
+    assert ("paving" in parts) == (path.stem in ("prusias_paving", "prusias_restored"))
+    assert structure.joints[structure.joint_number("main arch, joint 5")].part == "main arch"
+
+
+def test_a_table_of_parts_says_what_holds_for_all_of_them():
+    case = Case.read(
+        "meshes/prusias.toml",
+        ["structure.piers.height=2.8", "structure.piers.south pier.height=2.4"],
+    )
+    lowest = {
+        part: min(
+            y for block in case.structure.blocks if block.part == part for _, y in block.outline
+        )
+        for part in ("north pier", "south pier")
+    }
+    assert lowest["north pier"] - lowest["south pier"] == pytest.approx(-0.4)
