@@ -206,7 +206,7 @@ def test_shipped_bridges(path):
 
 def test_a_table_of_parts_says_what_holds_for_all_of_them():
     case = Case.read(
-        "meshes/prusias.toml",
+        RING.with_name("prusias.toml"),
         ["structure.piers.height=2.8", "structure.piers.south pier.height=2.4"],
     )
     lowest = {
