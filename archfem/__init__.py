@@ -60,6 +60,8 @@ if TYPE_CHECKING:
     from archfem.limit import stands as stands
     from archfem.matching import matched as matched
     from archfem.mechanism import verified_mechanism as verified_mechanism
+    from archfem.modal import modes as modes
+    from archfem.modal_damping import effective_damping as effective_damping
     from archfem.newton import Newton as Newton
     from archfem.push import pushover as pushover
     from archfem.runs import Record as Record
@@ -80,6 +82,8 @@ _LATER = {
     "matched": "matching",
     "verified_mechanism": "mechanism",
     "build": "ladder",
+    "modes": "modal",
+    "effective_damping": "modal_damping",
     "Newton": "newton",
     "pushover": "push",
     "Record": "runs",

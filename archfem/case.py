@@ -17,7 +17,7 @@ from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
 from archfem.plans import planned
-from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
+from archfem.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
 from archfem.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.structure import Structure
 from archfem.suite import Suite
@@ -31,7 +31,7 @@ MODEL = {
     "points": int,
     "tolerance": "1",
 }
-DAMPING = {"ratio": "1", "frequencies": ["Hz"], "joints": str}
+DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 OUTPUT = {"every": int, "fields_every": int, "joints": [int], "animation": bool}
 SECTIONS = (
@@ -126,18 +126,20 @@ class Case:
         return case
 
     @property
-    def damping(self) -> Rayleigh | None:
-        """Damping of the time history."""
+    def damping(self) -> Rayleigh | EffectiveRayleigh | None:
+        """Damping of the time history; its frequencies may be left to the modes."""
         if "damping" not in self.analysis:
             return None
-        given = self.analysis["damping"]
-        missing = {"ratio", "frequencies"} - set(given)
-        if missing or len(given["frequencies"]) != 2:
-            raise InvalidInput(
-                f"analysis.damping = {given}: give a ratio and two frequencies, e.g. "
-                "{ ratio = 0.05, frequencies = [8.0, 16.0] }"
-            )
-        return Rayleigh(given["ratio"], tuple(given["frequencies"]), given.get("joints", "closed"))
+        given = dict(self.analysis["damping"])
+        if set(given) - {"joints", "share"} == {"ratio", "modes"}:
+            if given.pop("modes") == "effective":
+                return EffectiveRayleigh(**given)
+        elif set(given) - {"joints"} == {"ratio", "frequencies"} and len(given["frequencies"]) == 2:
+            return Rayleigh(**{**given, "frequencies": tuple(given["frequencies"])})
+        raise InvalidInput(
+            f"analysis.damping = {self.analysis['damping']}: give a ratio and two frequencies, "
+            'e.g. { ratio = 0.05, frequencies = [8.0, 16.0] }, or modes = "effective" for them'
+        )
 
     @property
     def scheme(self) -> Scheme:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from archfem.case import Case
 from archfem.errors import DidNotConverge
 from archfem.motion import Motion
+from archfem.schemes import Rayleigh
 
 if TYPE_CHECKING:
     from archfem.history import History
@@ -45,6 +46,7 @@ def motion(given: argparse.Namespace) -> None:
 
 def accuracy(given: argparse.Namespace) -> None:
     """Run a case over rungs, meshes, rules and steps: table and picture."""
+    from archfem.analysis import expected_damping
     from archfem.tradeoff import accuracy as compared
     from archfem.view.style import save
     from archfem.view.tradeoff import draw_accuracy
@@ -53,7 +55,7 @@ def accuracy(given: argparse.Namespace) -> None:
     found = compared(
         case.structure,
         case.ground_motion(),
-        damping=case.damping,
+        damping=expected_damping(case),
         tolerance=case.model.get("tolerance", 0.005),
     )
     chosen = found.chosen.setting.label if found.chosen else "none: a finer model is needed"
@@ -82,6 +84,7 @@ def mesh(given: argparse.Namespace) -> None:
 
 def run(given: argparse.Namespace) -> None:
     """Find the dead load of a case and run its time histories: tables and pictures."""
+    from archfem.analysis import damping_of
     from archfem.view.results import write_dead, write_run
 
     case, folder = Case.read(given.case, given.changes), Path(given.out)
@@ -89,15 +92,17 @@ def run(given: argparse.Namespace) -> None:
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     dead = _dead_load(case)
     _tell_written([write_dead(dead, folder)])
+    damping, how = damping_of(case, dead)
+    print(how)
     if case.suite is not None:
-        _run_suite(case, dead, folder)
+        _run_suite(case, dead, damping, folder)
     elif case.motion is not None:
-        run = _shake(case, case.ground_motion(), dead, folder=folder)
+        run = _shake(case, case.ground_motion(), dead, damping, folder=folder)
         _tell(run, dead, folder)
         _tell_written(write_run(case, run, dead, folder))
 
 
-def _run_suite(case: Case, dead: "Equilibrium", folder: Path) -> None:
+def _run_suite(case: Case, dead: "Equilibrium", damping: Rayleigh | None, folder: Path) -> None:
     """Run all pairs of a suite, each to its own folder; those finished before are kept."""
     from archfem.analysis import complete
     from archfem.summary import pair_table
@@ -108,7 +113,8 @@ def _run_suite(case: Case, dead: "Equilibrium", folder: Path) -> None:
     _tell_written(write_suite(suite, case.target, folder))
     runs: dict[str, History] = {}
     for motion in suite.motions:
-        run = _run_pair(case.alone(motion.name), motion, dead, folder=folder / motion.name)
+        alone, own = case.alone(motion.name), folder / motion.name
+        run = _run_pair(alone, motion, dead, damping, folder=own)
         runs[motion.name] = run
         if run.outcome.startswith("interrupted"):
             break
@@ -127,7 +133,9 @@ def _run_suite(case: Case, dead: "Equilibrium", folder: Path) -> None:
         )
 
 
-def _run_pair(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
+def _run_pair(
+    case: Case, motion: Motion, dead: "Equilibrium", damping: Rayleigh | None, *, folder: Path
+) -> "History":
     """Run one pair, or take what an earlier command left of it; a failed step ends the pair only.
 
     Raises:
@@ -145,7 +153,7 @@ def _run_pair(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) 
     else:
         summary.unlink(missing_ok=True)
         try:
-            run = _shake(case, motion, dead, folder=folder)
+            run = _shake(case, motion, dead, damping, folder=folder)
         except DidNotConverge as error:
             if error.history is None:
                 raise
@@ -176,13 +184,15 @@ def _dead_load(case: Case) -> "Equilibrium":
     return dead
 
 
-def _shake(case: Case, motion: Motion, dead: "Equilibrium", *, folder: Path) -> "History":
+def _shake(
+    case: Case, motion: Motion, dead: "Equilibrium", damping: Rayleigh | None, *, folder: Path
+) -> "History":
     """Run a time history and keep it in its folder, also where it fails."""
     from archfem.analysis import shaken
 
     start = perf_counter()
     try:
-        run = shaken(case, motion, dead)
+        run = shaken(case, motion, dead, damping)
     except DidNotConverge as error:
         if error.history is not None:
             error.history.save(folder / "history.nc")

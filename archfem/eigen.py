@@ -24,7 +24,9 @@ APART = 1e-6
 ITERATIONS = 200
 
 
-def lowest(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int) -> tuple[Array, Array]:
+def lowest(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
+) -> tuple[Array, Array]:
     """Find the lowest ω² and their shapes, so that φᵀ M φ = 1.
 
     Args:

@@ -113,8 +113,9 @@ def _tangent(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:
 
 def _sense(shapes: Array, participation: Array, masses: Array) -> Array:
     """Sign of each shape, 1 or -1 (k,)."""
-    first = np.argmax(np.abs(shapes) >= 0.5 * np.abs(shapes).max(axis=0), axis=0)
-    leading = np.vstack([participation.T, shapes[first, np.arange(shapes.shape[1])]])
-    seen = np.vstack([participation.T**2 >= SEEN * masses[:, None], np.ones(shapes.shape[1], bool)])
-    chosen = np.take_along_axis(leading, np.argmax(seen, axis=0)[None], axis=0)[0]
-    return np.where(chosen < 0.0, -1.0, 1.0)
+    sizeable = np.abs(shapes) >= 0.5 * np.abs(shapes).max(axis=0)
+    sense = shapes[np.argmax(sizeable, axis=0), np.arange(shapes.shape[1])]
+    for axis in (1, 0):
+        along = participation[:, axis]
+        sense = np.where(along**2 / masses[axis] >= SEEN, along, sense)
+    return np.where(sense < 0.0, -1.0, 1.0)

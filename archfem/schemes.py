@@ -7,6 +7,9 @@ from archfem.errors import InvalidInput
 
 JOINTS = ("closed", "initial", "none")
 
+EFFECTIVE = 0.05
+"""Share of the mass along an axis from which a mode counts: EN 1998-1, 4.3.3.3.1(3)."""
+
 
 @dataclass(frozen=True)
 class Rayleigh:
@@ -49,6 +52,31 @@ class Rayleigh:
     def stiffness(self) -> float:
         """Coefficient of the stiffness matrix [s]."""
         return self.ratio / (pi * sum(self.frequencies))
+
+
+@dataclass(frozen=True)
+class EffectiveRayleigh:
+    """Rayleigh damping whose frequencies are yet to be found, for want of a model.
+
+    Attributes:
+        ratio: at the first and the last mode effective along x [-].
+        joints: what the stiffness part acts on, as in `Rayleigh`.
+        share: of the mass along x that makes a mode effective [-].
+    """
+
+    ratio: float
+    joints: str = "closed"
+    share: float = EFFECTIVE
+
+    def __post_init__(self) -> None:
+        """Refuse what could not become damping."""
+        self.between((1.0, 2.0))
+        if not 0.0 < self.share < 1.0:
+            raise InvalidInput(f"share {self.share} of the mass is not between 0 and 1")
+
+    def between(self, frequencies: tuple[float, float]) -> Rayleigh:
+        """The damping, once the two frequencies are known [Hz]."""
+        return Rayleigh(self.ratio, frequencies, self.joints)
 
 
 @dataclass(frozen=True)

@@ -194,8 +194,8 @@ def test_pairs_are_run_again_where_their_files_have_changed(tmp_path):
 def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys, monkeypatch):
     whole = analysis.shaken
 
-    def broken_off(case, motion, dead):
-        history = whole(case, motion, dead)
+    def broken_off(case, motion, *given):
+        history = whole(case, motion, *given)
         if motion.name == "second":
             history.dataset.attrs["outcome"] = "interrupted at 0.5 s"
         return history
@@ -213,8 +213,8 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys, 
 def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys, monkeypatch):
     whole = analysis.shaken
 
-    def failing(case, motion, dead):
-        history = whole(case, motion, dead)
+    def failing(case, motion, *given):
+        history = whole(case, motion, *given)
         if motion.name == "first":
             history.dataset.attrs["outcome"] = "failed at 0.5 s: no equilibrium"
             raise DidNotConverge("no equilibrium", history=history)
