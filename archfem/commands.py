@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from archfem.case import Case
+from archfem.criteria import judged
 from archfem.errors import DidNotConverge
 from archfem.motion import Motion
 from archfem.schemes import Rayleigh
@@ -170,16 +171,16 @@ def _dead_load(case: Case) -> "Equilibrium":
     print(case.title)
     start = perf_counter()
     dead = at_rest(case)
-    model, worst = dead.model, abs(dead.joints["eccentricity"])
+    model, joints = dead.model, judged(dead.joints)
     print(
         f"model: {model.fidelity}, {len(case.structure.free)} blocks, "
         f"{len(case.structure.joints)} joints, {model.size} coordinates "
         f"({perf_counter() - start:.2f} s with the dead load)"
     )
     print(
-        f"dead load: |e| ≤ {float(worst.max()):.3f}, "
-        f"V/N ≤ {float(dead.joints['friction'].max()):.3f}, "
-        f"N ≥ {float(dead.joints['N'].min()) / 1e3:.2f} kN"
+        f"dead load: |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
+        f"V/N ≤ {float(joints['friction'].max()):.3f}, "
+        f"N ≥ {float(joints['N'].min()) / 1e3:.2f} kN"
     )
     return dead
 
@@ -208,19 +209,10 @@ def _shake(
 
 
 def _tell(run: "History", dead: "Equilibrium", folder: Path) -> None:
-    """Print the table of joints and the mechanism, and keep them as text."""
-    from archfem.summary import joint_table
+    """Print the table of joints and the mechanisms, and keep them as text."""
+    from archfem.summary import joint_table, verdict
 
-    found = run.mechanism
-    lines = [joint_table(run.joints, dead.joints), ""]
-    if found is None:
-        lines.append("no mechanism: never four failed joints at once in one part")
-    else:
-        lines.append(
-            f"{found.kind} mechanism by count at {found.time:.3f} s: "
-            f"joints {', '.join(map(str, found.joints))} of {found.part}"
-        )
-    text = "\n".join(lines)
+    text = f"{joint_table(run.joints, dead.joints)}\n\n{verdict(run)}"
     (folder / "summary.txt").write_text(text + "\n", encoding="utf-8")
     print(text)
 

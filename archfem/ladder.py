@@ -14,6 +14,7 @@ from scipy.sparse.linalg import eigsh
 
 from archfem.actions import BodyForce
 from archfem.contact import LARGEST
+from archfem.criteria import judged
 from archfem.errors import DidNotConverge
 from archfem.models import Model
 from archfem.models import build as plain
@@ -180,8 +181,8 @@ def choose(
 
 
 def envelope(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
-    """Largest |e| of each joint over a run (n_joints,); 0.5 where it came apart."""
-    joints = time_history(model, motion, damping=damping, dt=dt).joints
+    """Largest |e| of each joint that is judged over a run (n,); 0.5 where it came apart."""
+    joints = judged(time_history(model, motion, damping=damping, dt=dt).joints)
     return abs(joints["eccentricity"]).fillna(0.5).max("time").values
 
 
@@ -253,7 +254,7 @@ def _probe(structure: Structure) -> Motion:
         middle = 0.5 * (low + high)
         try:
             joints = equilibrium(model, weight + model.load(BodyForce(middle))).joints
-            severe = float(abs(joints["eccentricity"]).max()) > SEVERE
+            severe = float(abs(judged(joints)["eccentricity"]).max()) > SEVERE
         except DidNotConverge:
             severe = True
         low, high = (low, middle) if severe else (middle, high)

@@ -20,6 +20,7 @@ from archfem.equilibrium import (
 )
 from archfem.errors import InvalidInput
 from archfem.resultants import joint_dataset
+from archfem.skeleton import yielding_blocks
 from archfem.sliding import without_dilatancy
 from archfem.structure import Array, Structure
 
@@ -131,7 +132,8 @@ def collapse_factor(
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
 
     Raises:
-        InvalidInput: an option is unknown, or an action misses the structure.
+        InvalidInput: an option is unknown, an action misses the structure, or bodies such as a
+            fill cannot be taken as rigid.
         DidNotConverge: the iteration for sliding joints did not settle.
 
     Note:
@@ -198,9 +200,21 @@ def _checked(friction: str | None, strength: float | None) -> None:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
 
 
+def _check_stiff(structure: Structure) -> None:
+    """Refuse bodies that cannot be taken as rigid: they would hold what lies under them."""
+    names = [structure.blocks[number].name for number in yielding_blocks(structure)]
+    if names:
+        raise InvalidInput(
+            f"blocks {names} are softer than the joints around them: rigid, they would hold every "
+            "ring below; build the structure without them, with their weight as point loads, or "
+            "push a finite-element model over, in which they deform"
+        )
+
+
 def _self_weight(structure: Structure, friction: str | None, strength: float | None) -> Programme:
     """Programme whose load is the self-weight, with nothing asked of it."""
     _checked(friction, strength)
+    _check_stiff(structure)
     blocks = RigidBlocks(structure)
     limits = no_limits(len(blocks.depths))
     if friction is not None:

@@ -5,22 +5,41 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import HINGE, envelope, first_time, hinged, longest_duration, opened, sliding
+from archfem.criteria import (
+    HINGE,
+    Mechanism,
+    envelope,
+    first_time,
+    hinged,
+    judged,
+    longest_duration,
+    opened,
+    sliding,
+)
 from archfem.history import History
 from archfem.matching import Match
 from archfem.measures import measures
 from archfem.motion import Motion
 from archfem.units import STANDARD_GRAVITY
 
+SHOWN = 8
+"""Names in a list, beyond which those in the middle are left out."""
+
 
 def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None, limit: float = HINGE) -> str:
     """One line a joint: envelope, and when and how long it hinged, slid and was open.
+
+    Only joints that are `judged` have a line.
 
     Args:
         joints: over time and joint.
         dead: over joint, under dead load alone.
         limit: of |e| for a hinge [-].
     """
+    joints = judged(joints)
+    rest = np.full(joints.sizes["joint"], np.nan)
+    if dead is not None:
+        rest = judged(dead)["eccentricity"].values
     span = envelope(joints)
     flags = {
         "hinge": hinged(joints, limit) != 0,
@@ -36,8 +55,7 @@ def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None, limit: float
     rows = []
     for k, name in enumerate(joints["name"].values):
         numbers = [span[key].values[k] for key in ("lowest", "highest", "friction")]
-        rest = np.nan if dead is None else float(dead["eccentricity"][k])
-        cells = [str(name), *(_number(x) for x in (rest, *numbers))]
+        cells = [str(name), *(_number(x) for x in (rest[k], *numbers))]
         for key in flags:
             start, longest = times[key][k]
             cells += [_seconds(start), _seconds(longest) if longest > 0.0 else "-"]
@@ -52,13 +70,15 @@ def pair_table(runs: Mapping[str, History]) -> str:
         runs: what to call each run, and the run.
     """
     head = ["pair", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"]
-    head += ["mechanism", "at", "joints", "end"]
+    head += ["by count", "at", "joints", "verified", "at", "end"]
     rows = []
     for name, run in runs.items():
-        size = abs(run.joints["eccentricity"])
-        apart = opened(run.joints).any("time")
+        joints = judged(run.joints)
+        size = abs(joints["eccentricity"])
+        apart = opened(joints).any("time")
         worst = size.max("time").where(~apart, 0.5)
         found = run.mechanism
+        moved = run.verified.moved if run.structure is not None and run.verified else None
         level, upright = np.abs(run.dataset["ground"].values).max(axis=0)
         rows.append(
             [
@@ -66,16 +86,55 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 f"{level:.2f} m/s²",
                 f"{upright:.2f} m/s²",
                 _number(float(size.max())),
-                str(run.joints["joint"].values[int(worst.values.argmax())]),
-                _number(float(run.joints["friction"].max())),
+                str(joints["joint"].values[int(worst.values.argmax())]),
+                _number(float(joints["friction"].max())),
                 f"{int(apart.sum())} joints" if apart.any() else "-",
-                found.kind if found else "none",
-                _seconds(np.nan if found is None or found.time is None else found.time),
+                *_class_and_time(found),
                 " ".join(map(str, found.joints)) if found else "-",
+                *(("unknown", "-") if run.structure is None else _class_and_time(moved)),
                 f"{run.outcome.split()[0]} {run.time[-1]:.2f} s",
             ]
         )
     return aligned(head, rows)
+
+
+def verdict(run: History) -> str:
+    """What a run's mechanisms are: a line for the first by count, one for the first verified."""
+    found = run.mechanism
+    if found is None:
+        lines = ["no mechanism by count: never four failed joints at once in rings and piers"]
+    else:
+        lines = [f"by count: {_told(found, run)}"]
+    if run.structure is None:
+        return lines[0]
+    moved = run.verified
+    if moved is None:
+        lines.append("no verified mechanism: at no instant could rings or piers move")
+    else:
+        lines.append(f"verified: {_told(moved.moved, run)}")
+    return "\n".join(lines)
+
+
+def _told(found: Mechanism, run: History) -> str:
+    """A mechanism in words."""
+    words = (
+        f"{found.kind} mechanism of {found.part} at {found.time:.3f} s, "
+        f"joints {_shortened(list(map(str, found.joints)), ', ')}"
+    )
+    if run.structure is None:
+        return words
+    names = [run.structure.blocks[k].name for k in found.blocks]
+    if not names:
+        return f"{words}; no block can move then"
+    return f"{words}; moving: {_shortened(names, '; ')}"
+
+
+def _shortened(words: Sequence[str], comma: str) -> str:
+    """A list in words, without its middle where it is long."""
+    if len(words) <= SHOWN:
+        return comma.join(words)
+    half = SHOWN // 2
+    return f"{comma.join([*words[:half], '…', *words[-half:]])} ({len(words)} in all)"
 
 
 def motion_table(motions: Sequence[Motion]) -> str:
@@ -150,6 +209,13 @@ def aligned(head: list[str], rows: list[list[str]]) -> str:
         ).rstrip()
         for row in [head, *rows]
     )
+
+
+def _class_and_time(found: Mechanism | None) -> tuple[str, str]:
+    """Two cells of a table."""
+    if found is None or found.time is None:
+        return "none", "-"
+    return found.kind, _seconds(found.time)
 
 
 def _number(value: float) -> str:

@@ -1,0 +1,56 @@
+"""When a run first meets a mechanism, by each of the definitions in use."""
+
+import numpy as np
+import xarray as xr
+
+from archfem.criteria import HINGE, Mechanism, counted_mechanism, part_role
+from archfem.errors import InvalidInput
+from archfem.history import History
+from archfem.mechanism import first_verified_mechanism
+
+DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
+"""Definitions of a mechanism, in the order of tables."""
+
+
+def first_mechanisms(run: History, limit: float = HINGE) -> dict[str, Mechanism | None]:
+    """Find the first mechanism of a run by each definition.
+
+    - "any four joints": four joints of rings and piers, anywhere, hinge or slide at once;
+    - "four in a ring": four of one ring do, whatever else fails (local);
+    - "ring and pier": four of one ring and one pier do, at least one of each (semi-global);
+    - "verified": the failed joints permit a motion of rings or piers, however many they are.
+
+    Args:
+        run: which knows its structure.
+        limit: of |e| for a hinge [-].
+
+    Returns:
+        By definition, the mechanism with its time, joints and class, or None.
+
+    Raises:
+        InvalidInput: the structure is not known.
+    """
+    if run.structure is None:
+        raise InvalidInput(
+            "this history does not know its structure, which a verified mechanism needs: read it "
+            "with History.read(path, structure)"
+        )
+    moved = first_verified_mechanism(run.structure, run.joints, limit)
+    found = counted_mechanisms(run.joints, limit)
+    return {**found, "verified": None if moved is None else moved.moved}
+
+
+def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Mechanism | None]:
+    """Find the first mechanism by each of the definitions that count joints.
+
+    Args:
+        joints: over joint, or over time and joint.
+        limit: of |e| for a hinge [-].
+    """
+    part = joints["part"].values.astype(str)
+    rings = np.array([part_role(name) == "ring" for name in part])
+    return {
+        "any four joints": counted_mechanism(joints, limit),
+        "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
+        "ring and pier": counted_mechanism(joints, limit, kinds=("semi-global",)),
+    }
