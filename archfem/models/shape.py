@@ -44,6 +44,12 @@ class Shape:
         edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.cells])
         return edges, np.repeat(self.owner, [len(cell) for cell in self.cells])
 
+    @cached_property
+    def rims(self) -> NDArray[np.intp]:
+        """Edges around the blocks, those of one polygon only (e, 2)."""
+        edges, count = np.unique(np.sort(self._edges[0], axis=1), axis=0, return_counts=True)
+        return edges[count == 1]
+
     def at(self, block: int, point: Array) -> sparse.csr_matrix:
         """Displacement of a point on the surface of a block, from coordinates (2, n).
 

@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from archfem.criteria import hinged, opened, sliding
+from archfem.criteria import hinged, judged, opened, sliding
 from archfem.history import History
+from archfem.view.film import Image
 from archfem.view.shades import Scale
-from archfem.view.stage import Image, Setting
+from archfem.view.stage import Setting
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
 WIDE, DENSE, COARSE = 12.8, 100.0, 60.0
@@ -142,7 +143,8 @@ def _flag(axes: Axes, time: float) -> None:
 
 
 def _sentence(joints: xr.Dataset) -> str:
-    """Time, and how many joints hinge, slide or are open."""
+    """Time, and how many joints that are judged hinge, slide or are open."""
+    joints = judged(joints)
     counts = {
         "hinging": int((hinged(joints) != 0).sum()),
         "sliding": int(sliding(joints).sum()),

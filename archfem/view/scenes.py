@@ -1,11 +1,8 @@
 """Films and stills of a structure that moves: how hinges form."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import imageio.v2 as imageio
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -19,12 +16,11 @@ from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
 from archfem.structure import Array
+from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
 from archfem.view.page import Page
 from archfem.view.shades import check_colour
-from archfem.view.stage import Image, Setting, Stage
-
-SUFFIXES = (".mp4", ".gif")
+from archfem.view.stage import Setting, Stage
 
 SMALLEST = (480, 320)
 """Least width and height of a picture [pixels]: type would not fit into less."""
@@ -64,21 +60,12 @@ def animate(  # noqa: PLR0913  (what is filmed, and how)
     Raises:
         InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
     """
-    target = _checked_path(path)
+    target = film_path(path)
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
     frames, fps = _frames(run.dataset["frame_time"].values, fps, seconds)
     setting = Setting.of(model, run.dataset["q"].values[frames], colour, magnification)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        with _writer(draft, fps) as film:
-            for shot in _shots(_with(setting, mechanism), run, frames, size):
-                film.append_data(shot)
-        os.replace(draft, target)
-    finally:
-        draft.unlink(missing_ok=True)
-    return target
+    return write_film(target, _shots(_with(setting, mechanism), run, frames, size), fps)
 
 
 def picture(
@@ -164,20 +151,6 @@ def _frames(times: Array, fps: float, seconds: float | None) -> tuple[Array, flo
     lasting = seconds or max(float(times[-1] - times[0]), 1.0 / fps)
     count = min(len(times), max(1, round(lasting * fps)))
     return np.linspace(0, len(times) - 1, count).round().astype(int), count / lasting
-
-
-def _writer(path: Path, fps: float) -> Any:
-    """Something that frames can be appended to."""
-    if path.suffix == ".gif":
-        return imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)
-    return imageio.get_writer(path, fps=fps, codec="libx264", quality=8, macro_block_size=2)
-
-
-def _checked_path(path: str | Path) -> Path:
-    """The file, if its suffix is one of a film."""
-    if Path(path).suffix not in SUFFIXES:
-        raise InvalidInput(f"{path} has suffix '{Path(path).suffix}': use one of {SUFFIXES}")
-    return Path(path)
 
 
 def _check_picture(

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from archfem.models import Model
 from archfem.models.shape import Shape
 from archfem.structure import Array
+from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines
 from archfem.view.shades import Scale, scale_for, shade
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
-Image = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
 
 DISC = 0.0125
@@ -108,7 +108,7 @@ class Stage:
         self._pen = max(0.6, size[0] / FULL)
         self._height = 1e-3 * setting.model.structure.size
         self._blocks = _surface(shape)
-        self._edges = _outlines(shape)
+        self._edges = shape.rims
         self._outlines = _lines(self._flat(shape.places, EDGES), self._edges)
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
         self._plotter.background_color = pv.Color("white")
@@ -264,13 +264,6 @@ def _surface(shape: Shape) -> pv.PolyData:
     surface = pv.PolyData(places, faces=listed)
     surface.cell_data["cell"] = np.arange(len(shape.cells))
     return surface.triangulate()
-
-
-def _outlines(shape: Shape) -> Numbers:
-    """Edges around each block: those of one of its cells only (n, 2)."""
-    edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in shape.cells])
-    edges, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    return edges[count == 1]
 
 
 def _lines(points: Array, pairs: Numbers) -> pv.PolyData:
