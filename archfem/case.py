@@ -16,6 +16,7 @@ from archfem import ground
 from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
+from archfem.naming import joint_number
 from archfem.plans import planned
 from archfem.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
 from archfem.settings import Table, change, checked, merged, refuse_unknown, remove
@@ -33,7 +34,7 @@ MODEL = {
 }
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
-OUTPUT = {"every": int, "fields_every": int, "joints": [int], "animation": bool}
+OUTPUT = {"every": int, "fields_every": int, "joints": [(int, str)], "animation": bool}
 SECTIONS = (
     "title",
     "structure",
@@ -122,7 +123,7 @@ class Case:
             settings=dict(settings),
             folder=folder,
         )
-        _ = case.damping, case.scheme
+        _ = case.damping, case.scheme, case.joints
         return case
 
     @property
@@ -140,6 +141,12 @@ class Case:
             f"analysis.damping = {self.analysis['damping']}: give a ratio and two frequencies, "
             'e.g. { ratio = 0.05, frequencies = [8.0, 16.0] }, or modes = "effective" for them'
         )
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Numbers of the joints to draw over time, which the file may name; none if not said."""
+        names = [joint.name for joint in self.structure.joints]
+        return tuple(joint_number(names, joint) for joint in self.output.get("joints", ()))
 
     @property
     def scheme(self) -> Scheme:
