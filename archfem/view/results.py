@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from archfem.case import Case
 from archfem.codes import DesignSpectrum
+from archfem.criteria import judged
 from archfem.history import History
 from archfem.motion import Motion
 from archfem.statics import Equilibrium
@@ -35,8 +36,8 @@ def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list
     Returns:
         The files.
     """
-    worst = abs(run.joints["eccentricity"]).max("time").fillna(0.5)
-    chosen = case.output.get("joints", [int(joint) for joint in worst.argsort()[::-1][:2]])
+    worst = abs(judged(run.joints)["eccentricity"]).max("time").fillna(0.5)
+    chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
     figures = {
         "gravest.png": draw_structure(case.structure, gravest(run)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
@@ -54,7 +55,7 @@ def gravest(run: History) -> xr.Dataset:
     """Joints at the instant of the first mechanism, or of the largest eccentricity."""
     if run.mechanism is not None:
         return run.joints.sel(time=run.mechanism.time, method="nearest")
-    worst = abs(run.joints["eccentricity"]).max("joint")
+    worst = abs(judged(run.joints)["eccentricity"]).max("joint")
     return run.joints.isel(time=int(worst.argmax("time")))
 
 
