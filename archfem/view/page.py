@@ -145,7 +145,6 @@ def _flag(axes: Axes, time: float) -> None:
 def _sentence(joints: xr.Dataset) -> str:
     """Time, and how many joints that are judged hinge, slide or are open."""
     joints = judged(joints)
-    joints = judged(joints)
     counts = {
         "hinging": int((hinged(joints) != 0).sum()),
         "sliding": int(sliding(joints).sum()),
