@@ -1,17 +1,22 @@
 """From blocks to a structure: joints wherever straight edges of two blocks touch."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from archfem.criteria import part_role
-from archfem.errors import InvalidStructure
+from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import Contact
+from archfem.rows import Row, rows_of
 from archfem.structure import TOUCHING, Array, Block, Joint, Structure
 from archfem.units import G
 
 ContactOf = Callable[[Block, Block], Contact]
 """Tells how two blocks touch."""
+
+UPRIGHT = 0.1
+"""Largest inclination of an upright line, horizontal to vertical."""
 
 Touch = tuple[int, int, Array]
 """Two blocks and both ends of a line along which they touch, the left or lower one first."""
@@ -28,14 +33,21 @@ def assembled(
 ) -> Structure:
     """Make a structure of blocks, with a joint along every line on which two of them touch.
 
-    Such a joint is named "one block to other block". Its "intrados" is its left end, or the lower
-    one where it is upright. It belongs to the part of its blocks; between two parts, to that of
-    the block that moves, then to one that is neither ring nor pier, then to the ring.
+    Joints across a ring or a pier come first, named and counted along it: "main arch, joint 0" is
+    its left springing, "north pier, base" its foot, "north pier, joint 1" the next one up. Their
+    intrados is the end nearer the ring's centre, in a pier the left one. Any other joint is named
+    "one block to other block"; its "intrados" is its left end, or the lower one where it is
+    upright.
+
+    A joint belongs to the part of its blocks. Between two parts it belongs to that of the block
+    that moves; then to the ring it lies across, as a springing does, or the pier it carries; then
+    to one that is neither ring nor pier; then to the ring.
 
     Args:
         blocks: in the order they will be numbered.
         contact: of the joints found, or a function of the two blocks.
-        joints: that are given already; their pairs of blocks are left alone.
+        joints: that are given already; their pairs of blocks are left alone, and their parts are
+            not counted.
         width: out of plane [m].
         gravity: acceleration of gravity [m/s²].
         name: of the structure.
@@ -44,20 +56,53 @@ def assembled(
         InvalidStructure: blocks do not hang together.
     """
     known = {frozenset(joint.blocks) for joint in joints}
+    counted = {joint.part for joint in joints}
+    touches = touching(blocks)
+    rows = rows_of(blocks, touches)
     of = contact if callable(contact) else lambda *_: contact
-    found = [touch for touch in touching(blocks) if frozenset(touch[:2]) not in known]
-    pairs = [touch[:2] for touch in found]
-    made = []
-    for k, (a, b, ends) in enumerate(found):
-        first, second = blocks[a], blocks[b]
-        words = f"{first.name} to {second.name}"
-        if pairs.count((a, b)) > 1:
-            words += f", {pairs[: k + 1].count((a, b))}"
-        (x0, y0), (x1, y1) = ends.tolist()
-        made.append(
-            Joint((a, b), (x0, y0), (x1, y1), of(first, second), words, _part(first, second))
-        )
-    return Structure(tuple(blocks), (*joints, *made), width, gravity, name)
+    across: dict[str, list[Joint]] = {part: [] for part in rows}
+    others = []
+    for a, b, ends in touches:
+        if {a, b} not in known:
+            part = _part(blocks[a], blocks[b], ends, rows)
+            made = _joint((a, b), ends, of(blocks[a], blocks[b]), part)
+            if part in rows and part not in counted and rows[part].separates(ends):
+                across[part].append(made)
+            else:
+                others.append(made)
+    lined = [each for part in rows for each in _counted(across[part], part, rows[part], blocks)]
+    made_all = (*joints, *lined, *_named(others, blocks))
+    return Structure(tuple(blocks), made_all, width, gravity, name)
+
+
+def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
+    """Tell how blocks touch by the names of their materials.
+
+    Args:
+        contact: of two blocks of one material.
+        pairs: contacts of two materials, "stone/backfill". Where a pair is missing, its blocks may
+            not touch.
+
+    Raises:
+        InvalidInput: a key is no pair of names.
+    """
+    known = {frozenset(name.strip() for name in key.split("/")): key for key in pairs}
+    for names, key in known.items():
+        if len(names) != 2:
+            raise InvalidInput(f"'{key}' is no pair of two materials: write e.g. stone/backfill")
+
+    def of(a: Block, b: Block) -> Contact:
+        names = frozenset((a.material.name, b.material.name))
+        if len(names) == 1:
+            return contact
+        if names not in known:
+            raise InvalidInput(
+                f"'{a.name}' of {a.material.name} and '{b.name}' of {b.material.name} touch, and "
+                f'of that contact nothing is said: give one for "{"/".join(sorted(names))}"'
+            )
+        return pairs[known[names]]
+
+    return of
 
 
 def touching(blocks: Sequence[Block]) -> list[Touch]:
@@ -100,28 +145,89 @@ def _edges(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
 
 
 def _joined(lines: list[Array], near: float) -> list[Array]:
-    """Lines between two blocks, those that continue one another made one, left ends first."""
-    ordered = [line if _before(line[0], line[1], near) else line[::-1] for line in lines]
-    ordered.sort(key=lambda line: (line[0][0], line[0][1]))
-    whole = ordered[:1]
-    for line in ordered[1:]:
-        arm, step = whole[-1][1] - whole[-1][0], line[1] - line[0]
-        bend = abs(arm[0] * step[1] - arm[1] * step[0]) / np.linalg.norm(arm)
-        if np.linalg.norm(line[0] - whole[-1][1]) <= 2.0 * near and bend <= 2.0 * near:
-            whole[-1] = np.array([whole[-1][0], line[1]])
-        else:
-            whole.append(line)
-    return whole
+    """Lines between two blocks, those that continue one another made one, from left to right."""
+    whole: list[Array] = []
+    for line in lines:
+        apart = []
+        for other in whole:
+            if _continues(line, other, near) or _continues(other, line, near):
+                line = np.array(max(((a, b) for a in line for b in other), key=_distance))
+            else:
+                apart.append(other)
+        whole = [*apart, line]
+    middles = np.array([line.mean(axis=0) for line in whole])
+    order = np.argsort(middles[:, int(np.argmax(np.ptp(middles, axis=0)))], kind="stable")
+    return [_turned(whole[k]) for k in order]
 
 
-def _before(a: Array, b: Array, near: float) -> bool:
-    """Whether a lies to the left of b, or below it on an upright line."""
-    return bool(a[1] < b[1]) if abs(a[0] - b[0]) <= near else bool(a[0] < b[0])
+def _continues(line: Array, other: Array, near: float) -> bool:
+    """Whether a line goes on where another ends, in the same direction."""
+    arm, step = other[1] - other[0], line[1] - line[0]
+    bend = abs(arm[0] * step[1] - arm[1] * step[0]) / np.linalg.norm(arm)
+    return bool(_distance((line[0], other[1])) <= 2.0 * near and bend <= 2.0 * near)
 
 
-def _part(a: Block, b: Block) -> str:
+def _distance(ends: tuple[Array, Array]) -> float:
+    return float(np.linalg.norm(ends[1] - ends[0]))
+
+
+def _turned(line: Array) -> Array:
+    """A line with its left end first, or where it is upright its lower one."""
+    x, y = line[1] - line[0]
+    forward = y > 0.0 if abs(x) <= UPRIGHT * abs(y) else x > 0.0
+    return line if forward else line[::-1]
+
+
+def _part(a: Block, b: Block, line: Array, rows: Mapping[str, Row]) -> str:
     """Part of a joint between two blocks."""
     if a.fixed != b.fixed:
         return b.part if a.fixed else a.part
     rank = {"other": 0, "ring": 1, "pier": 2}
+    for block, other in ((a, b), (b, a)):
+        row, role = rows.get(block.part), part_role(block.part)
+        if row is not None and rank[part_role(other.part)] != rank[role] and row.separates(line):
+            below = other.centroid[1] < line[:, 1].mean()
+            if role == "ring" or (part_role(other.part) == "other" and below):
+                return block.part
     return min((b.part, a.part), key=lambda part: rank[part_role(part)])
+
+
+def _joint(pair: tuple[int, int], ends: Array, contact: Contact, part: str) -> Joint:
+    """A joint still without a name."""
+    (x0, y0), (x1, y1) = ends.tolist()
+    return Joint(pair, (x0, y0), (x1, y1), contact, "", part)
+
+
+def _counted(joints: Sequence[Joint], part: str, row: Row, blocks: Sequence[Block]) -> list[Joint]:
+    """Joints across a row in their order along it, from inside outwards, and with their names."""
+    ordered = sorted(joints, key=lambda joint: row.along(joint.middle))
+    words = [f"joint {k}" for k in range(len(ordered))]
+    if part_role(part) == "pier":
+        ordered.sort(key=lambda joint: not _is_foot(joint, blocks))
+        feet = sum(_is_foot(joint, blocks) for joint in ordered)
+        words = [f"base {k + 1}" for k in range(feet)] if feet > 1 else ["base"]
+        words += [f"joint {k + 1}" for k in range(len(ordered))]
+    found = []
+    for joint, word in zip(ordered, words, strict=False):
+        inner, outer = joint.intrados, joint.extrados
+        if joint.tangent @ row.outward(joint.middle) < 0.0:
+            inner, outer = outer, inner
+        name = f"{part}, {word}" if part else word
+        found.append(replace(joint, intrados=inner, extrados=outer, name=name))
+    return found
+
+
+def _is_foot(joint: Joint, blocks: Sequence[Block]) -> bool:
+    return any(blocks[number].fixed for number in joint.blocks)
+
+
+def _named(joints: Sequence[Joint], blocks: Sequence[Block]) -> list[Joint]:
+    """Joints with names made of those of their blocks, numbered where two have several."""
+    pairs = [joint.blocks for joint in joints]
+    found = []
+    for k, joint in enumerate(joints):
+        words = " to ".join(blocks[number].name for number in joint.blocks)
+        if pairs.count(joint.blocks) > 1:
+            words += f", {pairs[: k + 1].count(joint.blocks)}"
+        found.append(replace(joint, name=words))
+    return found

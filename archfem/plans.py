@@ -1,6 +1,7 @@
 """Structures as tables describe them: shapes and their lengths, materials and contacts by name."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from archfem.errors import InvalidInput
@@ -18,6 +19,7 @@ from archfem.shapes import (
     column,
 )
 from archfem.structure import Structure
+from archfem.survey import Layer, surveyed
 
 COMMON = {"width": "m", "gravity": "m/s**2"}
 RING = {
@@ -49,11 +51,23 @@ BRIDGE = {
     "chords": int,
     **COMMON,
 }
+OUTLINES = {
+    "file": str,
+    "unit": str,
+    "snap": "m",
+    "layers": dict,
+    "contacts": dict,
+    **COMMON,
+}
+LAYER = {"part": str, "material": str, "fixed": bool, "ignore": bool}
+TOUCHING = {"stone/backfill": "soil to stone"}
+"""How blocks of two materials touch, unless the case says otherwise."""
 SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
     "circular_arch": (circular_arch, RING),
     "column": (column, COLUMN),
     "arch_on_piers": (arch_on_piers, PIERS),
     "bridge": (bridge, BRIDGE),
+    "outlines": (surveyed, OUTLINES),
 }
 SEVERAL: dict[str, tuple[Callable[..., Any], Table]] = {
     "arches": (
@@ -87,11 +101,12 @@ MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": 
 CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
 
 
-def planned(settings: Table) -> Structure:
+def planned(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure that a case describes.
 
     Args:
         settings: tables "structure", "materials" and "contacts".
+        folder: where the names of drawings start.
 
     Raises:
         InvalidInput: a shape, key, material or contact is not known, or a value cannot be meant.
@@ -107,6 +122,8 @@ def planned(settings: Table) -> Structure:
     values = checked(given, keys, "structure")
     if name == "bridge":
         values = _parts(values, settings)
+    elif name == "outlines":
+        values = _outlines(values, settings, folder)
     return _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
 
 
@@ -125,6 +142,25 @@ def _parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
         paving = checked(parts["paving"], PAVING, "structure.paving")
         parts["paving"] = _made(Paving, "structure.paving", **paving)
     return parts
+
+
+def _outlines(values: dict[str, Any], settings: Table, folder: Path) -> dict[str, Any]:
+    """A drawing, what is on its layers and how that touches."""
+    if "file" not in values:
+        raise InvalidInput("structure of shape 'outlines' has no file: name the drawing")
+    drawn = dict(values)
+    drawn["path"] = folder / drawn.pop("file")
+    if "layers" in drawn:
+        drawn["layers"] = {
+            name: Layer(**checked(own, LAYER, f"structure.layers.{name}"))
+            for name, own in drawn["layers"].items()
+        }
+    pairs = TOUCHING | drawn.get("contacts", {})
+    named = checked(pairs, dict.fromkeys(pairs, str), "structure.contacts")
+    drawn["contacts"] = {pair: _contact(settings, name) for pair, name in named.items()}
+    names = {*MATERIALS, *settings.get("materials", {})}
+    drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
+    return drawn
 
 
 def _several(make: Callable[..., Any], keys: Table, given: Table, section: str) -> list[Any]:

@@ -1,0 +1,232 @@
+"""Outlines that nearly touch, made to touch: surveys never close exactly.
+
+Vertices nearer to one another than a tolerance become one. A vertex that near to another outline's
+edge is put onto it, and a joint between two blocks that bends no more than that is made straight.
+What then still overlaps, or nearly touches, is an error: it is not clear what was meant.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from archfem.errors import InvalidStructure
+from archfem.structure import TOUCHING, Array
+
+NEARLY = 5.0
+"""Gaps up to so many times the tolerance are taken for faults of the survey."""
+
+Edge = tuple[int, int]
+Loops = list[list[int]]
+
+
+def snapped(
+    outlines: Sequence[Array], names: Sequence[str], snap: float
+) -> tuple[list[Array], float]:
+    """Make outlines touch that nearly do.
+
+    Args:
+        outlines: vertices of each (n, 2), either way round [m].
+        names: of the blocks, for errors.
+        snap: tolerance [m].
+
+    Returns:
+        The outlines, all anticlockwise, and the largest movement of a vertex [m].
+
+    Raises:
+        InvalidStructure: an outline crosses itself, two overlap or are the same, or a gap between
+            two is little wider than the tolerance.
+    """
+    if not snap > 0.0:
+        raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
+    for name, points in zip(names, outlines, strict=True):
+        _check_simple(points, name)
+    turned = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
+    given = np.concatenate(turned)
+    places, number = _merged(turned, snap)
+    parts = np.split(number, np.cumsum([len(points) for points in turned])[:-1])
+    loops = [[int(n) for n, _ in groupby(part)] for part in parts]
+    loops = [loop[:-1] if loop[0] == loop[-1] else loop for loop in loops]
+    ties = _ties(loops, places, snap)
+    ties |= _bends(loops, places, ties, snap)
+    _settle(places, ties)
+    moved = np.linalg.norm(places[number] - given, axis=1)
+    found = [places[loop] for loop in loops]
+    for name, points, loop in zip(names, found, loops, strict=True):
+        if len(loop) < 3:
+            raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
+        _check_simple(points, name)
+    _check_apart(found, loops, names)
+    _check_gaps(places, loops, names, snap)
+    return found, float(moved.max())
+
+
+def _area(points: Array) -> float:
+    """Area of a polygon, positive anticlockwise."""
+    x, y = (points - points[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _check_simple(points: Array, name: str) -> None:
+    """Refuse an outline that crosses or touches itself."""
+    import shapely
+
+    polygon = shapely.Polygon(points)
+    if not polygon.is_valid:
+        raise InvalidStructure(
+            f"the outline of '{name}' crosses or touches itself "
+            f"({shapely.is_valid_reason(polygon)}): correct the drawing"
+        )
+
+
+def _edges(loops: Loops) -> Iterator[tuple[int, int, int]]:
+    """Number of a loop, and the two points of each edge of it."""
+    for number, loop in enumerate(loops):
+        for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
+            yield number, a, b
+
+
+def _beside(places: Array, a: int, b: int) -> tuple[Array, Array, float]:
+    """How far all places lie along and to the left of an edge, and its length."""
+    step = places[b] - places[a]
+    length = float(np.linalg.norm(step))
+    x, y = (places - places[a]).T
+    return (x * step[0] + y * step[1]) / length, (step[0] * y - step[1] * x) / length, length
+
+
+def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
+    """Places where vertices are made one (n, 2), and the number of each vertex's place."""
+    points = np.concatenate(outlines)
+    pairs = [cKDTree(points).query_pairs(snap, output_type="ndarray")]
+    starts = np.cumsum([0, *map(len, outlines)])
+    owner = np.repeat(np.arange(len(outlines)), [len(points) for points in outlines])
+    vertices = [list(range(a, b)) for a, b in pairwise(starts)]
+    for number, a, b in _edges(vertices):
+        along, off, length = _beside(points, a, b)
+        near = (np.abs(off) <= snap) & (owner != number)
+        for end, away in ((a, along), (b, length - along)):
+            others = np.flatnonzero(near & (away >= 0.0) & (away <= snap))
+            pairs.append(np.column_stack([others, np.full(len(others), end)]))
+    one, two = np.concatenate(pairs).T
+    graph = sparse.coo_matrix((np.ones(len(one)), (one, two)), (len(points), len(points)))
+    count, number = connected_components(graph, directed=False)
+    sums = np.array([np.bincount(number, weights=x, minlength=count) for x in points.T])
+    places = (sums / np.bincount(number)).T
+    away = np.linalg.norm(places[number] - points, axis=1)
+    if away.max() > 2.0 * snap:
+        x, y = points[np.argmax(away)]
+        raise InvalidStructure(
+            f"vertices around ({x:.3f}, {y:.3f}) follow one another at less than snap "
+            f"{snap:.3g} m and would become one: lower snap, or leave vertices out"
+        )
+    return places, number
+
+
+def _ties(loops: Loops, places: Array, snap: float) -> dict[int, Edge]:
+    """Places near the edge of an outline they do not belong to, and the nearest such edge."""
+    best: dict[int, tuple[float, Edge]] = {}
+    for number, a, b in _edges(loops):
+        along, off, length = _beside(places, a, b)
+        inside = (np.abs(off) <= snap) & (along > 0.0) & (along < length)
+        for place in set(np.flatnonzero(inside).tolist()) - set(loops[number]):
+            found = (float(abs(off[place])), (a, b))
+            best[place] = min(best.get(place, found), found)
+    return {place: edge for place, (_, edge) in best.items()}
+
+
+def _bends(loops: Loops, places: Array, ties: dict[int, Edge], snap: float) -> dict[int, Edge]:
+    """Places in the middle of a joint that is straight but for the tolerance, and its ends."""
+    on: dict[frozenset[int], list[int]] = {}
+    for place, edge in ties.items():
+        on.setdefault(frozenset(edge), []).append(place)
+    whole: Loops = [[] for _ in loops]
+    for number, a, b in _edges(loops):
+        along = _beside(places, a, b)[0]
+        whole[number] += [a, *sorted(on.get(frozenset((a, b)), []), key=lambda n: along[n])]
+    across = {(a, b): number for number, a, b in _edges(whole)}
+    found: dict[int, Edge] = {}
+    for loop in whole:
+        beyond = [across.get((b, a), -1) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+        turn = next((k for k in range(len(loop)) if beyond[k] != beyond[k - 1]), 0)
+        nodes, beyond = loop[turn:] + loop[:turn], beyond[turn:] + beyond[:turn]
+        for other, run in groupby(range(len(loop)), beyond.__getitem__):
+            which = list(run)
+            ends = nodes[which[0]], nodes[(which[-1] + 1) % len(nodes)]
+            middle = [nodes[k] for k in which[1:]]
+            if other >= 0 and middle and ends[0] != ends[1]:
+                _, off, _ = _beside(places, *ends)
+                if np.abs(off[middle]).max() <= snap:
+                    found |= {place: ends for place in middle if place not in ties}
+    return found
+
+
+def _settle(places: Array, ties: dict[int, Edge]) -> None:
+    """Put all tied places onto their edges, which move with their own ends."""
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    for _ in range(1000):
+        largest = 0.0
+        for place, (a, b) in ties.items():
+            step = places[b] - places[a]
+            share = (places[place] - places[a]) @ step / (step @ step)
+            shift = places[a] + share * step - places[place]
+            places[place] += shift
+            largest = max(largest, float(np.abs(shift).max()))
+        if largest <= 1e-3 * TOUCHING * size:
+            return
+    raise InvalidStructure("vertices near edges do not settle: lower snap, or correct the drawing")
+
+
+def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str]) -> None:
+    """Refuse outlines that are the same or overlap."""
+    import shapely
+
+    size = float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    polygons = [shapely.Polygon(points) for points in outlines]
+    pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T.tolist()
+    for a, b in pairs:
+        if a >= b:
+            continue
+        if set(loops[a]) == set(loops[b]):
+            raise InvalidStructure(f"'{names[a]}' and '{names[b]}' are the same: leave one out")
+        common = shapely.intersection(polygons[a], polygons[b])
+        if common.area > 0.5 * TOUCHING * size * common.length:
+            x, y = common.centroid.x, common.centroid.y
+            raise InvalidStructure(
+                f"'{names[a]}' and '{names[b]}' overlap by {1e4 * common.area:.3g} cm², about "
+                f"{2e3 * common.area / common.length:.3g} mm deep at ({x:.3f}, {y:.3f}): correct "
+                "the drawing, or raise snap above that"
+            )
+
+
+def _check_gaps(places: Array, loops: Loops, names: Sequence[str], snap: float) -> None:
+    """Refuse blocks that nearly touch."""
+    import shapely
+
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    polygons = [shapely.Polygon(places[loop]) for loop in loops]
+    tree = shapely.STRtree(polygons)
+    first = {place: number for number, loop in reversed([*enumerate(loops)]) for place in loop}
+    found = []
+    for number, a, b in _edges(loops):
+        along, off, length = _beside(places, a, b)
+        beside = (off < -TOUCHING * size) & (off >= -NEARLY * snap)
+        beside &= (along > 0.0) & (along < length)
+        for place in set(np.flatnonzero(beside).tolist()) - set(loops[number]):
+            foot = places[a] + along[place] / length * (places[b] - places[a])
+            middle = shapely.Point(0.5 * (foot + places[place]))
+            if not len(tree.query(middle, predicate="within")):
+                found.append((float(-off[place]), number, place))
+    if not found:
+        return
+    width, number, place = max(found)
+    x, y = places[place]
+    more = f" ({len(found)} such places, this is the widest)" if len(found) > 1 else ""
+    raise InvalidStructure(
+        f"'{names[first[place]]}' and '{names[number]}' are {1e3 * width:.3g} mm apart at "
+        f"({x:.3f}, {y:.3f}){more}, just more than snap: raise snap = {snap:.3g} m above that if "
+        f"they touch; if not, draw a gap of more than {NEARLY * snap:.3g} m"
+    )
