@@ -114,7 +114,7 @@ class Case:
         motion, suite = settings.get("motion"), settings.get("suite")
         case = cls(
             title=str(settings.get("title", "case")),
-            structure=planned(settings),
+            structure=planned(settings, folder),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
