@@ -188,6 +188,25 @@ def counted_mechanism(
     return None
 
 
+def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Mechanism | None]:
+    """Find the first mechanism by each of the definitions in use that count joints.
+
+    "Any four joints" are of rings and piers, anywhere; "four in a ring" of one ring, whatever else
+    fails; "ring and pier" four of one ring and one pier together, at least one of each.
+
+    Args:
+        joints: over joint, or over time and joint.
+        limit: of |e| for a hinge [-].
+    """
+    part = joints["part"].values.astype(str)
+    rings = np.array([part_role(name) == "ring" for name in part])
+    return {
+        "any four joints": counted_mechanism(joints, limit),
+        "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
+        "ring and pier": counted_mechanism(joints, limit, kinds=("semi-global",)),
+    }
+
+
 def _widest_group(
     count: dict[str, int], failures: int, kinds: Sequence[str]
 ) -> tuple[str, ...] | None:

@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.criteria import FAILURES, HINGE, KINDS, USED_UP, counted_mechanism, judged_parts
+from archfem.criteria import (
+    FAILURES,
+    HINGE,
+    KINDS,
+    USED_UP,
+    counted_mechanism,
+    counted_mechanisms,
+    judged_parts,
+)
 from archfem.mechanism import Verifier
 from archfem.resultants import joint_dataset
 from archfem.structure import Array, Structure
@@ -77,6 +85,47 @@ class MovingMechanism:
             watch.idle.add(state.tobytes())
             return None
         return f"a mechanism that moves: joints {found.moved.joints}; {found}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class EveryMechanism:
+    """Event: a mechanism by each definition has been met, at one step or another.
+
+    Definitions that the structure has no joints for are not waited for. It remembers what it has
+    met, and so serves one run.
+
+    Attributes:
+        limit: of |e| for a hinge [-].
+    """
+
+    limit: float = HINGE
+    _met: set[str] = field(default_factory=set, init=False, repr=False, compare=False)
+    _watches: dict[int, "_Watch"] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+
+    def __call__(self, structure: Structure, resultants: Array) -> str | None:
+        """Say that all have been met, or None."""
+        watch = _watch(self._watches, structure)
+        state = np.concatenate(
+            [watch.state(resultants, each, self.limit) for each in (watch.judged, watch.skeleton)]
+        )
+        if not state.any() or state.tobytes() in watch.idle:
+            return None
+        watch.idle.add(state.tobytes())
+        joints = joint_dataset(structure, resultants)
+        counted = counted_mechanisms(joints, self.limit)
+        self._met.update(name for name, found in counted.items() if found is not None)
+        if "verified" not in self._met and watch.verifier.moving(joints, self.limit) is not None:
+            self._met.add("verified")
+        wanted = {"verified", *possible_counts(structure)}
+        return "a mechanism by each definition" if self._met >= wanted else None
+
+
+def possible_counts(structure: Structure) -> tuple[str, ...]:
+    """Definitions of `counted_mechanisms` that the structure has joints enough for."""
+    apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)))
+    return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
 
 
 class _Watch:

@@ -1,9 +1,6 @@
 """When a run first meets a mechanism, by each of the definitions in use."""
 
-import numpy as np
-import xarray as xr
-
-from archfem.criteria import HINGE, Mechanism, counted_mechanism, part_role
+from archfem.criteria import HINGE, Mechanism, counted_mechanisms
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import first_verified_mechanism
@@ -38,19 +35,3 @@ def first_mechanisms(run: History, limit: float = HINGE) -> dict[str, Mechanism 
     moved = first_verified_mechanism(run.structure, run.joints, limit)
     found = counted_mechanisms(run.joints, limit)
     return {**found, "verified": None if moved is None else moved.moved}
-
-
-def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Mechanism | None]:
-    """Find the first mechanism by each of the definitions that count joints.
-
-    Args:
-        joints: over joint, or over time and joint.
-        limit: of |e| for a hinge [-].
-    """
-    part = joints["part"].values.astype(str)
-    rings = np.array([part_role(name) == "ring" for name in part])
-    return {
-        "any four joints": counted_mechanism(joints, limit),
-        "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
-        "ring and pier": counted_mechanism(joints, limit, kinds=("semi-global",)),
-    }
