@@ -83,6 +83,24 @@ def mesh(given: argparse.Namespace) -> None:
     print(f"wrote {given.out}")
 
 
+def modes(given: argparse.Namespace) -> None:
+    """Find the modes of a case about its dead load: table, picture, film of the first two."""
+    from archfem.analysis import damping_of
+    from archfem.modal import modes as lowest
+    from archfem.view.modes import animate_modes, draw_modes
+    from archfem.view.style import save
+
+    case, folder = Case.read(given.case, given.changes), Path(given.out)
+    dead = _dead_load(case)
+    found = lowest(dead.model, given.count, about=dead)
+    text = f"{found.table()}\n\n{damping_of(case, dead)[1]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "modes.txt").write_text(text + "\n", encoding="utf-8")
+    print(text)
+    film = animate_modes(found, folder / "modes.gif", range(1, min(given.count, 2) + 1))
+    _tell_written([folder / "modes.txt", save(draw_modes(found), folder / "modes.png"), film])
+
+
 def run(given: argparse.Namespace) -> None:
     """Find the dead load of a case and run its time histories: tables and pictures."""
     from archfem.analysis import damping_of

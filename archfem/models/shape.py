@@ -46,9 +46,12 @@ class Shape:
 
     @cached_property
     def rims(self) -> NDArray[np.intp]:
-        """Edges around the blocks, those of one polygon only (e, 2)."""
-        edges, count = np.unique(np.sort(self._edges[0], axis=1), axis=0, return_counts=True)
-        return edges[count == 1]
+        """Edges around the blocks, those of one polygon only, with its sense (e, 2)."""
+        edges, _ = self._edges
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        return edges[first[count == 1]]
 
     def at(self, block: int, point: Array) -> sparse.csr_matrix:
         """Displacement of a point on the surface of a block, from coordinates (2, n).

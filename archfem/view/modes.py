@@ -1,0 +1,172 @@
+"""Pictures and films of vibration shapes."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from archfem.errors import InvalidInput
+from archfem.modal import Modes
+from archfem.models.shape import Shape
+from archfem.skeleton import yielding_blocks
+from archfem.structure import Array
+from archfem.view.film import Image, film_path, write_film
+from archfem.view.marks import support_outlines
+from archfem.view.style import (
+    COLUMN,
+    EDGE,
+    FAINT,
+    GHOST,
+    INK,
+    LONG,
+    SMALL,
+    SOIL,
+    STONE,
+    SUPPORT,
+    WIDE,
+)
+
+REACH = 0.04
+"""Largest displacement in a picture, relative to the size of the structure."""
+
+HIGHEST, HEADED = 3.0, 0.3
+"""Largest height of a panel; height of its title and of the gap below it [inch]."""
+
+FRAMES, FPS = 32, 20.0
+"""Pictures of one swing, and how many of them a second shows."""
+
+DENSITY = 100.0
+"""Of a film [dots per inch]."""
+
+
+def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
+    """Draw vibration shapes, magnified, over the outline at rest; soil is paler than stone.
+
+    Args:
+        modes: as found by `modes`.
+        numbers: which of them, counted from 1; by default all.
+
+    Raises:
+        InvalidInput: a number is not among them.
+    """
+    figure, panels = _page(modes, numbers)
+    for panel in panels:
+        panel.swing(1.0)
+    return figure
+
+
+def animate_modes(
+    modes: Modes, path: str | Path, numbers: Sequence[int] | None = None, *, swings: int = 1
+) -> Path:
+    """Film vibration shapes, each panel swinging once in the same time, whatever its period.
+
+    Args:
+        modes: as found by `modes`.
+        path: the film, .mp4 or .gif, which repeats itself; folders are made.
+        numbers: which of them, counted from 1; by default all.
+        swings: how often they swing.
+
+    Raises:
+        InvalidInput: a number is not among them, or the suffix is not that of a film.
+    """
+    target = film_path(path)
+    figure, panels = _page(modes, numbers)
+    return write_film(target, _shots(figure, panels, swings), FPS)
+
+
+def _shots(figure: Figure, panels: list["_Panel"], swings: int) -> Iterator[Image]:
+    figure.set_dpi(DENSITY)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    figure.set_layout_engine("none")  # nothing on the page will move but the blocks
+    for turn in np.tile(np.arange(FRAMES) / FRAMES, swings):
+        for panel in panels:
+            panel.swing(float(np.sin(2.0 * np.pi * turn)))
+        canvas.draw()
+        page = np.asarray(canvas.buffer_rgba())
+        yield page[: page.shape[0] // 2 * 2, : page.shape[1] // 2 * 2, :3].copy()
+
+
+def _page(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, list["_Panel"]]:
+    """Two columns of panels, one for each mode."""
+    count = len(modes.frequencies)
+    chosen = list(range(1, count + 1) if numbers is None else numbers)
+    if not chosen or not set(chosen) <= set(range(1, count + 1)):
+        raise InvalidInput(f"modes {chosen} cannot be drawn: there are 1 to {count}")
+    low, high = _view(modes)
+    wide, tall = high - low
+    columns, rows = min(2, len(chosen)), -(-len(chosen) // 2)
+    across = (COLUMN if wide < LONG * tall else WIDE) / 2.0
+    up = min(across * tall / wide, HIGHEST) + HEADED
+    figure = Figure(figsize=(across * columns, up * rows), layout="constrained")
+    places = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in places:
+        axes.set_axis_off()
+    panels = []
+    for axes, number in zip(places, chosen, strict=False):
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        panels.append(_Panel(axes, modes, number))
+    return figure, panels
+
+
+def _view(modes: Modes) -> tuple[Array, Array]:
+    """Corners of what is seen: the structure, and room to swing."""
+    structure = modes.model.structure
+    points = np.concatenate([block.drawn() for block in structure.blocks])
+    room = 1.1 * REACH * structure.size
+    return points.min(axis=0) - room, points.max(axis=0) + room
+
+
+class _Panel:
+    """One mode on its axes."""
+
+    def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
+        model = modes.model
+        shape, structure = model.shape, model.structure
+        moves = shape.displacement(modes.shapes[:, number - 1])
+        self._moves = moves * REACH * structure.size / np.linalg.norm(moves, axis=1).max()
+        self._places = shape.places
+        soil = yielding_blocks(structure)
+        self._loops = sorted(_loops(shape), key=lambda loop: shape.block[loop[0]] not in soil)
+        pale = [shape.block[loop[0]] in soil for loop in self._loops]
+        rest = LineCollection(shape.places[shape.rims], colors=GHOST, linewidths=0.9, zorder=1)
+        still = PolyCollection(
+            support_outlines(model, 1.0), facecolors=SUPPORT, edgecolors=EDGE, linewidths=0.6
+        )
+        self._blocks = PolyCollection(
+            [],
+            facecolors=[SOIL if each else STONE for each in pale],
+            edgecolors=[FAINT if each else EDGE for each in pale],
+            linewidths=0.6,
+            zorder=2,
+        )
+        for drawn in (rest, still, self._blocks):
+            axes.add_collection(drawn, autolim=False)
+        axes.set_title(_title(modes, number), fontsize=SMALL, color=INK)
+
+    def swing(self, phase: float) -> None:
+        """Move to a phase, from -1 to 1."""
+        places = self._places + phase * self._moves
+        self._blocks.set_verts([places[loop] for loop in self._loops])
+
+
+def _loops(shape: Shape) -> list[list[int]]:
+    """Points around each block, in order."""
+    following, loops = dict(shape.rims.tolist()), []
+    while following:
+        start, point = following.popitem()
+        loop = [start]
+        while point != start:
+            loop.append(point)
+            point = following.pop(point)
+        loops.append(loop)
+    return loops
+
+
+def _title(modes: Modes, number: int) -> str:
+    frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
+    return f"mode {number}: {frequency:.2f} Hz, {x:.0f} % of the mass along x, {y:.0f} % along y"
