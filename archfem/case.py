@@ -34,7 +34,13 @@ MODEL = {
 }
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
-OUTPUT = {"every": int, "fields_every": int, "joints": [(int, str)], "animation": bool}
+OUTPUT = {
+    "every": int,
+    "fields_every": int,
+    "joints": [(int, str)],
+    "animation": bool,
+    "free_body": str,
+}
 SECTIONS = (
     "title",
     "structure",

@@ -72,6 +72,27 @@ def accuracy(given: argparse.Namespace) -> None:
     _tell_written([folder / "accuracy.txt", save(draw_accuracy(found), folder / "accuracy.png")])
 
 
+def study(given: argparse.Namespace) -> None:
+    """Carry out a study: its tables, and a picture of the factors at first mechanism."""
+    from archfem.studies import Study, carried_out, study_table
+    from archfem.view.studies import draw_study
+    from archfem.view.style import save
+
+    asked, folder = Study.read(given.case, given.changes), Path(given.out)
+    print(asked.title)
+    found = {}
+    for name, finding in carried_out(asked, folder):
+        found[name] = finding
+        print(f"{name}: {len(finding.runs)} pairs")
+    table = study_table(found)
+    (folder / "study.txt").write_text(f"{asked.title}\n\n{table}\n", encoding="utf-8")
+    print(table)
+    written = [folder / "study.txt"]
+    if asked.scales:
+        written.append(save(draw_study(found, asked.reduction), folder / "study.png"))
+    _tell_written(written)
+
+
 def mesh(given: argparse.Namespace) -> None:
     """Write the mesh of a case as a gmsh file."""
     from archfem.mesh import Meshing, write_mesh
@@ -110,7 +131,7 @@ def run(given: argparse.Namespace) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     dead = _dead_load(case)
-    _tell_written([write_dead(dead, folder)])
+    _tell_written(write_dead(case, dead, folder))
     damping, how = damping_of(case, dead)
     print(how)
     if case.suite is not None:
@@ -185,6 +206,7 @@ def _run_pair(
 
 def _dead_load(case: Case) -> "Equilibrium":
     from archfem.analysis import at_rest
+    from archfem.stress import strength_use, use_sentence
 
     print(case.title)
     start = perf_counter()
@@ -200,6 +222,8 @@ def _dead_load(case: Case) -> "Equilibrium":
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / 1e3:.2f} kN"
     )
+    if model.shape.stress is not None:
+        print(f"dead load: {use_sentence(strength_use(model, dead.q))}")
     return dead
 
 

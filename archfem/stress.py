@@ -41,9 +41,8 @@ def principal(model: Model, q: Array) -> xr.Dataset:
     Raises:
         InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
     """
-    _check_state(model, q)
     shape, structure = model.shape, model.structure
-    across, up, shear = (_stress(shape) @ q).reshape(-1, 3).T
+    across, up, shear = cell_stress(model, q).T
     largest, least = principal_values(across, up, shear)
     centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
     blocks = [structure.blocks[number] for number in shape.owner]
@@ -61,6 +60,20 @@ def principal(model: Model, q: Array) -> xr.Dataset:
             "y": ("cell", centre[:, 1], {"units": "m"}),
         },
     )
+
+
+def cell_stress(model: Model, q: Array) -> Array:
+    """Stress at the centres of all cells, σ_xx, σ_yy, σ_xy (cells, 3) [Pa].
+
+    Args:
+        model: any rung with a mesh.
+        q: coordinates (n,).
+
+    Raises:
+        InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
+    """
+    _check_state(model, q)
+    return (_stress(model.shape) @ q).reshape(-1, 3)
 
 
 def principal_values(across: Array, up: Array, shear: Array) -> tuple[Array, Array]:

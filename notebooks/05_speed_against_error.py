@@ -19,7 +19,7 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.plots import draw_envelope
+from archfem.view.envelopes import draw_envelope
 from archfem.view.tradeoff import draw_accuracy
 
 # %% [markdown]

@@ -7,7 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.criteria import HINGE, hinged, opened, sliding
+from archfem.criteria import HINGE, hinged, judged_parts, opened, sliding
 from archfem.equilibrium import RigidBlocks
 from archfem.kinematics import motion_of
 from archfem.models import Model
@@ -27,14 +27,18 @@ STILL = 1e-4
 LENGTH, APART = 0.55, 0.14
 """Length of the arrows of a slip, and their distance from the joint, relative to its depth."""
 
+LEAST = 0.03
+"""Depth that arrows are made for at least, relative to the size of the structure."""
+
 
 @dataclass(frozen=True, eq=False)
 class Marks:
     """Where to draw what.
 
     Attributes:
-        thrust: points of the thrust line (n_joints, 2) [m]; NaN in an open joint.
-        links: pieces of the thrust line, through the blocks between two closed joints
+        thrust: points of the thrust line (n_joints, 2) [m]; NaN in an open joint, and in one that
+            is not of a ring or pier.
+        links: pieces of the thrust line, through the blocks between two such joints
             (n_links, 2, 2) [m].
         hinges: points where hinged joints stay in contact (n_hinges, 2) [m].
         slips: outlines of two opposite arrows beside each sliding joint: the higher block's,
@@ -56,7 +60,7 @@ def joint_marks(
     shift: Array | None = None,
     limit: float = HINGE,
 ) -> Marks:
-    """Find what to draw at the joints.
+    """Find what to draw at the joints of rings and piers, or at all where there are neither.
 
     Args:
         structure: whose joints they are.
@@ -69,27 +73,34 @@ def joint_marks(
     ends = np.array([joint.ends for joint in structure.joints]) + shift
     share = 0.5 + joints["eccentricity"].values[:, None]
     carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-    side = hinged(joints, limit).values
+    shown = shown_joints(structure)
+    side = np.where(shown, hinged(joints, limit).values, 0)
     failed = np.flatnonzero(side)
-    slipping = np.flatnonzero(sliding(joints).values)
+    slipping = np.flatnonzero(shown & sliding(joints).values)
     arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
-    thrust = carried + thrust_line(structure, joints).values
-    links = thrust[_neighbours(structure)]
+    thrust = np.where(shown[:, None], carried + thrust_line(structure, joints).values, np.nan)
+    links = thrust[_neighbours(structure, shown)]
     return Marks(
         thrust=thrust,
         links=links[np.isfinite(links).all(axis=(1, 2))],
         hinges=ends[failed, (side[failed] > 0).astype(int)],
         slips=np.array(arrows).reshape(-1, *ARROW.shape),
-        gaps=ends[opened(joints).values],
+        gaps=ends[shown & opened(joints).values],
     )
 
 
-def _neighbours(structure: Structure) -> NDArray[np.intp]:
-    """Pairs of joints with a block between them that has no other joint (n_links, 2)."""
+def shown_joints(structure: Structure) -> NDArray[np.bool_]:
+    """Which joints are drawn: those of rings and piers, or all where there are neither."""
+    parts = [joint.part for joint in structure.joints]
+    return np.isin(parts, judged_parts(parts))
+
+
+def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Pairs of joints with a block between them that has no other shown joint (n_links, 2)."""
     touching: list[list[int]] = [[] for _ in structure.blocks]
-    for number, joint in enumerate(structure.joints):
-        for block in joint.blocks:
-            touching[block].append(number)
+    for number in np.flatnonzero(shown):
+        for block in structure.joints[number].blocks:
+            touching[block].append(int(number))
     pairs = [numbers for numbers in touching if len(numbers) == 2]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
@@ -98,9 +109,10 @@ def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Arr
     """Two arrows that say how a joint slips (2, 7, 2) [m]."""
     joint, normal = structure.joints[number], structure.normals[number]
     sense = np.sign(shear) * joint.tangent
-    outline = ARROW * LENGTH * joint.depth
+    depth = max(joint.depth, LEAST * structure.size)
+    outline = ARROW * LENGTH * depth
     arrow = outline[:, :1] * sense + outline[:, 1:] * normal
-    away = APART * joint.depth * normal
+    away = APART * depth * normal
     return np.array([middle + away + arrow, middle - away - arrow])
 
 

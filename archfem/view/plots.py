@@ -1,6 +1,6 @@
-"""Pictures on paper: a structure at an instant, envelopes of eccentricity, histories of joints."""
+"""Pictures on paper: a structure at an instant, histories of joints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -9,22 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
 
-from archfem.criteria import HINGE, envelope, opened
+from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.skeleton import yielding_blocks
 from archfem.structure import Array, Structure
+from archfem.view.envelopes import draw_faces
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     COLUMN,
     EDGE,
-    FAINT,
     INK,
     LINES,
     NORMAL,
     SLIP,
     SMALL,
+    SOIL,
     STONE,
     SUPPORT,
     THRUST,
@@ -48,9 +49,9 @@ def draw_structure(
 ) -> Figure:
     """Draw the blocks and, where given, what their joints do at one instant.
 
-    Supports are darker. The thrust line is interrupted where a joint is open. A red circle marks
-    a hinge on the face where its blocks stay in contact, two opposite arrows a joint that slides,
-    a white gap one that has come apart.
+    Supports are darker, soil is paler. Each ring and pier has its thrust line, interrupted where a
+    joint is open. A red circle marks a hinge on the face where its blocks stay in contact, two
+    opposite arrows a joint that slides, a white gap one that has come apart.
 
     Args:
         structure: what stands.
@@ -64,55 +65,13 @@ def draw_structure(
     axes = canvas(structure).add_subplot() if axes is None else axes
     dress(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
-    _blocks(axes, structure)
+    draw_blocks(axes, structure)
     if joints is not None:
         _check_instant(structure, joints)
         _marks(axes, joint_marks(structure, joints, limit=limit))
         legend(axes)
     axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
     axes.autoscale_view()
-    return cast(Figure, axes.figure)
-
-
-def draw_envelope(
-    runs: Mapping[str, History],
-    *,
-    dead: xr.Dataset | None = None,
-    limit: float = HINGE,
-    axes: Axes | None = None,
-) -> Figure:
-    """Draw the least and largest eccentricity of each joint over runs, against the faces.
-
-    Crosses above the upper face mark joints that came apart at some time.
-
-    Args:
-        runs: what to call each run, and the run.
-        dead: joints under dead load, drawn dotted.
-        limit: of |e| for a hinge [-].
-        axes: where to draw; by default a new figure.
-
-    Raises:
-        InvalidInput: there is no run, or too many to tell apart.
-    """
-    if not 1 <= len(runs) <= len(LINES):
-        raise InvalidInput(f"{len(runs)} runs in one picture: give 1 to {len(LINES)}")
-    page = Figure(figsize=(COLUMN, 3.4), layout="constrained")
-    axes = page.add_subplot() if axes is None else axes
-    dress(axes, "joint [-]", "eccentricity e = M / (N h) [-]")
-    _faces(axes, limit)
-    apart = [np.flatnonzero(opened(run.joints).any("time")) for run in runs.values()]
-    for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
-        _band(axes, run.joints, label, colour)
-        height = np.full(len(apart[row]), 0.56 + 0.05 * row)
-        axes.plot(apart[row], height, "x", ms=4, color=colour)
-    if any(map(len, apart)):
-        axes.plot([], [], "x", ms=4, color=FAINT, label="came apart")
-    if dead is not None:
-        axes.plot(dead["joint"], dead["eccentricity"], ":", color=INK, lw=1.4, label="dead load")
-    axes.set_ylim(-0.56, 0.56 + 0.05 * len(runs))
-    axes.set_yticks(np.linspace(-0.5, 0.5, 5))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    legend(axes)
     return cast(Figure, axes.figure)
 
 
@@ -172,21 +131,30 @@ def _title(structure: Structure, joints: xr.Dataset | None) -> str:
     return f"{structure.name}, t = {float(joints['time']):.3f} s"
 
 
-def _blocks(axes: Axes, structure: Structure) -> None:
-    """Draw blocks where they are, supports darker."""
-    faces = [SUPPORT if block.fixed else STONE for block in structure.blocks]
+def draw_blocks(axes: Axes, structure: Structure) -> None:
+    """Draw blocks where they are, supports darker, soil paler."""
+    soil = yielding_blocks(structure)
+    faces = [
+        SUPPORT if block.fixed else SOIL if number in soil else STONE
+        for number, block in enumerate(structure.blocks)
+    ]
     outlines = [block.drawn() for block in structure.blocks]
     drawn = PolyCollection(outlines, facecolors=faces, edgecolors=EDGE, linewidths=0.7, zorder=1)
     drawn.set_gid("blocks")
     axes.add_collection(drawn)
 
 
-def _marks(axes: Axes, marks: Marks) -> None:
-    """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
+def draw_thrust(axes: Axes, marks: Marks) -> None:
+    """Draw the thrust lines."""
     halo = withStroke(linewidth=3.4, foreground="white")
     line: dict[str, Any] = {"color": THRUST, "lw": 1.7, "zorder": 5, "path_effects": [halo]}
     axes.plot(*_broken(marks.links).T, label="thrust line", gid="links", **line)
     axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5, gid="thrust")
+
+
+def _marks(axes: Axes, marks: Marks) -> None:
+    """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
+    draw_thrust(axes, marks)
     if len(marks.hinges):
         disc: dict[str, Any] = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
@@ -216,24 +184,6 @@ def _broken(pieces: Array) -> Array:
     return np.insert(pieces, 2, np.nan, axis=1).reshape(-1, 2)
 
 
-def _faces(axes: Axes, limit: float) -> None:
-    """Draw the faces of the joints, and where a joint counts as hinged."""
-    for side in (-1.0, 1.0):
-        axes.axhspan(side * limit, side * 0.5, color=RED, alpha=0.12, lw=0)
-        axes.axhline(side * 0.5, color=EDGE, lw=1.2)
-        axes.axhline(side * limit, color=RED, lw=0.7, ls="--")
-    axes.axhline(0.0, color=FAINT, lw=0.5)
-
-
-def _band(axes: Axes, joints: xr.Dataset, label: str, colour: str) -> None:
-    """Fill between the least and the largest eccentricity of each joint."""
-    span, number = envelope(joints), joints["joint"].values
-    axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=0.15, lw=0)
-    style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
-    axes.plot(number, span["highest"], **style, label=label)
-    axes.plot(number, span["lowest"], **style)
-
-
 def _ground(axes: Axes, run: History) -> None:
     """Draw the acceleration of the ground."""
     dress(axes, "", "ground [m/s²]")
@@ -247,7 +197,7 @@ def _ground(axes: Axes, run: History) -> None:
 def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
     """Draw where the thrust crosses a joint, against its faces."""
     dress(axes, "", f"{joint['name'].values!s}\nM / (N h) [-]")
-    _faces(axes, limit)
+    draw_faces(axes, limit)
     axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 

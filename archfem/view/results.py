@@ -13,15 +13,38 @@ from archfem.criteria import judged
 from archfem.history import History
 from archfem.motion import Motion
 from archfem.statics import Equilibrium
+from archfem.stress import strength_use, use_table
 from archfem.suite import Suite
+from archfem.view.envelopes import draw_envelope
+from archfem.view.freebody import draw_free_body
 from archfem.view.motions import accelerogram, spectra, suite_spectra
-from archfem.view.plots import draw_envelope, draw_joint_histories, draw_structure
+from archfem.view.plots import draw_joint_histories, draw_structure
+from archfem.view.stress import draw_stress
 from archfem.view.style import LINES, save
 
 
-def write_dead(dead: Equilibrium, folder: Path) -> Path:
-    """Draw the thrust line under dead load."""
-    return save(draw_structure(dead.model.structure, dead.joints), folder / "dead.png")
+def write_dead(case: Case, dead: Equilibrium, folder: Path) -> list[Path]:
+    """Draw the dead load: thrust lines; where there is a mesh, stress; a free body where asked.
+
+    Args:
+        case: names the block to be cut free, if any.
+        dead: the equilibrium.
+        folder: for the files.
+
+    Returns:
+        The files, a table of stress by part among them.
+    """
+    model, structure = dead.model, dead.model.structure
+    files = [save(draw_structure(structure, dead.joints), folder / "dead.png")]
+    if model.shape.stress is not None:
+        files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))
+        table = folder / "dead_stress.txt"
+        table.write_text(use_table(strength_use(model, dead.q)) + "\n", encoding="utf-8")
+        files.append(table)
+    if "free_body" in case.output:
+        body = draw_free_body(structure, dead.joints, case.output["free_body"], shape=model.shape)
+        files.append(save(body, folder / "free_body.png"))
+    return files
 
 
 def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from archfem.errors import InvalidInput
 from archfem.structure import Structure
 
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
+SOIL = "#f6f3ec"
 INK, FAINT, GHOST = "#1b1b1b", "#8d8d8d", "#cfcac0"
 THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
 MOVED = "#009e73"
@@ -23,6 +24,12 @@ SMALL, NORMAL = 8.0, 9.5
 
 COLUMN, TALL = 6.4, 6.8
 """Width and largest height of a picture [inch]."""
+
+WIDE = 11.0
+"""Width of a picture of a long structure, or of many panels [inch]."""
+
+LONG = 4.0
+"""Width over height from which a structure is long; a ring has at most about 3."""
 
 
 def dress(axes: Axes, x: str = "", y: str = "") -> None:
@@ -53,7 +60,8 @@ def canvas(structure: Structure) -> Figure:
     """An empty page that fits a structure."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
-    scale = min((COLUMN - 0.8) / wide, (TALL - 1.2) / high)
+    room = COLUMN if wide < LONG * high else WIDE
+    scale = min((room - 0.8) / wide, (TALL - 1.2) / high)
     size = max(0.5 * COLUMN, scale * wide + 0.8), max(0.35 * COLUMN, scale * high + 1.2)
     return Figure(figsize=size, layout="constrained")
 

@@ -8,8 +8,9 @@ from archfem.criteria import hinged, opened, sliding
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
+from archfem.view.envelopes import draw_envelope
 from archfem.view.marks import joint_ends, joint_marks
-from archfem.view.plots import draw_envelope, draw_joint_histories, draw_structure
+from archfem.view.plots import draw_joint_histories, draw_structure
 from archfem.view.style import save
 
 WEIGHT = 1e4  # normal force in every joint [N]: only signs and ratios matter

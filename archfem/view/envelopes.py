@@ -1,0 +1,207 @@
+"""Eccentricity of the joints, part by part: its envelope over runs, or its value at one instant."""
+
+from collections.abc import Collection, Mapping
+from typing import Any, cast
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from archfem.criteria import HINGE, envelope, judged_parts, opened, part_role
+from archfem.errors import InvalidInput
+from archfem.history import History
+from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
+from archfem.view.style import HINGE as RED
+
+ROW, LEAST = 80, 6
+"""Joints that fit side by side in a wide picture, and those for which a panel has room at least."""
+
+LABEL = "eccentricity e = M / (N h) [-]"
+
+STEP = 0.05
+"""Distance of the crosses of one run from those of the next, above the upper face."""
+
+
+def draw_envelope(
+    runs: Mapping[str, History],
+    *,
+    dead: xr.Dataset | None = None,
+    limit: float = HINGE,
+    dotted: Collection[str] = (),
+    axes: Axes | None = None,
+) -> Figure:
+    """Draw the least and largest eccentricity of each joint over runs, against the faces.
+
+    Each ring and pier has a panel of its own, in which its joints count from 0. Crosses above the
+    upper face mark joints that came apart at some time.
+
+    Args:
+        runs: what to call each run, and the run; those of different structures share the panels
+            of parts of one name.
+        dead: joints under dead load, drawn dotted.
+        limit: of |e| for a hinge [-].
+        dotted: names of the runs that are drawn dotted and not filled.
+        axes: where to draw, for a single ring or pier; by default a new figure.
+
+    Raises:
+        InvalidInput: there is no run, or too many to tell apart; axes were given for several
+            parts.
+    """
+    shown = _panels({label: run.joints for label, run in runs.items()}, limit, axes)
+    apart = 0
+    for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
+        for part, panel in shown.items():
+            own = _of_part(run.joints, part)
+            draw_band(panel, own, label, colour, dotted=label in dotted)
+            crosses = np.flatnonzero(opened(own).any("time"))
+            height = np.full(len(crosses), 0.56 + STEP * row)
+            panel.plot(crosses, height, "x", ms=4, color=colour)
+            apart += len(crosses)
+    first = next(iter(shown.values()))
+    if apart:
+        first.plot([], [], "x", ms=4, color=FAINT, label="came apart")
+    if dead is not None:
+        for part, panel in shown.items():
+            at_rest = _of_part(dead, part)["eccentricity"]
+            panel.plot(at_rest.values, ":", color=INK, lw=1.4, label="dead load")
+    first.set_ylim(-0.56, 0.56 + STEP * len(runs))
+    return _explained(shown)
+
+
+def draw_eccentricity(
+    states: Mapping[str, xr.Dataset], *, limit: float = HINGE, dotted: Collection[str] = ()
+) -> Figure:
+    """Draw the eccentricity of each joint at one instant of each of several structures.
+
+    Each ring and pier has a panel of its own, as by `draw_envelope`.
+
+    Args:
+        states: what to call each state, and its joints at one instant, for example dead load.
+        limit: of |e| for a hinge [-].
+        dotted: names of the states that are drawn dotted.
+
+    Raises:
+        InvalidInput: there is no state, or too many to tell apart, or one has several instants.
+    """
+    several = [label for label, joints in states.items() if joints["N"].dims != ("joint",)]
+    if several:
+        raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
+    shown = _panels(states, limit, None)
+    for (label, joints), colour in zip(states.items(), LINES, strict=False):
+        line = ":" if label in dotted else "-"
+        style: dict[str, Any] = {"color": colour, "lw": 1.4, "marker": "o", "ms": 2.8}
+        for part, panel in shown.items():
+            values = _of_part(joints, part)["eccentricity"].values
+            panel.plot(values, ls=line, label=label, **style)
+    first = next(iter(shown.values()))
+    first.set_ylim(-0.56, 0.56)
+    return _explained(shown)
+
+
+def draw_band(
+    axes: Axes, joints: xr.Dataset, label: str, colour: str, *, dotted: bool = False
+) -> None:
+    """Draw the least and the largest eccentricity of joints, which count from 0.
+
+    Args:
+        axes: where to draw.
+        joints: over time and joint.
+        label: of the lines.
+        colour: of the lines, and of the band between them.
+        dotted: draw dotted lines, and no band.
+    """
+    span, number = envelope(joints), np.arange(joints.sizes["joint"])
+    style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
+    if dotted:
+        style |= {"ls": ":", "ms": 2.0}
+    else:
+        axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=0.15, lw=0)
+    axes.plot(number, span["highest"], **style, label=label)
+    axes.plot(number, span["lowest"], **style)
+
+
+def draw_faces(axes: Axes, limit: float = HINGE) -> None:
+    """Draw the faces of the joints, and where a joint counts as hinged."""
+    for side in (-1.0, 1.0):
+        axes.axhspan(side * limit, side * 0.5, color=RED, alpha=0.12, lw=0)
+        axes.axhline(side * 0.5, color=EDGE, lw=1.2)
+        axes.axhline(side * limit, color=RED, lw=0.7, ls="--")
+    axes.axhline(0.0, color=FAINT, lw=0.5)
+
+
+def _of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
+    """The joints of one part."""
+    return joints.isel(joint=np.flatnonzero(joints["part"].values.astype(str) == part))
+
+
+def _panels(drawn: Mapping[str, xr.Dataset], limit: float, axes: Axes | None) -> dict[str, Axes]:
+    """A panel for each ring and pier, the rings first, with the faces of its joints."""
+    if not 1 <= len(drawn) <= len(LINES):
+        raise InvalidInput(f"{len(drawn)} runs in one picture: give 1 to {len(LINES)}")
+    sizes: dict[str, int] = {}
+    for joints in drawn.values():
+        names = joints["part"].values.astype(str)
+        for part in judged_parts(names):
+            sizes[part] = max(sizes.get(part, 0), int(np.sum(names == part)))
+    parts = sorted(sizes, key=lambda part: part_role(part) != "ring")
+    if axes is None:
+        shown = _page({part: sizes[part] for part in parts})
+    elif len(parts) == 1:
+        shown = {parts[0]: axes}
+        axes.set_ylabel(LABEL)
+    else:
+        raise InvalidInput(f"parts {parts} do not fit one pair of axes: leave axes out")
+    for part, panel in shown.items():
+        dress(panel, "joint [-]", panel.get_ylabel())
+        draw_faces(panel, limit)
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+        if len(parts) > 1:
+            panel.set_title(part, fontsize=NORMAL, color=INK)
+            panel.set_xlim(-0.7, sizes[part] - 0.3)
+    return shown
+
+
+def _page(sizes: Mapping[str, int]) -> dict[str, Axes]:
+    """Empty panels on one page, as wide as their parts have joints, in as many rows as needed."""
+    rows: list[dict[str, int]] = [{}]
+    for part, size in sizes.items():
+        if rows[-1] and sum(rows[-1].values()) + max(size, LEAST) > ROW:
+            rows.append({})
+        rows[-1][part] = max(size, LEAST)
+    inches = (COLUMN, 3.4) if len(sizes) == 1 else (WIDE, 0.6 + 2.8 * len(rows))
+    page, found = Figure(figsize=inches, layout="constrained"), {}
+    longest = max(sum(row.values()) for row in rows)
+    first: Axes | None = None
+    whole = page.add_gridspec(len(rows), 1)
+    for number, row in enumerate(rows):
+        rest = longest - sum(row.values())
+        widths = [*row.values(), *([rest] if rest else [])]
+        columns = whole[number].subgridspec(1, len(widths), width_ratios=widths)
+        for k, part in enumerate(row):
+            panel = page.add_subplot(columns[k], sharey=first)
+            panel.tick_params(labelleft=k == 0)
+            if k == 0:
+                panel.set_ylabel(LABEL)
+            first = first or panel
+            found[part] = panel
+    return found
+
+
+def _explained(shown: Mapping[str, Axes]) -> Figure:
+    """Mark quarters of the depth, and explain the lines of all panels once."""
+    first = next(iter(shown.values()))
+    first.set_yticks(np.linspace(-0.5, 0.5, 5))
+    page = cast(Figure, first.figure)
+    if len(shown) == 1:
+        legend(first)
+    else:
+        page.legend(
+            *first.get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=2 + len(LINES),
+            frameon=False,
+            fontsize=SMALL,
+        )
+    return page

@@ -1,0 +1,196 @@
+"""A map of principal compression over the blocks, with thrust lines and principal directions."""
+
+from collections.abc import Collection
+from typing import cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
+
+from archfem.errors import InvalidInput
+from archfem.models import Model
+from archfem.models.shape import Shape
+from archfem.resultants import joint_dataset
+from archfem.skeleton import yielding_blocks
+from archfem.stress import at_corners, cell_stress, principal_values
+from archfem.structure import Array, Structure
+from archfem.units import MPa, kPa
+from archfem.view.marks import joint_marks
+from archfem.view.plots import draw_blocks, draw_thrust
+from archfem.view.style import EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
+
+SHADES = LinearSegmentedColormap.from_list(
+    "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
+)
+"""From none to the largest compression; warm, so that the thrust line stands out."""
+
+CUT = 99.5
+"""Percentage of corners within the scale: else a few on which stones turn would take all of it."""
+
+APART = 0.21
+"""Distance between two crosses on paper, and length of the longest arms [inch]."""
+
+SEEN = 0.08
+"""Arms shorter than this, relative to the longest, are left out."""
+
+TOGETHER = 4
+"""Cells whose mean stress a cross shows."""
+
+PIECES = 3
+"""Into how many a cell's sides are cut for shading."""
+
+BAR = 0.16
+"""Width of the colour bar, and its distance from the picture [inch]."""
+
+Numbers = NDArray[np.intp]
+
+
+def draw_stress(
+    model: Model, q: Array, *, parts: Collection[str] | None = None, axes: Axes | None = None
+) -> Figure:
+    """Map the largest principal compression, with thrust lines and principal directions.
+
+    Crosses lie along the principal directions and are as long as the stresses are large: dark
+    under compression, green under tension.
+
+    Args:
+        model: any rung with a mesh.
+        q: coordinates (n,).
+        parts: whose blocks are shaded, for example ["backfill"]; by default all but soil.
+        axes: where to draw; by default a new figure.
+
+    Raises:
+        InvalidInput: the blocks are rigid, or there is no such part.
+    """
+    structure, shape = model.structure, model.shape
+    chosen = _chosen(structure, parts)
+    corners = (at_corners(shape) @ q).reshape(-1, 3)
+    own = axes is None
+    axes = canvas(structure).add_subplot() if axes is None else axes
+    page = cast(Figure, axes.figure)
+    dress(axes, "x [m]", "y [m]")
+    axes.set_aspect("equal")
+    draw_blocks(axes, structure)
+    _shade(axes, shape, -principal_values(*corners.T)[1], chosen)
+    outlines = [block.drawn() for block in structure.blocks]
+    axes.add_collection(
+        PolyCollection(outlines, facecolors="none", edgecolors=EDGE, linewidths=0.6, zorder=3)
+    )
+    _crosses(axes, shape, cell_stress(model, q), chosen)
+    joints = joint_dataset(structure, model.resultants(q))
+    draw_thrust(axes, joint_marks(structure, joints))
+    axes.set_title(f"{structure.name}: principal compression", fontsize=NORMAL, color=INK)
+    axes.autoscale_view()
+    if own:
+        page.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
+    return page
+
+
+def _chosen(structure: Structure, parts: Collection[str] | None) -> Numbers:
+    """Numbers of the blocks that are shaded."""
+    soil = yielding_blocks(structure)
+    if parts is None:
+        return np.array([number for number in structure.free if number not in soil])
+    known = {structure.blocks[number].part for number in structure.free}
+    unknown = sorted(set(parts) - known)
+    if unknown or not parts:
+        raise InvalidInput(f"parts {unknown} cannot be shaded: name some of {sorted(known)}")
+    return np.array([n for n in structure.free if structure.blocks[n].part in parts])
+
+
+def _shade(axes: Axes, shape: Shape, compression: Array, chosen: Numbers) -> None:
+    """Colour the cells of blocks by compression at their corners [Pa], and add a colour bar."""
+    cells = [c for c, own in zip(shape.cells, shape.owner, strict=True) if own in chosen]
+    corners = np.array([[*cell, cell[-1]][:4] for cell in cells])
+    shown = compression[np.unique(corners)].clip(0.0)
+    highest = max(float(np.percentile(shown, CUT)), 1.0)
+    unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
+    places, triangles = _cut(shape.places[corners])
+    painted = axes.tripcolor(
+        Triangulation(places[..., 0].ravel(), places[..., 1].ravel(), triangles),
+        _inside(compression[corners]).ravel().clip(0.0) / unit,
+        shading="gouraud",
+        cmap=SHADES,
+        vmin=0.0,
+        vmax=highest / unit,
+        zorder=2,
+        rasterized=True,
+    )
+    painted.set_gid("compression")
+    wide = BAR / cast(Figure, axes.figure).get_figwidth()
+    beyond = "max" if shown.max() > highest else "neither"
+    beside = axes.inset_axes((1.0 + wide, 0.0, wide, 1.0))
+    bar = axes.figure.colorbar(painted, cax=beside, extend=beyond)
+    bar.set_label(f"largest compression [{name}]", fontsize=SMALL)
+    bar.ax.tick_params(labelsize=SMALL, color=EDGE)
+    bar.ax.yaxis.set_major_locator(MaxNLocator(5))
+    bar.outline.set(edgecolor=EDGE, linewidth=0.8)
+
+
+def _inside(corners: Array) -> Array:
+    """Values on a grid in each cell from those at its four corners (cells, 4, …)."""
+    s, t = np.meshgrid(*(np.linspace(0.0, 1.0, PIECES + 1),) * 2)
+    share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]).reshape(4, -1)
+    return np.einsum("kp,ck...->cp...", share, corners)
+
+
+def _cut(corners: Array) -> tuple[Array, Numbers]:
+    """Points on a grid in each cell (cells, p, 2), and triangles between them (m, 3).
+
+    Colours of a triangle run straight between those of its corners, past the ones between on the
+    scale: over a whole cell of a coarse mesh that would be seen.
+    """
+    places = _inside(corners)
+    row = PIECES + 1
+    first = (np.arange(PIECES)[:, None] * row + np.arange(PIECES)).ravel()
+    square = np.column_stack(
+        [first, first + 1, first + row + 1, first, first + row + 1, first + row]
+    )
+    starts = np.arange(len(places)) * row**2
+    return places, (starts[:, None, None] + square.reshape(-1, 3)).reshape(-1, 3)
+
+
+def _crosses(axes: Axes, shape: Shape, stress: Array, chosen: Numbers) -> None:
+    """Draw crosses along the principal directions, on a grid in each block."""
+    spacing = APART * np.ptp(shape.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
+    centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
+    groups = [g for n in chosen for g in _grid(centre, np.flatnonzero(shape.owner == n), spacing)]
+    middle = np.array([centre[group].mean(axis=0) for group in groups])
+    across, up, shear = np.array([stress[group].mean(axis=0) for group in groups]).T
+    angle = 0.5 * np.arctan2(2.0 * shear, across - up)
+    turned = np.stack([angle, angle + 0.5 * np.pi])
+    size = np.stack(principal_values(across, up, shear))
+    share = size / np.abs(size).max()
+    direction = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    arm = 0.5 * spacing * np.abs(share)[..., None] * direction
+    ends = np.stack([middle - arm, middle + arm], axis=2)
+    for sign, colour, name in ((-1.0, INK, "compression"), (1.0, MOVED, "tension")):
+        lines = ends[sign * share > SEEN]
+        if len(lines):
+            drawn = LineCollection(list(lines), colors=colour, linewidths=0.8, label=name)
+            drawn.set(zorder=4, gid=name)
+            axes.add_collection(drawn)
+
+
+def _grid(centre: Array, own: Numbers, spacing: float) -> list[Numbers]:
+    """Groups of neighbouring cells of a block, about equally far from each other."""
+    middle = centre[own].mean(axis=0)
+    axes = np.linalg.svd(centre[own] - middle, full_matrices=False)[2]
+    local = (centre[own] - middle) @ axes.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    spacing = max(spacing, np.sqrt(TOGETHER * np.prod(high - low) / len(own)))
+    counts = np.maximum(1, np.round((high - low) / spacing)).astype(int)
+    steps = [
+        a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts, strict=True)
+    ]
+    groups = []
+    for place in np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2):
+        distance = np.linalg.norm(local - place, axis=1)
+        if distance.min() < 0.5 * spacing:
+            groups.append(own[np.argsort(distance, kind="stable")[:TOGETHER]])
+    return groups
