@@ -14,39 +14,17 @@ from typing import Any
 import gmsh
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from archfem import _fenicsx
 from archfem.errors import InvalidInput, MeshError
-from archfem.structure import TOUCHING, Array, Block, Structure
+from archfem.intervals import Division, Meshing, divided
+from archfem.structure import TOUCHING, Structure
 
-Segment = tuple[int, int]
-CELLS = ("quadrilateral", "triangle")
+FRONTAL = 6
+"""Gmsh's number for the frontal Delaunay algorithm."""
 
-
-@dataclass(frozen=True)
-class Meshing:
-    """How finely blocks are cut into cells.
-
-    Attributes:
-        through: cells through the thickness, so facets on a joint.
-        along: cells along each block; a sector's faces get as many chords. A polygon's face made
-            of several chords needs at least one cell to each.
-        cell: "quadrilateral" or "triangle".
-    """
-
-    through: int = 4
-    along: int = 4
-    cell: str = "quadrilateral"
-
-    def __post_init__(self) -> None:
-        """Refuse impossible settings."""
-        for key in ("through", "along"):
-            count = getattr(self, key)
-            if not (isinstance(count, int | np.integer) and 1 <= count <= 1000):
-                raise InvalidInput(f"cells {key} = {count!r}: give a whole number, 1 to 1000")
-        if self.cell not in CELLS:
-            raise InvalidInput(f"cell '{self.cell}' is not known: use one of {CELLS}")
+FULL_QUAD = 3
+"""Gmsh's number for recombination that leaves no triangle: it splits a mesh twice as coarse."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,153 +93,75 @@ def _model(name: str) -> Iterator[None]:
 
 def _generate(structure: Structure, meshing: Meshing) -> None:
     """Build geometry and mesh of all blocks in the current gmsh model."""
-    outlines, points = _shared_outlines(structure, meshing)
-    counts = _cells_on_segments(structure, outlines, points, meshing)
+    division = divided(structure, meshing)
+    outlines = division.outlines
     geo = gmsh.model.geo
-    corners = [geo.addPoint(x, y, 0.0) for x, y in points]
-    lines = {s: geo.addLine(corners[s[0]], corners[s[1]]) for s in counts}
-    for segment, count in counts.items():
-        geo.mesh.setTransfiniteCurve(lines[segment], count + 1)
-    for number, (block, outline) in enumerate(zip(structure.blocks, outlines, strict=True)):
+    corners = [geo.addPoint(x, y, 0.0) for x, y in outlines.points]
+    pieces = [_pieces(division, edge, corners) for edge in range(len(outlines.edges))]
+    for number, block in enumerate(structure.blocks):
         loop = [
-            lines[key] if (a, b) == key else -lines[key]
-            for a, b in zip(outline, np.roll(outline, -1), strict=True)
-            for key in [(min(a, b), max(a, b))]
+            line
+            for start, edge in zip(outlines.loops[number], outlines.around[number], strict=True)
+            for line in _run(pieces[edge], start == outlines.edges[edge, 0])
         ]
         surface = geo.addPlaneSurface([geo.addCurveLoop(loop)], number + 1)
         if block.corners is not None:
-            ends = [corners[p] for p in _corner_points(block, points)]
+            ends = [corners[point] for point in outlines.corners(number)]
             geo.mesh.setTransfiniteSurface(surface, "Alternate", ends)
         if meshing.cell == "quadrilateral":
             geo.mesh.setRecombine(2, surface)
         gmsh.model.addPhysicalGroup(2, [surface], number + 1, block.name)
-    for number, segments in enumerate(_joint_segments(structure, outlines, points)):
-        name = structure.joints[number].name
-        gmsh.model.addPhysicalGroup(1, [lines[s] for s in segments], number + 1, name)
+    for number, (joint, edges) in enumerate(zip(structure.joints, outlines.joints, strict=True)):
+        lines = [line for edge in edges for line in pieces[edge]]
+        gmsh.model.addPhysicalGroup(1, lines, number + 1, joint.name)
     geo.synchronize()
-    gmsh.model.mesh.generate(2)
+    _fill(division)
 
 
-def _shared_outlines(
-    structure: Structure, meshing: Meshing
-) -> tuple[list[NDArray[np.intp]], Array]:
-    """Outlines as numbers of points that touching blocks share, and those points."""
-    near = TOUCHING * structure.size
-    drawn = [block.drawn(_along(block, meshing)) for block in structure.blocks]
-    every = np.concatenate(drawn)
-    first = np.array([min(group) for group in cKDTree(every).query_ball_point(every, near)])
-    kept, number = np.unique(first, return_inverse=True)
-    points = every[kept]
-    starts = np.cumsum([0, *map(len, drawn)])
-    outlines = [
-        _with_points_on_edges(number[start : start + len(own)], points, near)
-        for start, own in zip(starts, drawn, strict=False)
-    ]
-    return outlines, points
+def _pieces(division: Division, edge: int, corners: list[int]) -> list[int]:
+    """Lines along an edge, of as many cells each as its number is a multiple of."""
+    geo = gmsh.model.geo
+    unit = int(division.units[edge])
+    first, last = division.outlines.edges[edge]
+    start, end = division.outlines.points[[first, last]]
+    inner = division.stations[edge][unit:-unit:unit, None]
+    points = [geo.addPoint(x, y, 0.0) for x, y in start + (end - start) * inner]
+    lines = [geo.addLine(a, b) for a, b in pairwise([corners[first], *points, corners[last]])]
+    for line in lines:
+        geo.mesh.setTransfiniteCurve(line, unit + 1)
+    return lines
 
 
-def _with_points_on_edges(
-    outline: NDArray[np.intp], points: Array, near: float
-) -> NDArray[np.intp]:
-    """Insert points of other blocks that lie on an outline's edges."""
-    result: list[int] = []
-    for a, b in zip(outline, np.roll(outline, -1), strict=True):
-        edge = points[b] - points[a]
-        length = np.linalg.norm(edge)
-        along = (points - points[a]) @ edge / length
-        off = np.abs((points - points[a]) @ np.array([-edge[1], edge[0]]) / length)
-        inside = np.flatnonzero((off <= near) & (along > near) & (along < length - near))
-        result += [a, *inside[np.argsort(along[inside])]]
-    return np.array(result)
+def _run(lines: list[int], forward: bool) -> list[int]:
+    """Lines along an edge, or back along it."""
+    return lines if forward else [-line for line in reversed(lines)]
 
 
-def _along(block: Block, meshing: Meshing) -> int:
-    """Cells along a block; an abutment, which does not deform, has one."""
-    return 1 if block.fixed else meshing.along
+def _fill(division: Division) -> None:
+    """Mesh the blocks, those without corners with cells of their sizes."""
 
+    def size(dimension: int, tag: int, x: float, y: float, z: float, given: float) -> float:
+        own = division.sizes.get(tag - 1) if dimension == 2 else None
+        return given if own is None else float(own.at(np.array([x, y])))
 
-def _corner_points(block: Block, points: Array) -> list[int]:
-    """Numbers of the points at the four corners of a block."""
-    assert block.corners is not None
-    corners = block.points[list(block.corners)]
-    return [int(np.argmin(np.sum((points - corner) ** 2, axis=1))) for corner in corners]
-
-
-def _cells_on_segments(
-    structure: Structure, outlines: list[NDArray[np.intp]], points: Array, meshing: Meshing
-) -> dict[Segment, int]:
-    """Number of cells on each segment between two points."""
-    counts: dict[Segment, int] = {}
-    for block, outline in zip(structure.blocks, outlines, strict=True):
-        wanted = (_along(block, meshing), meshing.through)
-        for side, segments in enumerate(_sides(block, outline, points)):
-            lengths = np.array([np.linalg.norm(points[b] - points[a]) for a, b in segments])
-            if block.corners is None:
-                size = min(joint.depth for joint in structure.joints) / meshing.through
-                shares = np.ceil(lengths / size - 1e-9).astype(int)
-            else:
-                shares = _shares(lengths, wanted[side % 2], block)
-            for (a, b), share in zip(segments, shares, strict=True):
-                key = (min(a, b), max(a, b))
-                if block.corners is None and key in counts:
-                    continue
-                if counts.setdefault(key, int(share)) != share:
-                    raise MeshError(
-                        f"block '{block.name}' wants {share} cells where a neighbour has "
-                        f"{counts[key]}: give as many cells along as through the thickness"
-                    )
-    return counts
-
-
-def _sides(block: Block, outline: NDArray[np.intp], points: Array) -> list[list[Segment]]:
-    """Segments of an outline by side: four from corner to corner, or all as one."""
-    if block.corners is None:
-        return [list(zip(outline, np.roll(outline, -1), strict=True))]
-    starts = [int(np.flatnonzero(outline == p)[0]) for p in _corner_points(block, points)]
-    turned = np.roll(outline, -starts[0])
-    ends = [(start - starts[0]) % len(outline) for start in starts] + [len(outline)]
-    closed = np.append(turned, turned[0])
-    return [list(zip(closed[a:b], closed[a + 1 : b + 1], strict=True)) for a, b in pairwise(ends)]
-
-
-def _shares(lengths: Array, cells: int, block: Block) -> NDArray[np.intp]:
-    """Deal a side's cells to its segments, in proportion to their lengths."""
-    if cells < len(lengths):
+    if division.sizes:
+        gmsh.option.setNumber("Mesh.RecombinationAlgorithm", FULL_QUAD)
+    gmsh.option.setNumber("Mesh.Algorithm", FRONTAL)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.model.mesh.setSizeCallback(size)
+    try:
+        gmsh.model.mesh.generate(2)
+    except Exception as error:  # gmsh raises nothing more specific
+        names = [division.outlines.structure.blocks[number].name for number in division.sizes]
         raise MeshError(
-            f"a side of block '{block.name}' has {len(lengths)} pieces but only {cells} cells: "
-            "give at least one cell a piece"
-        )
-    ends = np.round(np.cumsum(lengths) / lengths.sum() * cells).astype(int)
-    shares = np.diff(ends, prepend=0)
-    if shares.min() < 1:
+            f"gmsh cannot mesh the blocks: {error}: look for outlines that cross themselves or one "
+            f"another, first among those without corners, {names}"
+        ) from error
+    if len(gmsh.model.mesh.getElementTypes(2)) > 1:
         raise MeshError(
-            f"a side of block '{block.name}' has pieces of very different length: give more cells"
+            "triangles are left among the quadrilaterals, and a mesh has one kind of cell: use "
+            "cell = 'triangle'"
         )
-    return shares
-
-
-def _joint_segments(
-    structure: Structure, outlines: list[NDArray[np.intp]], points: Array
-) -> list[list[Segment]]:
-    """Segments on each joint: those that both its blocks have, between its ends."""
-    own = [
-        {(min(a, b), max(a, b)) for a, b in zip(line, np.roll(line, -1), strict=True)}
-        for line in outlines
-    ]
-    near = TOUCHING * structure.size
-    found = []
-    for joint in structure.joints:
-        segments = []
-        for a, b in own[joint.lower] & own[joint.higher]:
-            relative = points[[a, b]] - joint.ends[0]
-            along = relative @ joint.tangent
-            off = relative - along[:, None] * joint.tangent
-            if np.all(np.abs(off) <= near) and np.all(
-                (along > -near) & (along < joint.depth + near)
-            ):
-                segments.append((a, b))
-        found.append(segments)
-    return found
 
 
 def _imported(structure: Structure) -> Mesh:
