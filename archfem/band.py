@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from archfem.kernel import ITERATIONS, SETTLED, finish, integrals, open_part
+from archfem.products import times
 
 
 @numba.njit(cache=True)
@@ -35,7 +36,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
     changed = True
     for step in range(len(loads)):
         _constants(series[step], matrices, numbers, constant, contact)
-        _times(matrices.opening, contact, base)
+        times(matrices.opening, contact, base)
         gap, passes = gaps[step + 1], 0
         while True:
             passes += 1
@@ -45,7 +46,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
             changed = False
             _right(change, loads[step], constant, (stiffness, base), matrices.opening, law)
             _solve(factor, change)
-            _times(matrices.opening, change, gap)
+            times(matrices.opening, change, gap)
             for row in range(points):
                 gap[row] = base[row] + seen * gap[row]
             _closed(gap, law, new)
@@ -56,7 +57,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
         iterations[step] = passes
         finish(series[step], series[step + 1], change, (beta, gamma, dt, lag), contact)
         if share != 1.0:
-            _times(matrices.opening, contact, gap)
+            times(matrices.opening, contact, gap)
             _closed(gap, law, new)
         _resultants(resultants[step], gap, new, matrices.shear, contact, law)
     return len(loads)
@@ -84,17 +85,6 @@ def _constants(state, matrices, numbers, constant, contact):  # type: ignore
                 + matrices.always[entry] * contact[j]
             )
         constant[i] = total
-
-
-@numba.njit(cache=True)
-def _times(rows, vector, result):  # type: ignore
-    """Product of sparse rows (indptr, indices, data) and a vector."""
-    indptr, indices, data = rows
-    for row in range(len(result)):
-        total = 0.0
-        for entry in range(indptr[row], indptr[row + 1]):
-            total += data[entry] * vector[indices[entry]]
-        result[row] = total
 
 
 @numba.njit(cache=True)
@@ -211,7 +201,7 @@ def _resultants(result, gap, stiffness, shear, contact, law):  # type: ignore
     """N, V, M of every joint from the gaps at its points and the stiffness that belongs to them."""
     facets, _, arm, joint = law
     result[:] = 0.0
-    _times(shear, contact, result[:, 1])
+    times(shear, contact, result[:, 1])
     for row in range(len(gap)):
         if gap[row] > 0.0 and (not facets or gap[row ^ 1] > 0.0):
             continue  # open: it carries exactly nothing
@@ -272,8 +262,8 @@ def _loss(state, matrices, lag, law, damping):  # type: ignore
         potential += 0.5 * state[0, i] * elastic
         damping[i] = rate + lag * late
     gap, seen = np.empty(len(law[1])), np.empty(len(law[1]))
-    _times(matrices.opening, state[0], gap)
-    _times(matrices.opening, state[0] + lag * state[1], seen)
+    times(matrices.opening, state[0], gap)
+    times(matrices.opening, state[0] + lag * state[1], seen)
     stored, acting = np.zeros((len(gap), 2)), np.zeros((len(gap), 2))
     _closed(gap, law, stored)
     _closed(seen, law, acting)

@@ -6,7 +6,6 @@ the equilibrium solves of `dynamics`, to rounding, like `contact`, and is the fa
 long structures; it also takes any damping.
 """
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,12 +13,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem import band
-from archfem.batches import compiled_law, in_batches
-from archfem.dynamics import Batch, State, Stepper
+from archfem.batches import Room, compiled_law, shear_resultants
+from archfem.dynamics import Stepper
 from archfem.models.jointed import Jointed
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.schemes import Rayleigh, Scheme
 from archfem.structure import Array
 
 
@@ -75,114 +71,83 @@ def _bandwidth(matrix: sparse.csr_matrix, permutation: Array) -> int:
     return int(np.abs(place[rows] - place[matrix.indices]).max(initial=0))
 
 
-class ChainStepper:
-    """Advances a model of small bandwidth under a ground motion.
+class ChainMethod:
+    """Steps on a model's matrices of small bandwidth.
 
-    A step whose joints do not settle is taken by SNES instead.
+    Args:
+        exact: the same steps, and what they are made of.
     """
 
     name = "chain"
 
-    def __init__(
-        self,
-        model: Jointed,
-        motion: Motion,
-        *,
-        damping: Rayleigh | None = None,
-        scheme: Scheme | None = None,
-        newton: Newton | None = None,
-    ) -> None:
-        self.model = model
-        self.motion = motion
-        self.exact = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
-        self.lag = self.exact.lag
-        self._order, self._width = order(model)
-        self._weight = self.exact.weight[self._order]
-        self._body = model.body[self._order]
-        self._law = compiled_law(model)
+    def __init__(self, exact: Stepper) -> None:
+        assert isinstance(exact.model, Jointed)
+        self._exact = exact
+        self._model = exact.model
+        self._order, self._width = order(self._model)
+        self._place = np.argsort(self._order)
+        self._weight = exact.weight[self._order]
+        self._body = self._model.body[self._order]
+        self._law = compiled_law(self._model)
         self._step: tuple[float, Matrices, tuple[float, ...]] | None = None
 
-    def at_rest(self, q: Array, time: float = 0.0) -> State:
-        """The state of a structure at rest as the ground begins to move."""
-        return self.exact.at_rest(q, time)
+    def enter(self, vectors: Array) -> Array:
+        """From coordinates to those of small bandwidth (3, n)."""
+        return vectors[:, self._order]
 
-    def energy(self, state: State) -> Array:
-        """Kinetic and potential energy of a state, and two zeros (4,) [J]."""
-        return self.exact.energy(state)
+    def leave(self, vectors: Array) -> Array:
+        """Back from those (3, n)."""
+        return vectors[:, self._place]
 
-    def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
-        """Yield the steps to the end, many at a time.
-
-        Args:
-            start: state from which to go.
-            dt: time step [s].
-            end: time of the last step [s].
-
-        Raises:
-            DidNotConverge: SNES failed as well; `last` is the state before.
-        """
-        return in_batches(self._batch, self.exact, start, dt=dt, end=end)
-
-    def _batch(self, state: State, dt: float, times: Array) -> tuple[Batch, bool]:
-        """Take steps up to these times, or up to one whose joints do not settle."""
+    def take(self, dt: float, room: Room) -> int:
+        """Take steps up to the last, or up to one whose joints do not settle."""
         matrices, numbers = self._prepared(dt)
-        place = np.argsort(self._order)
-        series = np.empty((len(times) + 1, 3, self.model.size))
-        series[0] = np.stack([state.q, state.velocity, state.acceleration])[:, self._order]
-        gaps = np.empty((len(series), len(self._law[1])))
-        gaps[0] = self.model.joints.opening @ (state.q + self.lag * state.velocity)
-        resultants = np.empty((len(times), self.model.joints.points.count, 3))
-        iterations = np.zeros(len(times), dtype=np.int64)
-        loads = self._weight + self._ground(times + self.exact.scheme.alpha * dt)
+        gaps = np.empty((len(room.series), len(room.gap)))
+        gaps[0] = room.gap
         count = band.advance(
-            series, gaps, resultants, iterations, loads, matrices, numbers, self._law
+            room.series,
+            gaps,
+            room.resultants,
+            room.iterations,
+            self._weight - room.seen @ self._body.T,
+            matrices,
+            numbers,
+            self._law,
         )
-        ground = self._ground(np.append(times[0] - dt, times[:count]))
-        batch = Batch(
-            times[:count],
-            resultants[:count],
-            iterations[:count],
-            np.full(count, dt),
-            band.energies(
-                series[: count + 1],
-                (self._weight, 0.5 * (ground[:-1] + ground[1:])),
-                matrices,
-                self.lag,
-                self._law,
-            ),
-            lambda k: State(float(times[k]), *(row[place] for row in series[k + 1])),
+        room.energy[:count] = band.energies(
+            room.series[: count + 1],
+            (self._weight, -room.mean[:count] @ self._body.T),
+            matrices,
+            self._exact.lag,
+            self._law,
         )
-        return batch, count == len(times)
-
-    def _ground(self, times: Array) -> Array:
-        """Forces of the ground (steps, n)."""
-        return -self.motion.at(times) @ self._body.T
+        return int(count)
 
     def _prepared(self, dt: float) -> tuple[Matrices, tuple[float, ...]]:
         """What a step of this length needs."""
         if self._step is None or self._step[0] != dt:
-            scheme = self.exact.scheme
+            scheme = self._exact.scheme
             share = 1.0 + scheme.alpha
             rate = scheme.gamma / (scheme.beta * dt)
-            numbers = (scheme.beta, scheme.gamma, share, self.lag, dt)
+            numbers = (scheme.beta, scheme.gamma, share, self._exact.lag, dt)
             self._step = (dt, self._matrices(dt, share, rate), numbers)
-        return self._step[1], self._step[2]
+        return self._step[1:]
 
     def _matrices(self, dt: float, share: float, rate: float) -> Matrices:
-        model, joints = self.model, self.model.joints
+        model, joints = self._model, self._model.joints
         always = model.blocks + joints.shear_stiffness()
-        parts = [self._ordered(part) for part in (model.mass, self.exact.damping, always)]
+        parts = [self._ordered(part) for part in (model.mass, self._exact.damping, always)]
         mass, damping, stiffness = parts
         linear = (
-            mass / (self.exact.scheme.beta * dt**2)
+            mass / (self._exact.scheme.beta * dt**2)
             + share * rate * damping
-            + share * (1.0 + self.lag * rate) * stiffness
+            + share * (1.0 + self._exact.lag * rate) * stiffness
         )
         pattern = (abs(mass) + abs(damping) + abs(stiffness)).tocsr()
         pattern.sort_indices()
         zero = pattern * 0.0
         opening = joints.opening[:, self._order].tocsr()
-        shear = (joints.sums[0] @ joints.law.shear @ joints.slip)[:, self._order].tocsr()
+        shear = shear_resultants(model)[:, self._order].tocsr()
         entries = [_entries(part, zero) for part in parts]
         return Matrices(
             pattern.indptr,

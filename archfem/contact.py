@@ -13,20 +13,17 @@ dynamic analysis of structures, 2002, chapter 18), here without truncation: the 
 the equilibrium solves of `dynamics`, to rounding.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
 
 from archfem import kernel
-from archfem.batches import compiled_law, in_batches
-from archfem.dynamics import Batch, State, Stepper
+from archfem.batches import Room, compiled_law, shear_resultants
+from archfem.dynamics import Stepper
 from archfem.modal_energy import energies
 from archfem.models.jointed import Jointed
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.schemes import Rayleigh, Scheme
+from archfem.schemes import Rayleigh
 from archfem.structure import Array
 
 LARGEST = 1200
@@ -70,118 +67,81 @@ class _Modes:
     def of(cls, model: Jointed, weight: Array) -> "_Modes":
         squares, shapes = eigh(model.closed().toarray(), model.mass.toarray())
         joints = model.joints
-        shear = joints.sums[0] @ (joints.law.shear @ (joints.slip @ shapes))
         return cls(
             shapes,
             model.mass @ shapes,
             squares,
             np.ascontiguousarray(joints.opening @ shapes),
-            np.ascontiguousarray(shear),
+            np.ascontiguousarray(shear_resultants(model) @ shapes),
             shapes.T @ weight,
             shapes.T @ model.body,
         )
 
 
-class ContactStepper:
-    """Advances a model under a ground motion, in the modes of its closed state.
+class ContactMethod:
+    """Steps in the modes of a model's closed state.
 
-    A step whose open points do not settle is taken by SNES instead.
+    Args:
+        exact: the same steps, and what they are made of.
+        damping: None is undamped.
     """
 
     name = "contact"
 
-    def __init__(
-        self,
-        model: Jointed,
-        motion: Motion,
-        *,
-        damping: Rayleigh | None = None,
-        scheme: Scheme | None = None,
-        newton: Newton | None = None,
-    ) -> None:
-        self.model = model
-        self.motion = motion
-        self.exact = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
-        self.lag = self.exact.lag
-        self._modes = _Modes.of(model, self.exact.weight)
-        self._law = compiled_law(model)
+    def __init__(self, exact: Stepper, damping: Rayleigh | None) -> None:
+        assert isinstance(exact.model, Jointed)
+        self._scheme = exact.scheme
+        self._lag = exact.lag
+        self._modes = _Modes.of(exact.model, exact.weight)
+        self._law = compiled_law(exact.model)
         rate = damping.stiffness if damping else 0.0
         self._rates = (damping.mass if damping else 0.0) + rate * self._modes.squares
         self._step: tuple[float, kernel.Coefficients, Array] | None = None
 
-    def at_rest(self, q: Array, time: float = 0.0) -> State:
-        """The state of a structure at rest as the ground begins to move."""
-        return self.exact.at_rest(q, time)
+    def enter(self, vectors: Array) -> Array:
+        """From displacements, velocities, … to modes (3, n)."""
+        return np.asarray(vectors @ self._modes.back)
 
-    def energy(self, state: State) -> Array:
-        """Kinetic and potential energy of a state, and two zeros (4,) [J]."""
-        return self.exact.energy(state)
+    def leave(self, vectors: Array) -> Array:
+        """Back from modes (3, n)."""
+        return np.stack([self._modes.shapes @ each for each in vectors])
 
-    def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
-        """Yield the steps to the end, many at a time.
-
-        Args:
-            start: state from which to go.
-            dt: time step [s].
-            end: time of the last step [s].
-
-        Raises:
-            DidNotConverge: SNES failed as well; `last` is the state before.
-        """
-        return in_batches(self._batch, self.exact, start, dt=dt, end=end)
-
-    def _batch(self, state: State, dt: float, times: Array) -> tuple[Batch, bool]:
-        """Take steps up to these times, or up to one whose open points do not settle."""
-        modes, coefficients, compliance = self._prepared(dt)
-        series = np.empty((len(times) + 1, 3, len(modes.squares)))
-        series[0] = np.stack([state.q, state.velocity, state.acceleration]) @ modes.back
-        gaps = np.empty((len(series), len(modes.opening)))
-        gaps[0] = modes.opening @ (series[0, 0] + self.lag * series[0, 1])
-        resultants = np.empty((len(times), self.model.joints.points.count, 3))
-        iterations = np.zeros(len(times), dtype=np.int64)
+    def take(self, dt: float, room: Room) -> int:
+        """Take steps up to the last, or up to one whose open points do not settle."""
+        coefficients, compliance = self._prepared(dt)
+        modes = self._modes
+        gaps = np.empty((len(room.series), len(room.gap)))
+        gaps[0] = room.gap
         count = kernel.advance(
-            series,
+            room.series,
             gaps,
-            resultants,
-            iterations,
-            modes.weight + self._ground(times + self.exact.scheme.alpha * dt),
+            room.resultants,
+            room.iterations,
+            modes.weight - room.seen @ modes.body.T,
             (modes.opening, modes.shear, compliance),
             coefficients,
             self._law,
         )
-        ground = self._ground(np.append(times[0] - dt, times[:count]))
-        batch = Batch(
-            times[:count],
-            resultants[:count],
-            iterations[:count],
-            np.full(count, dt),
-            energies(
-                series[: count + 1],
-                gaps[: count + 1],
-                (modes.weight, 0.5 * (ground[:-1] + ground[1:])),
-                modes.opening,
-                coefficients,
-                self._law,
-            ),
-            lambda k: State(float(times[k]), *(modes.shapes @ x for x in series[k + 1])),
+        room.energy[:count] = energies(
+            room.series[: count + 1],
+            gaps[: count + 1],
+            (modes.weight, -room.mean[:count] @ modes.body.T),
+            modes.opening,
+            coefficients,
+            self._law,
         )
-        return batch, count == len(times)
+        return int(count)
 
-    def _ground(self, times: Array) -> Array:
-        """Modal forces of the ground (steps, n)."""
-        return -self.motion.at(times) @ self._modes.body.T
-
-    def _prepared(self, dt: float) -> tuple[_Modes, "kernel.Coefficients", Array]:
+    def _prepared(self, dt: float) -> tuple["kernel.Coefficients", Array]:
         """What a step of this length needs."""
-        modes = self._modes
         if self._step is None or self._step[0] != dt:
-            scheme = self.exact.scheme
+            scheme, modes = self._scheme, self._modes
             numbers = kernel.coefficients(
                 dt,
                 (scheme.beta, scheme.gamma, scheme.alpha),
-                self.lag,
+                self._lag,
                 (modes.squares, self._rates),
             )
             compliance = (modes.opening * (numbers.seen * numbers.gain)) @ modes.opening.T
             self._step = (dt, numbers, np.ascontiguousarray(compliance))
-        return modes, self._step[1], self._step[2]
+        return self._step[1:]

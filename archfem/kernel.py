@@ -90,7 +90,7 @@ def advance(series, gaps, resultants, iterations, loads, matrices, numbers, law)
         if numbers.share != 1.0:
             gap = opening @ contact
         gaps[step + 1] = gap
-        _resultants(resultants[step], gap, shear @ contact, law)
+        joint_resultants(resultants[step], gap, shear @ contact, law)
     return len(loads)
 
 
@@ -231,7 +231,7 @@ def integrals(low, high):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _resultants(result, gap, shear, law):  # type: ignore
+def joint_resultants(result, gap, shear, law):  # type: ignore
     """N, V, M of every joint from the gaps at its points."""
     facets, stiffness, arm, joint = law
     result[:] = 0.0

@@ -1,8 +1,10 @@
 """Which stepper takes a run: the fastest that gives the history of the equilibrium solves."""
 
-from archfem import chain, contact
-from archfem.chain import ChainStepper
-from archfem.contact import ContactStepper
+from archfem import chain, compliance, contact
+from archfem.batches import CompiledStepper, Method
+from archfem.chain import ChainMethod
+from archfem.compliance import ComplianceMethod
+from archfem.contact import ContactMethod
 from archfem.dynamics import Stepper
 from archfem.errors import InvalidInput
 from archfem.models import Model
@@ -11,9 +13,9 @@ from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.schemes import Rayleigh, Scheme
 
-METHODS = ("auto", "contact", "chain", "snes")
+METHODS = ("auto", "contact", "chain", "compliance", "snes")
 
-AnyStepper = Stepper | ContactStepper | ChainStepper
+AnyStepper = Stepper | CompiledStepper
 
 
 def stepper_for(
@@ -21,15 +23,15 @@ def stepper_for(
     model: Model,
     motion: Motion,
     *,
-    damping: Rayleigh | None,
-    scheme: Scheme | None,
-    newton: Newton | None,
+    damping: Rayleigh | None = None,
+    scheme: Scheme | None = None,
+    newton: Newton | None = None,
 ) -> AnyStepper:
     """The stepper of a run.
 
     Args:
-        method: "snes", "contact", "chain", or "auto": of the last two the one with less work,
-            where one applies.
+        method: "snes", "contact", "chain", "compliance", or "auto": of the last three the one with
+            the least work, where one applies.
         model: any rung.
         motion: of the ground.
         damping: None is undamped.
@@ -51,12 +53,20 @@ def stepper_for(
             f"the {method} stepper does not apply to a '{model.fidelity}' model of {model.size} "
             f"coordinates under this damping: contact needs at most {contact.LARGEST} of them and "
             f"damping on closed or initial joints, chain a bandwidth up to {chain.WIDEST}, and "
-            "both joints whose supports have not moved; use method='snes'"
+            "all three joints whose supports have not moved; use method='snes'"
         )
-    if isinstance(model, Jointed) and chosen != "snes":
-        kind = ContactStepper if chosen == "contact" else ChainStepper
-        return kind(model, motion, damping=damping, scheme=scheme, newton=newton)
-    return Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+    exact = Stepper(model, motion, damping=damping, scheme=scheme, newton=newton)
+    if chosen == "snes":
+        return exact
+    return CompiledStepper(_method(chosen, exact, damping), exact)
+
+
+def _method(name: str, exact: Stepper, damping: Rayleigh | None) -> Method:
+    if name == "chain":
+        return ChainMethod(exact)
+    if name == "compliance":
+        return ComplianceMethod(exact, damping)
+    return ContactMethod(exact, damping)
 
 
 def _fitting(model: Model, damping: Rayleigh | None) -> dict[str, float]:
@@ -69,4 +79,6 @@ def _fitting(model: Model, damping: Rayleigh | None) -> dict[str, float]:
     _, width = chain.order(model)
     if chain.applies(model, width):
         fitting["chain"] = chain.work(model, width)
+    if compliance.applies(model):
+        fitting["compliance"] = compliance.work(model)
     return fitting

@@ -14,11 +14,12 @@ from pathlib import Path
 
 import numpy as np
 from setting import DT, ground_motion, options, ring
-from stepping import STEPPERS, Run, warm_up
+from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
 from archfem import kernel
+from archfem.steppers import METHODS
 
 LINES = 12
 """Functions shown."""
@@ -56,8 +57,9 @@ def parts(run: Run, repeat: int) -> str:
 
     Each call from Python costs about a microsecond, which the loop is spared.
     """
-    modes, numbers, compliance = run.stepper._prepared(DT)
-    size, law = len(modes.squares), run.stepper._law
+    method = run.stepper.method
+    modes, (numbers, compliance) = method._modes, method._prepared(DT)
+    size, law = len(modes.squares), method._law
     state, new = np.zeros((3, size)), np.zeros((3, size))
     state[0] = modes.shapes.T @ (run.model.mass @ run.dead.q)
     change, contact = np.zeros(size), np.zeros(size)
@@ -74,7 +76,7 @@ def parts(run: Run, repeat: int) -> str:
             state, new, change, (numbers.beta, numbers.gamma, DT, numbers.lag), contact
         ),
         "shear from modes": lambda: modes.shear @ contact,
-        "resultants": lambda: kernel._resultants(rests, gap, slips, law),
+        "resultants": lambda: kernel.joint_resultants(rests, gap, slips, law),
     }
     times = 2000
     rows = []
@@ -109,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
     made = options(__doc__.splitlines()[0])
     made.add_argument("--fidelity")
     made.add_argument("--quadrature", default="nodal")
-    made.add_argument("--method", default="contact", choices=sorted(STEPPERS))
+    made.add_argument("--method", default="contact", choices=METHODS)
     return made
 
 

@@ -5,12 +5,9 @@ from setting import DAMPING, DT
 from timing import Clock, least, stopwatch, watched
 
 import archfem as af
-from archfem.chain import ChainStepper
-from archfem.contact import ContactStepper
-from archfem.dynamics import State, Stepper
+from archfem.dynamics import State
 from archfem.models.jointed import Jointed
-
-STEPPERS = {"snes": Stepper, "contact": ContactStepper, "chain": ChainStepper}
+from archfem.steppers import stepper_for
 
 
 class Run:
@@ -25,7 +22,7 @@ class Run:
         self.motion = motion
         self.dead = af.dead_load(model)
         watch = stopwatch()
-        self.stepper = STEPPERS[method](model, motion, damping=DAMPING)
+        self.stepper = stepper_for(method, model, motion, damping=DAMPING)
         self.start: State = self.stepper.at_rest(self.dead.q)
         next(iter(self.stepper.batches(self.start, DT, DT)))
         self.setup = watch()[0]

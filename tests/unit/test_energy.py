@@ -29,7 +29,7 @@ def model(ring):
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize("joints", ["closed", "initial"])
-@pytest.mark.parametrize("fast", ["contact", "chain"])
+@pytest.mark.parametrize("fast", ["contact", "chain", "compliance"])
 def test_all_steppers_keep_the_same_balance(ring, rule, joints, fast):
     """To the 1e-8 within which their histories agree."""
     model = build(ring, fidelity="faces", quadrature=rule, cells=(2, 2))
@@ -61,7 +61,7 @@ def test_drift_falls_with_the_step(model):
 def test_balance_is_exact_while_joints_stay_closed(stack):
     """Average acceleration keeps it, with damping and with work of the ground, to a millionth."""
     model = build(stack, fidelity="rigid")
-    for method in ("snes", "contact", "chain"):
+    for method in ("snes", "contact", "chain", "compliance"):
         run = time_history(model, MOTION.scaled(0.05), damping=DAMPING, method=method)
         assert run.dataset["iterations"].max() <= 1
         assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
@@ -160,7 +160,7 @@ def test_numbers_that_overflow_end_in_an_error():
     stiff = Contact(1e16, 1e16)
     model = build(column(breadth=1.0, heights=[1.0], contact=stiff), fidelity="rigid")
     state = State(0.0, np.zeros(3), np.array([0.0, 1e200, 0.0]), np.zeros(3))
-    for method in ("snes", "contact", "chain"):
+    for method in ("snes", "contact", "chain", "compliance"):
         with (
             np.errstate(all="ignore"),
             pytest.raises(DidNotConverge, match="not numbers any more") as caught,

@@ -97,7 +97,7 @@ def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule):
             "newton": TIGHT,
         }
         slow = time_history(model, short, method="snes", **given)
-        for method in ("contact", "chain"):
+        for method in ("contact", "chain", "compliance"):
             fast = time_history(model, short, method=method, **given)
             assert fast.dataset.attrs["method"] == method
             assert fast.dataset.attrs["fallback_steps"] == 0
@@ -129,11 +129,12 @@ def test_contact_stepper_refuses_what_does_not_fall_into_modes(ring, full):
         time_history(full, MOTION, method="fast")
 
 
-def test_chain_stepper_takes_damping_on_the_blocks_alone(ring):
+@pytest.mark.parametrize("method", ["chain", "compliance"])
+def test_damping_on_the_blocks_alone(ring, method):
     model = build(ring, fidelity="faces", cells=(2, 2), quadrature="nodal")
     given = {"damping": Rayleigh(0.05, (8.0, 16.0), "none"), "newton": TIGHT}
     short = MOTION.cut(0.8, 1.6)
-    runs = [time_history(model, short, method=m, **given).joints["M"] for m in ("snes", "chain")]
+    runs = [time_history(model, short, method=m, **given).joints["M"] for m in ("snes", method)]
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
