@@ -5,13 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
 
+import numpy as np
 from tqdm import tqdm
 
 from archfem.criteria import HINGE, Mechanism
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import EveryMechanism, possible_counts
 from archfem.models import Model
-from archfem.motion import Motion
+from archfem.motion import LARGEST_PEAK, Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import Equilibrium, dead_load
@@ -102,7 +103,9 @@ class MechanismScales:
         return MechanismScales(self.asked, tuple(trials))
 
     def __getitem__(self, definition: str) -> Bracket:
-        """The bracket of one of `DEFINITIONS`."""
+        """The bracket of one of `DEFINITIONS`; without bounds where it was not asked for."""
+        if definition not in self.asked:
+            return Bracket(0.0, inf, None, ())
         failing = [trial for trial in self.trials if trial.fails(definition)]
         surviving = [trial.scale for trial in self.trials if trial.survives(definition)]
         upper = failing[0].scale if failing else inf
@@ -165,7 +168,7 @@ def mechanism_scales(
         dt: time step [s], likewise.
         limit: of |e| for a hinge [-].
         precision: relative width of the last brackets [-].
-        between: least and largest scale tried [-].
+        between: least and largest scale tried [-]; no ground motion may exceed 5 g.
 
     Returns:
         Brackets, mechanisms and runs; at most 40 runs are made.
@@ -183,6 +186,9 @@ def mechanism_scales(
             "above 0, the smaller first"
         )
     start = start or dead_load(model)
+    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
+    most = LARGEST_PEAK / peak if peak > 0.0 else inf  # no motion may be stronger
+    least, largest = between
 
     def trial(scale: float) -> Trial:
         try:
@@ -201,7 +207,9 @@ def mechanism_scales(
         return Trial(scale, first_mechanisms(run, limit), run.outcome)
 
     asked = (*possible_counts(model.structure), "verified")
-    return _searched(MechanismScales(asked), trial, precision, between)
+    return _searched(
+        MechanismScales(asked), trial, precision, (least, max(least, min(largest, most)))
+    )
 
 
 def _searched(
