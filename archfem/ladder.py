@@ -97,6 +97,7 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
     fidelity: str | Mapping[str, str] = "full",
     cells: tuple[int, int] = (4, 4),
     cell: str = "quadrilateral",
+    coarse: float | None = None,
     degree: int = 1,
     quadrature: str = "lobatto",
     points: int | None = None,
@@ -113,6 +114,7 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
             `prediction`; cells, quadrature and points are then chosen too.
         cells: through the thickness (facets on a joint) and along each block.
         cell: "quadrilateral" or "triangle".
+        coarse: largest cell inside blocks without corners [m].
         degree: of the elements, 1 or 2.
         quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
         points: on each facet, 3 where not given.
@@ -132,6 +134,7 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
         fidelity=fidelity,
         cells=cells,
         cell=cell,
+        coarse=coarse,
         degree=degree,
         quadrature=quadrature,
         points=points,

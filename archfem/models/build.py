@@ -26,6 +26,7 @@ def build(
     fidelity: str | Mapping[str, str] = "full",
     cells: tuple[int, int] = (4, 4),
     cell: str = "quadrilateral",
+    coarse: float | None = None,
     degree: int = 1,
     quadrature: str = "lobatto",
     points: int | None = None,
@@ -42,8 +43,10 @@ def build(
             "monolithic": all nodes, UFL forms assembled at each iteration.
             Or rungs by block name or part, with "rest" for all others, for example
             {"backfill": "full", "rest": "faces"}.
-        cells: through the thickness (facets on a joint) and along each block.
+        cells: through the thickness (facets on a joint) and along each block, at least.
         cell: "quadrilateral" or "triangle".
+        coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
+            given, half of the block's mean thickness.
         degree: of the elements, 1 or 2.
         quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
         points: on each facet, 3 where not given.
@@ -71,7 +74,7 @@ def build(
     from archfem.models.monolithic import Monolithic
     from archfem.space import broken_space
 
-    space = broken_space(mesh(structure, Meshing(*cells, cell)), degree)
+    space = broken_space(mesh(structure, Meshing(*cells, cell, coarse)), degree)
     if fidelity == "monolithic":
         return Monolithic(space, rule)
     model = full(space, rule)
