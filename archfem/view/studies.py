@@ -1,0 +1,52 @@
+"""A study in one picture: at which strength of the motions mechanisms begin, case by case."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from archfem.studies import Finding
+from archfem.verdicts import DEFINITIONS
+from archfem.view.style import EDGE, FAINT, LINES, SMALL, WIDE, dress
+
+
+def draw_study(findings: Mapping[str, Finding], reduction: float = 1.0) -> Figure:
+    """Draw the factors on the motions at which mechanisms begin, a row for each case.
+
+    A mark is the median over the pairs, its line their range; an arrow goes beyond what was tried.
+
+    Args:
+        findings: by name of the case, with scales.
+        reduction: R, drawn as a line at 1 / R beside that of the whole motions.
+    """
+    names = list(findings)
+    figure = Figure(figsize=(0.75 * WIDE, 1.1 + 0.42 * len(names)), layout="constrained")
+    axes = figure.add_subplot()
+    dress(axes, "factor on the motions at the first mechanism [-]")
+    axes.set_xscale("log")
+    tried = [np.array([f.least(d) for f in findings.values()]) for d in DEFINITIONS]
+    finite = np.concatenate([each[np.isfinite(each)] for each in tried])
+    end = 1.3 * max(finite.max(initial=1.0), 1.0)
+    for number, (definition, factors) in enumerate(zip(DEFINITIONS, tried, strict=True)):
+        rows = np.arange(len(names)) + 0.16 * (number - 1.5)
+        low, middle, high = np.quantile(factors, [0.0, 0.5, 1.0], axis=1, method="nearest")
+        axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), color=LINES[number], lw=1.4)
+        inside = np.isfinite(middle)
+        axes.plot(middle[inside], rows[inside], "o", color=LINES[number], ms=5, label=definition)
+        axes.plot(np.full((~inside).sum(), end), rows[~inside], ">", color=LINES[number], ms=5)
+    for factor, words in ((1.0, "whole"), (1.0 / reduction, f"R = {reduction:g}")):
+        axes.axvline(factor, color=FAINT, lw=0.9, ls="--", zorder=0)
+        axes.annotate(
+            words, (factor, 1.0), xycoords=("data", "axes fraction"), fontsize=SMALL, color=EDGE,
+            ha="center", va="bottom", xytext=(0, 2), textcoords="offset points",
+        )  # fmt: skip
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlim(0.85 * min(finite.min(initial=1.0), 1.0 / reduction), 1.06 * end)
+    ticks = [
+        tick for tick in (0.1, 0.2, 0.333, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if tick < end
+    ]
+    axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    axes.minorticks_off()
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
+    return figure
