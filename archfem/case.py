@@ -27,6 +27,7 @@ MODEL = {
     "fidelity": str,
     "cells": [int],
     "cell": str,
+    "coarse": "m",
     "degree": int,
     "quadrature": str,
     "points": int,

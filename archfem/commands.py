@@ -99,7 +99,8 @@ def mesh(given: argparse.Namespace) -> None:
 
     case = Case.read(given.case, given.changes)
     through, along = case.model.get("cells", [4, 4])
-    meshing = Meshing(through, along, case.model.get("cell", "quadrilateral"))
+    others = {key: case.model[key] for key in ("cell", "coarse") if key in case.model}
+    meshing = Meshing(through, along, **others)
     write_mesh(case.structure, given.out, meshing)
     print(f"wrote {given.out}")
 
