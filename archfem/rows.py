@@ -1,9 +1,9 @@
 """Rows of stones: which way a ring or a pier runs, so that its joints can be told and counted.
 
 A surveyed ring says nothing of its centre. It is found from the stones: the circle that fits the
-mid-points of the joints between them, and their centroids, best (Kåsa, IEEE Transactions on
-Instrumentation and Measurement 25 (1976) 8). Only directions are taken from it, so an ellipse or a
-pointed arch does as well.
+mid-points of the joints between them best (Kåsa, IEEE Transactions on Instrumentation and
+Measurement 25 (1976) 8), of few stones their centroids too. Only directions are taken from it, so
+that an ellipse or a pointed arch does as well.
 """
 
 from collections.abc import Iterable, Sequence
@@ -58,21 +58,25 @@ class Row:
 
 
 def rows_of(blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]) -> dict[str, Row]:
-    """Find the rows that rings and piers are, by the names of their parts.
+    """Find the rows that rings and piers are, by the names of their parts; without a name none is.
 
     Args:
         blocks: of a structure.
         lines: on which two of them touch, and the numbers of the two.
     """
-    places: dict[str, list[Array]] = {}
+    stones: dict[str, list[Array]] = {}
+    beds: dict[str, list[Array]] = {}
     for block in blocks:
-        if not block.fixed and part_role(block.part) != "other":
-            places.setdefault(block.part, []).append(block.centroid)
+        if block.part and not block.fixed and part_role(block.part) != "other":
+            stones.setdefault(block.part, []).append(block.centroid)
     for a, b, line in lines:
         part = blocks[a].part
-        if part in places and part == blocks[b].part and not blocks[a].fixed | blocks[b].fixed:
-            places[part].append(line.mean(axis=0))
-    return {part: _row(np.array(found), part_role(part)) for part, found in places.items()}
+        if part in stones and part == blocks[b].part and not blocks[a].fixed | blocks[b].fixed:
+            beds.setdefault(part, []).append(line.mean(axis=0))
+    for part, found in stones.items():
+        middles = beds.get(part, [])
+        stones[part] = middles if len(middles) > 2 else [*middles, *found]
+    return {part: _row(np.array(found), part_role(part)) for part, found in stones.items()}
 
 
 def _row(places: Array, role: str) -> Row:

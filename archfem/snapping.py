@@ -60,7 +60,7 @@ def snapped(
         if len(loop) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
         _check_simple(points, name)
-    _check_apart(found, loops, names)
+    _check_apart(found, loops, names, snap)
     _check_gaps(places, loops, names, snap)
     return found, float(moved.max())
 
@@ -180,11 +180,11 @@ def _settle(places: Array, ties: dict[int, Edge]) -> None:
     raise InvalidStructure("vertices near edges do not settle: lower snap, or correct the drawing")
 
 
-def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str]) -> None:
+def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str], snap: float) -> None:
     """Refuse outlines that are the same or overlap."""
     import shapely
 
-    size = float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    near = TOUCHING * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
     polygons = [shapely.Polygon(points) for points in outlines]
     pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T.tolist()
     for a, b in pairs:
@@ -193,12 +193,13 @@ def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str]) -> N
         if set(loops[a]) == set(loops[b]):
             raise InvalidStructure(f"'{names[a]}' and '{names[b]}' are the same: leave one out")
         common = shapely.intersection(polygons[a], polygons[b])
-        if common.area > 0.5 * TOUCHING * size * common.length:
+        depth = 2.0 * common.area / common.length if common.length else 0.0
+        if depth > near:
             x, y = common.centroid.x, common.centroid.y
+            remedy = ", or raise snap above that" if depth < NEARLY * snap else ""
             raise InvalidStructure(
                 f"'{names[a]}' and '{names[b]}' overlap by {1e4 * common.area:.3g} cm², about "
-                f"{2e3 * common.area / common.length:.3g} mm deep at ({x:.3f}, {y:.3f}): correct "
-                "the drawing, or raise snap above that"
+                f"{1e3 * depth:.3g} mm deep at ({x:.3f}, {y:.3f}): correct the drawing{remedy}"
             )
 
 
@@ -206,15 +207,15 @@ def _check_gaps(places: Array, loops: Loops, names: Sequence[str], snap: float) 
     """Refuse blocks that nearly touch."""
     import shapely
 
-    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    near = TOUCHING * float(np.linalg.norm(np.ptp(places, axis=0)))
     polygons = [shapely.Polygon(places[loop]) for loop in loops]
     tree = shapely.STRtree(polygons)
     first = {place: number for number, loop in reversed([*enumerate(loops)]) for place in loop}
     found = []
     for number, a, b in _edges(loops):
         along, off, length = _beside(places, a, b)
-        beside = (off < -TOUCHING * size) & (off >= -NEARLY * snap)
-        beside &= (along > 0.0) & (along < length)
+        beside = (off < -near) & (off >= -NEARLY * snap)
+        beside &= (along > -near) & (along < length + near)
         for place in set(np.flatnonzero(beside).tolist()) - set(loops[number]):
             foot = places[a] + along[place] / length * (places[b] - places[a])
             middle = shapely.Point(0.5 * (foot + places[place]))
