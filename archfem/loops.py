@@ -26,6 +26,9 @@ SHUT = 1e-5
 """Least misfit of loops, per unit of gap, that counts: well above what the linear programme lets
 pass (1e-7), so that it and not this decides close cases."""
 
+ROUND_OFF = 1e-12
+"""Entry of an orthonormal basis below which it is nothing: that joint is in no loop."""
+
 
 @dataclass(frozen=True, eq=False)
 class Loops:
@@ -43,7 +46,8 @@ class Loops:
     def stresses(self) -> Array:
         """Orthonormal basis R of the self-stresses (3 n_joints, r) [-]."""
         gaps = self.blocks.kinematics @ sparse.diags(self.blocks.coordinates)
-        return np.linalg.qr(gaps.toarray(), mode="complete")[0][:, gaps.shape[1] :]
+        basis = np.linalg.qr(gaps.toarray(), mode="complete")[0][:, gaps.shape[1] :]
+        return np.where(np.abs(basis) > ROUND_OFF, basis, 0.0)
 
     @cached_property
     def telling(self) -> NDArray[np.bool_]:

@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from archfem.criteria import (
     counted_mechanism,
+    counted_mechanisms,
     envelope,
     failed,
     first_time,
     hinged,
+    judged,
+    judged_parts,
     longest_duration,
     opened,
     sliding,
@@ -111,3 +115,76 @@ def test_table_says_when_and_how_long(joints):
     assert len(lines) == 19
     assert lines[8].split()[8:12] == ["0.200", "s", "0.300", "s"]
     assert lines[1].split()[-6:] == ["-"] * 6
+
+
+PARTS = ["arch 1"] * 5 + ["pier 1"] * 4 + ["arch 2"] * 5 + ["backfill"] * 6
+
+
+def joints_of(failing):
+    """Twenty joints of two rings, a pier and soil; those failing at each instant slide."""
+    friction = np.zeros((len(failing), 20))
+    for instant, joints in enumerate(failing):
+        friction[instant, list(joints)] = 0.6
+    return xr.Dataset(
+        {
+            "N": (("time", "joint"), np.ones_like(friction)),
+            "eccentricity": (("time", "joint"), np.zeros_like(friction)),
+            "friction": (("time", "joint"), friction),
+        },
+        {
+            "time": np.arange(len(failing), dtype=float),
+            "joint": np.arange(20),
+            "part": ("joint", PARTS),
+            "friction_limit": ("joint", np.full(20, 0.6)),
+        },
+    )
+
+
+def test_definitions_of_a_counted_mechanism():
+    soil, three = range(14, 20), {0, 1, 9}
+    states = [soil, three | set(soil), three | {10}, {0, 5, 6, 7}, {0, 5, 6, 9}, {1, 2, 3, 4, 5}]
+    found = counted_mechanisms(joints_of(states))
+    anywhere, ring, mixed = found.values()
+    assert list(found) == ["any four joints", "four in a ring", "ring and pier"]
+    assert (anywhere.time, anywhere.kind, anywhere.joints) == (2.0, "global", (0, 1, 9, 10))
+    assert (mixed.time, mixed.part, mixed.joints) == (3.0, "arch 1 + pier 1", (0, 5, 6, 7))
+    assert (ring.time, ring.kind, ring.joints) == (5.0, "local", (1, 2, 3, 4))
+    assert (ring.part, mixed.kind) == ("arch 1", "semi-global")
+
+
+def test_four_in_a_pier_are_no_four_in_a_ring():
+    found = counted_mechanisms(joints_of([{5, 6, 7, 8}]))
+    assert found["any four joints"].kind == "local"
+    assert found["four in a ring"] is None
+    assert found["ring and pier"] is None  # no joint of a ring
+
+
+def test_four_of_two_rings_and_a_pier_are_of_no_pair():
+    found = counted_mechanisms(joints_of([{0, 5, 9, 10}]))
+    assert found["any four joints"].kind == "global"
+    assert found["ring and pier"] is None
+
+
+def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
+    joints = joints_of([{0}])
+    assert judged(joints)["joint"].values.tolist() == list(range(14))
+    turned = judged(joints.isel(joint=slice(None, None, -1)))
+    assert turned["joint"].values.tolist() == list(range(13, -1, -1))
+    soil = joints.isel(joint=slice(14, None))
+    assert judged(soil).identical(soil)  # there is nothing else to judge
+    assert judged_parts(["wall", "pier", "wall", "", "fill"]) == ("pier", "")
+    assert judged_parts(["wall", "fill", "wall"]) == ("wall", "fill")
+
+
+def test_a_wall_by_itself_is_counted():
+    joints = joints_of([{14, 15, 16, 17}]).isel(joint=slice(14, None))
+    found = counted_mechanism(joints)
+    assert (found.kind, found.part) == ("local", "backfill")
+
+
+def test_table_holds_judged_joints_only():
+    names = [f"joint {k}" for k in range(20)]
+    joints = joints_of([{0}, {15}]).assign_coords(name=("joint", names))
+    lines = joint_table(joints, joints.isel(time=0)).splitlines()
+    assert len(lines) == 15
+    assert "joint 15" not in "".join(lines)
