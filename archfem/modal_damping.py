@@ -52,14 +52,14 @@ class EffectiveRange:
     @property
     def text(self) -> str:
         """Which modes these are, in a sentence."""
-        ratios = self.modes.mass_ratios[:, 0]
+        ratios, frequencies = self.modes.mass_ratios[:, 0], self.modes.frequencies
         each = ", ".join(
-            f"{number} ({self.modes.frequencies[number - 1]:.2f} Hz, {ratios[number - 1]:.0%})"
+            f"{number} ({frequencies[number - 1]:.2f} Hz, {_percent(ratios[number - 1])})"
             for number in self.numbers
         )
         return (
-            f"modes with at least {self.share:.0%} of the mass along x: {each}; "
-            f"{len(ratios)} modes with {self.found:.1%} looked at"
+            f"modes with at least {_percent(self.share)} of the mass along x: {each}; "
+            f"{len(ratios)} modes with {_percent(self.found)} looked at"
         )
 
 
@@ -91,19 +91,19 @@ def effective_range(
         count = min(2 * count, MOST, model.size)
     numbers = tuple(int(number) + 1 for number in np.flatnonzero(ratios >= share))
     if len(numbers) < 2:
+        largest = " and ".join(_percent(ratio) for ratio in np.sort(ratios)[:-3:-1])
         raise InvalidInput(
-            f"{len(numbers)} of {count} modes have at least {share:.0%} of the mass along x, and "
-            f"damping needs two; the largest have {_largest(ratios)}: lower the share, or give the "
+            f"{len(numbers)} of {count} modes have at least {_percent(share)} of the mass along x, "
+            f"and damping needs two; the largest have {largest}: lower the share, or give the "
             "frequencies"
         )
     if ratios.sum() <= 1.0 - share:
         logger.warning(
-            "%d modes, up to %.1f Hz, have %.1f %% of the mass along x: one with %.0f %% may lie "
-            "above them",
+            "%d modes, up to %.1f Hz, have %s of the mass along x: one with %s may lie above them",
             count,
             found.frequencies[-1],
-            100.0 * ratios.sum(),
-            100.0 * share,
+            _percent(ratios.sum()),
+            _percent(share),
         )
     return EffectiveRange(found, numbers, share)
 
@@ -135,5 +135,5 @@ def effective_damping(
     return Rayleigh(ratio, effective_range(model, about, share=share).frequencies, joints)
 
 
-def _largest(ratios: np.ndarray) -> str:
-    return " and ".join(f"{ratio:.0%}" for ratio in np.sort(ratios)[:-3:-1])
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
