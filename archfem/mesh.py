@@ -149,19 +149,23 @@ def _fill(division: Division) -> None:
     gmsh.option.setNumber("Mesh.Algorithm", FRONTAL)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.model.mesh.setSizeCallback(size)
+    failure = ""
     try:
         gmsh.model.mesh.generate(2)
     except Exception as error:  # gmsh raises nothing more specific
-        names = [division.outlines.structure.blocks[number].name for number in division.sizes]
-        raise MeshError(
-            f"gmsh cannot mesh the blocks: {error}: look for outlines that cross themselves or one "
-            f"another, first among those without corners, {names}"
-        ) from error
-    if len(gmsh.model.mesh.getElementTypes(2)) > 1:
-        raise MeshError(
-            "triangles are left among the quadrilaterals, and a mesh has one kind of cell: use "
-            "cell = 'triangle'"
-        )
+        failure = f": {error}"
+    for number, block in enumerate(division.outlines.structure.blocks):
+        kinds = gmsh.model.mesh.getElementTypes(2, number + 1)
+        if not len(kinds):
+            raise MeshError(
+                f"gmsh cannot mesh block '{block.name}'{failure}: check that its outline crosses "
+                "neither itself nor another's"
+            )
+        if len(kinds) > 1:
+            raise MeshError(
+                f"triangles are left among the quadrilaterals of block '{block.name}', and a mesh "
+                "has one kind of cell: use cell = 'triangle'"
+            )
 
 
 def _imported(structure: Structure) -> Mesh:

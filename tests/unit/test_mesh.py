@@ -1,17 +1,31 @@
 """Meshes: what they cover, their files, and what is refused."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import meshio
 import numpy as np
 import pytest
 
+from archfem.assembly import assembled
 from archfem.errors import InvalidInput, MeshError
+from archfem.materials import STONE, STONE_TO_STONE
 from archfem.mesh import Meshing, mesh, read_mesh, write_mesh
 from archfem.models.full import full
+from archfem.newton import Newton
 from archfem.quadrature import Quadrature
-from archfem.shapes import circular_arch, column
+from archfem.shapes import (
+    Arch,
+    Backfill,
+    Paving,
+    Pier,
+    Sidewall,
+    bridge,
+    circular_arch,
+    column,
+)
 from archfem.space import broken_space
+from archfem.statics import dead_load
 from archfem.structure import Block
 
 
@@ -80,6 +94,7 @@ def test_the_mesh_of_another_structure_is_refused(ring, stack, tmp_path):
         (lambda: Meshing(0, 4), InvalidInput, "cells through = 0"),
         (lambda: Meshing(4, 2.5), InvalidInput, "cells along = 2.5"),
         (lambda: Meshing(cell="hexagon"), InvalidInput, "'hexagon' is not known"),
+        (lambda: Meshing(coarse=0.0), InvalidInput, "coarse = 0.0 m"),
         (lambda: read_mesh(None, "none.msh"), InvalidInput, "no mesh file none.msh"),
     ],
 )
@@ -103,3 +118,195 @@ def test_a_file_that_is_no_mesh(stack, tmp_path):
 def test_degrees_beyond_two_are_refused():
     with pytest.raises(InvalidInput, match="degree 3"):
         broken_space(mesh(column(breadth=1.0, heights=[1.0]), Meshing(1, 1)), 3)
+
+
+def viaduct(**parts):
+    """Two spans with fill, piers and sidewalls that rise above the springing."""
+    return bridge(
+        arches=[
+            Arch(span=4.0, embrace=150.0, thickness=0.5, voussoirs=9, name="left arch"),
+            Arch(span=5.0, embrace=140.0, thickness=0.5, voussoirs=11, name="right arch"),
+        ],
+        piers=[Pier(gap=1.2, height=1.0, name="pier")],
+        sidewalls=[
+            Sidewall(length=2.0, height=1.0, name="left wall"),
+            Sidewall(length=6.0, height=1.0, above=0.8, setback=0.1, name="right wall"),
+        ],
+        backfill=Backfill(cover=0.4),
+        **parts,
+    )
+
+
+def one_arch(**parts):
+    """One span between fixed abutments, with fill that ends in wedges on the springings."""
+    ring = Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
+    return bridge(arches=[ring], backfill=Backfill(cover=0.3), **parts)
+
+
+def scaled_jacobians(made):
+    """Least scaled Jacobian of each cell: 1 for squares and equilateral triangles, 0 for lines."""
+    corners = full(broken_space(made), Quadrature()).shape
+    points = corners.places[np.array(corners.cells)]
+    ahead = np.roll(points, -1, axis=1) - points
+    behind = np.roll(ahead, 1, axis=1)
+    turn = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
+    sine = turn / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
+    best = 1.0 if points.shape[1] == 4 else np.sqrt(3.0) / 2.0
+    return sine.min(axis=1) / best
+
+
+@pytest.mark.parametrize("make", [viaduct, one_arch])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
+def test_meshes_of_bridges_are_sound(make, cell, count):
+    """Sharp wedges and strips between stones included; slender triangles lie in slender stones."""
+    structure = make(paving=Paving(thickness=0.2))
+    made = mesh(structure, Meshing(count, count, cell))
+    quality = scaled_jacobians(made)
+    stones = [b.corners is not None for b in structure.blocks]
+    stones = np.array(stones)[made.blocks[np.isin(made.blocks, structure.free)]]
+    assert quality[~stones].min() > 0.15
+    assert quality.min() > (0.15 if cell == "quadrilateral" else 0.05)
+
+
+def outer_edges(shape, places):
+    """Edges that only one cell has, as pairs of places (e, 2)."""
+    cells = places[np.array(shape.cells)]
+    pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, times = np.unique(pairs, axis=0, return_counts=True)
+    assert times.max() == 2
+    return edges[times == 1]
+
+
+@pytest.mark.parametrize("make", [viaduct, one_arch])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_cells_of_touching_blocks_meet(make, cell):
+    """Patch test, all of stone and stuck together: a uniform strain needs forces at the rim alone.
+
+    The rim, edges of one cell, is as long as the blocks' outlines less twice the joints.
+    """
+    structure = make()
+    blocks = tuple(replace(block, material=STONE) for block in structure.blocks)
+    structure = replace(structure, blocks=blocks)
+    model = full(broken_space(mesh(structure, Meshing(3, 4, cell))), Quadrature())
+    points, places = np.unique(model.shape.places.round(9), axis=0, return_inverse=True)
+    rim = outer_edges(model.shape, places.ravel())
+    length = np.linalg.norm(points[rim[:, 0]] - points[rim[:, 1]], axis=1).sum()
+    free = set(structure.free)
+    outlines = [structure.blocks[number].points for number in free]
+    around = sum(np.linalg.norm(np.roll(p, 1, axis=0) - p, axis=1).sum() for p in outlines)
+    inner = sum(joint.depth for joint in structure.joints if free.issuperset(joint.blocks))
+    assert length == pytest.approx(around - 2.0 * inner, rel=1e-9)
+    stretched = model.shape.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
+    forces = np.zeros((len(points), 2))
+    np.add.at(forces, places.ravel(), (model.blocks @ stretched.ravel()).reshape(-1, 2))
+    inside = np.setdiff1d(np.arange(len(points)), rim)
+    assert np.abs(forces[inside]).max() < 1e-9 * np.abs(forces).max()
+    held = [not free.issuperset(joint.blocks) for joint in structure.joints]
+    between = ~np.array(held)[model.joints.points.joint]
+    for gap in (model.joints.opening @ stretched.ravel(), model.joints.slip @ stretched.ravel()):
+        assert np.abs(gap[between]).max() < 1e-12
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_supports_of_a_bridge_carry_its_weight(cell):
+    structure = viaduct(paving=Paving(thickness=0.2))
+    made = full(broken_space(mesh(structure, Meshing(2, 2, cell))), Quadrature())
+    joints, carried = dead_load(made, Newton(tolerance=1e-13)).joints, np.zeros(2)
+    for k, joint in enumerate(structure.joints):
+        fixed = [structure.blocks[number].fixed for number in (joint.lower, joint.higher)]
+        if any(fixed):
+            push = float(joints["N"][k]) * structure.normals[k]
+            push -= float(joints["V"][k]) * joint.tangent  # both act on the higher block
+            carried += push if fixed[0] else -push
+    assert carried == pytest.approx([0.0, structure.weight], abs=1e-9 * structure.weight)
+
+
+def test_soil_has_the_cells_that_its_stones_impose():
+    """Four on each extrados, and cells inside that grow to no more than was asked."""
+    structure = viaduct()
+    soil = next(k for k, block in enumerate(structure.blocks) if block.name == "backfill")
+    stones = {k for k, block in enumerate(structure.blocks) if block.part.endswith("arch")}
+    pairs = [set(joint.blocks) for joint in structure.joints]
+    extrados = [k for k, pair in enumerate(pairs) if soil in pair and pair & stones]
+    assert len(extrados) == 20
+    counts = []
+    for coarse in (None, 0.3, 0.15):
+        made = mesh(structure, Meshing(4, 4, coarse=coarse))
+        assert set(np.bincount(made.joints[1])[extrados]) == {4}
+        counts.append(np.sum(made.blocks == soil))
+    area = structure.blocks[soil].area
+    assert counts[0] < counts[1] < counts[2]
+    assert counts[1] > 0.8 * area / 0.3**2
+    assert counts[2] > 0.8 * area / 0.15**2
+
+
+def block(name, *outline, corners=(0, 1, 2, 3), fixed=False):
+    """A stone with a structured mesh unless it is told otherwise."""
+    return Block(outline, STONE, name, fixed=fixed, corners=corners)
+
+
+def box(name, left, right, low, high, **given):
+    """A rectangular stone."""
+    return block(name, (left, high), (left, low), (right, low), (right, high), **given)
+
+
+def wall_in_bond():
+    """Stones across the joints of the course below, one three times as wide as its neighbour."""
+    rows = ([0.0, 1.0, 4.0], [0.0, 2.0, 4.0], [0.0, 0.7, 2.5, 4.0])
+    stones = [box("ground", 0.0, 4.0, -0.3, 0.0, fixed=True)]
+    for k, ends in enumerate(rows):
+        stones += [
+            box(f"stone {k}.{n}", left, right, 0.5 * k, 0.5 * k + 0.5)
+            for n, (left, right) in enumerate(pairwise(ends))
+        ]
+    return assembled(stones, STONE_TO_STONE)
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("cells", [(1, 1), (4, 4), (2, 5)])
+def test_stones_in_bond_fit(cell, cells):
+    """Opposite sides agree although a long side faces two short ones."""
+    made = mesh(wall_in_bond(), Meshing(*cells, cell))
+    of_block = np.bincount(made.blocks)[1:]
+    assert of_block.min() >= cells[0] * cells[1] * (1 if cell == "quadrilateral" else 2)
+    assert scaled_jacobians(made).min() > (0.3 if cell == "quadrilateral" else 0.05)
+
+
+def test_neighbours_that_wish_different_numbers_take_the_larger():
+    """The side of one stone is the bed of another."""
+    low, high = box("low", 0.0, 1.0, 0.0, 1.0), box("high", 0.0, 1.0, 1.0, 2.0)
+    high = replace(high, corners=(1, 2, 3, 0))
+    ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
+    made = mesh(assembled([ground, low, high], STONE_TO_STONE), Meshing(2, 5))
+    assert np.bincount(made.blocks).tolist() == [5, 25, 10]
+    assert np.bincount(made.joints[1]).tolist() == [5, 5]
+
+
+def test_cells_of_a_long_stone_are_not_absurdly_long():
+    """No longer than twice its thickness: ten cells in eight metres of 0.4 m."""
+    ground = box("ground", 0.0, 8.0, -0.3, 0.0, fixed=True)
+    made = mesh(assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], STONE_TO_STONE), Meshing(2, 2))
+    assert np.bincount(made.joints[1]).tolist() == [10]
+
+
+def test_sides_that_cannot_agree():
+    """Round a spiral a stone's end is one side of its beginning and another stone besides."""
+    turns = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
+    rays = [[(r * x, r * y) for r in (1.0, 2.0)] for x, y in turns]
+    stones = [
+        block(f"stone {k}", a[0], a[1], b[1], b[0]) for k, (a, b) in enumerate(pairwise(rays))
+    ]
+    stones.append(block("last", rays[3][0], rays[3][1], (3.0, 0.0), rays[0][0]))
+    stones.append(block("rest", (2.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.5, 1.0), fixed=True))
+    with pytest.raises(MeshError, match="leaving out their corners"):
+        mesh(assembled(stones, STONE_TO_STONE), Meshing(2, 2))
+    free = replace(stones[3], corners=None)
+    assert mesh(assembled([*stones[:3], free, stones[4]], STONE_TO_STONE), Meshing(2, 2))
+
+
+def test_an_outline_that_crosses_itself():
+    ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
+    bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
+    with pytest.raises(MeshError, match="cannot mesh block 'bow'"):
+        mesh(assembled([ground, bow], STONE_TO_STONE), Meshing(2, 2))
