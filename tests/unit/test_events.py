@@ -1,15 +1,25 @@
 """Events that end a run, on joints whose state is known and in whole runs."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from archfem.events import CountedMechanism, MovingMechanism
+from archfem.assembly import assembled
+from archfem.events import (
+    CountedMechanism,
+    EveryMechanism,
+    MovingMechanism,
+    possible_counts,
+)
+from archfem.materials import BACKFILL, STONE_TO_STONE
 from archfem.mechanism import Verifier, first_verified_mechanism
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.shapes import arch_on_piers, circular_arch, column
+from archfem.structure import Block
 
 WEIGHT = 1e4
 
@@ -90,3 +100,47 @@ def test_a_run_ends_when_its_blocks_can_move():
     assert halted.time[-1] == pytest.approx(expected.moved.time)
     assert "a mechanism that moves" in halted.outcome
     assert str(expected) in halted.outcome
+
+
+def test_an_event_serves_several_structures():
+    """The same numbers of joints, in another structure, are another state."""
+    event, lone = MovingMechanism(), column(breadth=1.0, heights=[1.0] * 18)
+    assert event(ring(), state(ring(), {0: 0.5})) is None
+    assert event(lone, state(lone, {0: 0.5})) is not None
+
+
+def with_soil():
+    """Two stones and, on them, twenty flat bodies of soil."""
+    stones = column(breadth=1.0, heights=[1.0, 1.0])
+    levels = [2.0 + 0.1 * k for k in range(21)]
+    soil = [
+        Block(
+            ((-0.5, y), (0.5, y), (0.5, top), (-0.5, top)), BACKFILL, f"soil {y:.1f}", part="fill"
+        )
+        for y, top in pairwise(levels)
+    ]
+    return assembled([*stones.blocks, *soil], STONE_TO_STONE, joints=stones.joints)
+
+
+def test_soil_that_slides_is_no_event():
+    structure = with_soil()
+    resultants = state(structure, sliding=dict.fromkeys(range(2, 22), 0.7))
+    for event in (CountedMechanism(), MovingMechanism()):
+        assert event(structure, resultants) is None
+    resultants[1] = state(structure, {1: 0.5})[1]
+    assert CountedMechanism()(structure, resultants) is None
+    assert "motion local (column)" in MovingMechanism()(structure, resultants)
+
+
+def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
+    structure, event = on_piers(), EveryMechanism()
+    in_ring = state(structure, {3: -0.5, 6: -0.5, 9: -0.5, 12: -0.5})  # one face: cannot move
+    with_pier = state(structure, {0: -0.5, 3: -0.5, 6: -0.5, 9: -0.5})
+    moving = state(structure, {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
+    assert possible_counts(structure) == ("any four joints", "four in a ring", "ring and pier")
+    for resultants in (state(structure), in_ring, in_ring, with_pier):
+        assert event(structure, resultants) is None
+    assert "by each definition" in event(structure, moving)
+    assert EveryMechanism()(structure, moving) is None  # never four in the ring
+    assert "by each definition" in EveryMechanism()(ring(), state(ring(), ALTERNATING))
+    assert possible_counts(column(breadth=1.0, heights=[1.0])) == ()

@@ -2,18 +2,22 @@
 
 import os
 import signal
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import xarray as xr
 
 from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import History
+from archfem.mechanism import verified_mechanism
 from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.runs import CountedMechanism, Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.statics import dead_load
+from archfem.summary import pair_table, verdict
 
 DAMPING = Rayleigh(0.05, (8.0, 16.0))
 
@@ -85,6 +89,70 @@ def test_file_and_back(run, tmp_path):
         assert plain["N"].attrs["units"] == "N"
         assert plain.attrs["outcome"] == run.outcome
     assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
+
+
+def test_a_history_knows_what_can_move(run, model, motion, tmp_path):
+    """The blocks at the counted instant, and the first motion of all: looked for anew."""
+    assert run.structure is model.structure
+    instant = run.joints.sel(time=run.mechanism.time)
+    assert run.mechanism.blocks == verified_mechanism(model.structure, instant).moved.blocks
+    assert run.mechanism.blocks == ()  # four hinges, too many of them on one face
+    first = int(np.flatnonzero(run.time == run.verified.moved.time)[0])
+    before = [
+        verified_mechanism(model.structure, run.joints.isel(time=k)).kind
+        for k in range(first - 40, first + 1)
+    ]
+    assert before == ["none"] * 40 + ["local"]
+    assert run.verified.moved.blocks
+    assert run.verified is run.verified
+    calm = time_history(model, motion.scaled(0.1), damping=DAMPING)
+    assert calm.verified is None
+    assert calm.mechanism is None
+
+
+def test_a_history_without_its_structure_says_so(run, tmp_path, stack):
+    path = run.save(tmp_path / "run.nc")
+    alone = History.read(path)
+    assert alone.mechanism == replace(run.mechanism, blocks=())
+    with pytest.raises(InvalidInput, match=r"History\.read\(path, structure\)"):
+        _ = alone.verified
+    again = History.read(path, run.structure)
+    assert again.verified.moved == run.verified.moved
+    with pytest.raises(InvalidInput, match="18 joints from 'joint 0' to 'joint 17'"):
+        History.read(path, stack)
+
+
+def test_a_joint_by_name_or_number(run, model):
+    by_name = run.joint("joint 7")
+    assert by_name["N"].dims == ("time",)
+    assert by_name["N"].equals(run.joints["N"].isel(joint=7))
+    assert run.joint(7).identical(by_name)
+    assert float(dead_load(model).joint("joint 7")["N"]) == pytest.approx(float(by_name["N"][0]))
+    with pytest.raises(InvalidInput, match="no joint 'jiont 7': did you mean 'joint 7'"):
+        run.joint("jiont 7")
+    with pytest.raises(InvalidInput, match="no joint 18: give a number from 0 to 17"):
+        run.joint(18)
+
+
+def test_verdict_tells_count_and_motion(run, tmp_path):
+    counted, moved = verdict(run).splitlines()
+    assert f"by count: local mechanism of arch at {run.mechanism.time:.3f} s" in counted
+    assert "no block can move then" in counted
+    assert f"verified: local mechanism of arch at {run.verified.moved.time:.3f} s" in moved
+    names = [run.structure.blocks[k].name for k in run.verified.moved.blocks]
+    assert f"moving: {names[0]}; " in moved
+    assert len(names) <= 8 or f"({len(names)} in all)" in moved
+    alone = verdict(History.read(run.save(tmp_path / "run.nc")))
+    assert alone == counted.removesuffix("; no block can move then")
+
+
+def test_pair_table_tells_both(run, tmp_path):
+    row = pair_table({"pair": run}).splitlines()[1]
+    joints = " ".join(map(str, run.mechanism.joints))
+    assert f"local  {run.mechanism.time:.3f} s  {joints}" in row
+    assert f"local  {run.verified.moved.time:.3f} s" in row.split(joints)[1]
+    alone = pair_table({"pair": History.read(run.save(tmp_path / "run.nc"))})
+    assert "unknown" in alone
 
 
 def test_a_failed_write_leaves_the_old_file(run, tmp_path, monkeypatch):

@@ -7,10 +7,14 @@ import pytest
 
 from archfem.assembly import assembled
 from archfem.errors import InvalidInput
+from archfem.ladder import envelope
 from archfem.limit import BodyForce, collapse_factor, stands
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
 from archfem.mechanism import Verifier, first_verified_mechanism, verified_mechanism
+from archfem.models.rigid import rigid
+from archfem.motion import Motion
 from archfem.resultants import joint_dataset
+from archfem.runs import time_history
 from archfem.shapes import arch_on_piers, circular_arch
 from archfem.skeleton import skeleton_of, yielding_blocks
 from archfem.structure import Block
@@ -194,3 +198,11 @@ def test_limit_analysis_refuses_a_fill():
         with pytest.raises(InvalidInput, match=r"blocks \['fill'\] are softer than the joints"):
             analysis(whole)
     assert stands(skeleton_of(whole).structure)
+
+
+def test_the_error_of_a_model_is_measured_on_rings_and_piers():
+    model, motion = rigid(filled()), Motion(np.array([0.0, 1.0, 0.0]), dt=0.05)
+    run = time_history(model, motion, dt=0.01)
+    own = abs(run.joints["eccentricity"]).max("time").values
+    found = envelope(model, motion, None, 0.01)
+    assert found == pytest.approx(own[: len(piers().joints)])

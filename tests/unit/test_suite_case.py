@@ -161,7 +161,7 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
     }
     table = (out / "suite.txt").read_text()
     assert re.search(r"^first +0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE)  # 1 m/s² by R = 2
-    assert re.search(r"^second .* none +- +- +reached 1\.00 s$", table, re.MULTILINE)
+    assert re.search(r"^second .* none +- +- +none +- +reached 1\.00 s$", table, re.MULTILINE)
     assert "finished before" not in capsys.readouterr().out
 
     before = (out / "second" / "history.nc").stat().st_mtime_ns
