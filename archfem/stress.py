@@ -1,13 +1,15 @@
 """Stress in the blocks: principal stresses from a model's field, edge stress from resultants alone.
 
 Blocks are linear elastic in plane stress. A cell's mean stress is that at its centre, where it is
-most accurate; compression peaks at the blocks' faces, where it is up to a third larger on coarse
-cells. Peaks are therefore taken from stress recovered at the cells' corners, by a linear fit to the
-cells around each corner, within its block. Reference: Zienkiewicz and Zhu, Int. J. Numer. Methods
+most accurate; compression peaks at the blocks' faces. Peaks are therefore taken from stress
+recovered at the cells' corners, by a linear fit to the cells around each corner within its block:
+in a ring with 4 × 4 cells a stone under dead load, centres miss 14 % of the peak and corners 4 %.
+Reduced models recover the structure's peak to 4 %, that of a single block to 13 %. Tension at the
+corners of stones converges more slowly. Reference: Zienkiewicz and Zhu, Int. J. Numer. Methods
 Eng. 33 (1992) 1331-1364.
 
-Of time histories these are elastic stresses; what viscous damping adds is not in them, nor in the
-joints' resultants.
+Stress in time histories is elastic: it is without the blocks' viscous part. Resultants, and so
+the edge stress from them, hold that of the joints where damping is "closed".
 """
 
 import numpy as np

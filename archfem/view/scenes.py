@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from tqdm import tqdm
 
-from archfem.criteria import hinged
+from archfem.criteria import hinged, judged_parts
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import VerifiedMechanism
@@ -138,8 +138,9 @@ def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
 
 
 def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
-    """Whether each end of each joint has been a hinge by each step (steps, n_joints, 2)."""
-    side = hinged(joints).transpose("time", "joint").values
+    """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
+    parts = joints["part"].values.astype(str)
+    side = hinged(joints).transpose("time", "joint").values * np.isin(parts, judged_parts(parts))
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
 

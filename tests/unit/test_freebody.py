@@ -1,0 +1,106 @@
+"""One block cut free: what its joints and its weight do must balance, with the right senses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archfem.actions import BodyForce
+from archfem.case import Case
+from archfem.errors import InvalidInput, InvalidStructure
+from archfem.freebody import forces_on
+from archfem.models.build import build
+from archfem.resultants import joint_dataset
+from archfem.shapes import arch_on_piers
+from archfem.statics import dead_load, equilibrium
+
+BALANCED = 1e-9
+"""Newton's method stops at 1e-10 of the load, and forces on a block are of its order."""
+
+BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
+
+
+@pytest.fixture(scope="module")
+def portal():
+    return arch_on_piers(
+        radius=2.0, thickness=0.6, voussoirs=11, pier_breadth=0.6, courses=[0.5, 0.5]
+    )
+
+
+def check_balance(model, joints):
+    """Forces and moments of every free block add up to nothing."""
+    structure = model.structure
+    for number in structure.free:
+        body = forces_on(structure, joints, number, model.shape)
+        reach = np.ptp(body.points, axis=0).max()
+        assert body.closing_error < BALANCED, body.block.name
+        assert abs(body.moment) < BALANCED * reach * body.sizes.max(), body.block.name
+
+
+@pytest.mark.parametrize("rung", ["rigid", "faces", "full"])
+@pytest.mark.parametrize("name", ["ring", "stack", "portal"])
+def test_forces_on_every_block_balance(request, name, rung):
+    model = build(request.getfixturevalue(name), fidelity=rung)
+    check_balance(model, dead_load(model).joints)
+
+
+def test_forces_on_every_block_of_a_bridge_balance():
+    """Soil joints, skewbacks and the backfill itself included."""
+    model = build(Case.read(BRIDGE).structure, fidelity="full")
+    check_balance(model, dead_load(model).joints)
+
+
+@pytest.mark.parametrize("tilt", [-0.1, 0.1])
+def test_shear_and_moment_have_the_senses_they_are_drawn_with(portal, tilt):
+    """Under a horizontal body force the joints' forces must carry it: V and M of either sign."""
+    model = build(portal, fidelity="rigid")
+    state = equilibrium(model, model.load(BodyForce(tilt, -1.0)))
+    for number in portal.free:
+        body = forces_on(portal, state.joints, number)
+        weight = body.sizes[-1]
+        assert body.sum == pytest.approx([-tilt * weight, 0.0], abs=BALANCED * body.sizes.max())
+        assert abs(body.moment) < BALANCED * body.sizes.max()  # it acts at the centroid
+
+
+def test_what_a_joint_does_to_one_block_it_does_against_the_other(ring, ring_model):
+    joints = dead_load(ring_model).joints
+    lower, higher = (forces_on(ring, joints, number) for number in (5, 6))
+    assert lower.names == ("joint 4", "joint 5", "weight")
+    assert lower.forces[1] == pytest.approx(-higher.forces[0])
+    assert lower.points[1] == pytest.approx(higher.points[0])
+
+
+def test_the_left_abutment_pushes_the_ring_up_and_inwards(ring, ring_model):
+    push = forces_on(ring, dead_load(ring_model).joints, "voussoir 1").forces[0]
+    assert push[0] > 0.0
+    assert push[1] == pytest.approx(ring.weight / 2.0, rel=1e-3)  # by symmetry; chords are lighter
+
+
+def test_weight_is_that_of_the_outline_or_of_the_cells(ring, ring_model):
+    """Four chords to a sector of angle φ weigh 1 - (φ / 4)² / 6 of it."""
+    joints = dead_load(ring_model).joints
+    true, meshed = (forces_on(ring, joints, 9, s).sizes[-1] for s in (None, ring_model.shape))
+    turn = np.radians(159.0 / 17)
+    assert true == pytest.approx(ring.weight / 17)
+    assert meshed / true == pytest.approx(1.0 - (turn / 4.0) ** 2 / 6.0, abs=1e-6)
+
+
+def test_an_open_joint_acts_at_its_middle(stack):
+    """Nothing presses, and shear springs still hold: they act along the joint."""
+    joints = joint_dataset(stack, np.array([[3e4, 0.0, 0.0], [0.0, 500.0, 0.0]]))
+    body = forces_on(stack, joints, "block 2")
+    assert body.points[0] == pytest.approx(stack.joints[1].middle)
+    assert body.forces[0] == pytest.approx([-500.0, 0.0])
+
+
+def test_what_cannot_be_cut_free_is_refused(stack):
+    joints = joint_dataset(stack, np.array([[3e4, 0.0, 0.0], [1e4, 0.0, 0.0]]))
+    with pytest.raises(InvalidInput, match=r"'base' is fixed.*that can move"):
+        forces_on(stack, joints, "base")
+    with pytest.raises(InvalidStructure, match=r"no block 'blok 1': .* \['block 1'"):
+        forces_on(stack, joints, "blok 1")
+    with pytest.raises(InvalidStructure, match=r"no block 3: give a number below 3"):
+        forces_on(stack, joints, 3)
+    over_time = joint_dataset(stack, np.ones((4, 2, 3)), np.arange(4.0))
+    with pytest.raises(InvalidInput, match=r"give one instant of the 2 joints"):
+        forces_on(stack, over_time, "block 1")
