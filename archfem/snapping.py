@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from archfem.errors import InvalidStructure
@@ -53,8 +54,10 @@ def snapped(
     loops = [loop[:-1] if loop[0] == loop[-1] else loop for loop in loops]
     ties = _ties(loops, places, snap)
     ties |= _bends(loops, places, ties, snap)
-    _settle(places, ties)
+    places = _settled(places, ties)
     moved = np.linalg.norm(places[number] - given, axis=1)
+    owners = [name for name, points in zip(names, turned, strict=True) for _ in points]
+    _check_moved(moved, given, owners, snap)
     found = [places[loop] for loop in loops]
     for name, points, loop in zip(names, found, loops, strict=True):
         if len(loop) < 3:
@@ -116,13 +119,6 @@ def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
     count, number = connected_components(graph, directed=False)
     sums = np.array([np.bincount(number, weights=x, minlength=count) for x in points.T])
     places = (sums / np.bincount(number)).T
-    away = np.linalg.norm(places[number] - points, axis=1)
-    if away.max() > 2.0 * snap:
-        x, y = points[np.argmax(away)]
-        raise InvalidStructure(
-            f"vertices around ({x:.3f}, {y:.3f}) follow one another at less than snap "
-            f"{snap:.3g} m and would become one: lower snap, or leave vertices out"
-        )
     return places, number
 
 
@@ -164,20 +160,29 @@ def _bends(loops: Loops, places: Array, ties: dict[int, Edge], snap: float) -> d
     return found
 
 
-def _settle(places: Array, ties: dict[int, Edge]) -> None:
-    """Put all tied places onto their edges, which move with their own ends."""
-    size = float(np.linalg.norm(np.ptp(places, axis=0)))
-    for _ in range(1000):
-        largest = 0.0
-        for place, (a, b) in ties.items():
-            step = places[b] - places[a]
-            share = (places[place] - places[a]) @ step / (step @ step)
-            shift = places[a] + share * step - places[place]
-            places[place] += shift
-            largest = max(largest, float(np.abs(shift).max()))
-        if largest <= 1e-3 * TOUCHING * size:
-            return
-    raise InvalidStructure("vertices near edges do not settle: lower snap, or correct the drawing")
+def _settled(places: Array, ties: dict[int, Edge]) -> Array:
+    """Places with those tied put onto their edges, whose ends may be tied to others in turn."""
+    hold = sparse.identity(len(places), format="lil")
+    free = places.copy()
+    for place, (a, b) in ties.items():
+        along, _, length = _beside(places, a, b)
+        share = along[place] / length
+        hold[place, a], hold[place, b] = share - 1.0, -share
+        free[place] = 0.0
+    return np.asarray(splu(hold.tocsc()).solve(free))
+
+
+def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float) -> None:
+    """Refuse to move vertices by much more than the tolerance, in steps below it."""
+    worst = int(np.argmax(moved))
+    if moved[worst] > 2.0 * snap:
+        x, y = given[worst]
+        raise InvalidStructure(
+            f"the vertex of '{owners[worst]}' at ({x:.3f}, {y:.3f}) would move by "
+            f"{1e3 * moved[worst]:.3g} mm until all nearer than snap = {snap:.3g} m touch: raise "
+            "snap if the survey is rougher than that; lower it, or leave out vertices, if they "
+            "follow one another so closely"
+        )
 
 
 def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str], snap: float) -> None:
