@@ -18,8 +18,10 @@ from scipy import sparse
 from archfem import march
 from archfem.batches import Room, compiled_law, shear_resultants
 from archfem.dynamics import Stepper
-from archfem.factor import Numbers, Plan, factorised
+from archfem.factor import Plan, factorised
 from archfem.models.jointed import Jointed
+from archfem.newmark import Numbers, numbers_of
+from archfem.products import Rows
 from archfem.schemes import Rayleigh
 from archfem.structure import Array
 
@@ -61,7 +63,7 @@ class ComplianceMethod:
         self._parts = [part[self._order][:, self._order] for part in parts]
         self._weight = exact.weight[self._order]
         self._law = compiled_law(self._model)
-        self._step: tuple[float, march.Matrices, march.Numbers] | None = None
+        self._step: tuple[float, march.Matrices, Numbers] | None = None
 
     def enter(self, vectors: Array) -> Array:
         """From coordinates to those in the order of the factor (3, n)."""
@@ -86,15 +88,15 @@ class ComplianceMethod:
             )
         )
 
-    def _prepared(self, dt: float) -> tuple[march.Matrices, march.Numbers]:
+    def _prepared(self, dt: float) -> tuple[march.Matrices, Numbers]:
         """What a step of this length needs."""
         if self._step is None or self._step[0] != dt:
             scheme = (self._scheme.beta, self._scheme.gamma, self._scheme.alpha)
-            numbers = march.numbers_of(dt, scheme, self._lag, self._drag)
+            numbers = numbers_of(dt, scheme, self._lag, self._drag)
             self._step = (dt, self._matrices(numbers), numbers)
         return self._step[1:]
 
-    def _matrices(self, numbers: march.Numbers) -> march.Matrices:
+    def _matrices(self, numbers: Numbers) -> march.Matrices:
         model, count = self._model, len(self._law[1])
         mass, damping, closed = self._parts
         effective = closed + numbers.inertia * mass + numbers.rate * damping
@@ -121,5 +123,5 @@ def _trimmed(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
     return kept
 
 
-def _rows(matrix: sparse.csr_matrix) -> tuple[Numbers, Numbers, Array]:
+def _rows(matrix: sparse.csr_matrix) -> Rows:
     return matrix.indptr, matrix.indices, matrix.data

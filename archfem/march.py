@@ -6,9 +6,10 @@ import numba
 import numpy as np
 
 from archfem.factor import Factor, backward, forward
-from archfem.kernel import ITERATIONS, SETTLED, finish, joint_resultants
-from archfem.products import Rows, add_rows, row_times, times, two_times
-from archfem.release import gaps, pull, release
+from archfem.kernel import ITERATIONS, SETTLED, joint_resultants
+from archfem.newmark import add_mixed, follow
+from archfem.products import Rows, add_rows, row_times, times
+from archfem.release import find_gaps, pull, pulls, release
 from archfem.structure import Array
 
 EXACT = 1e-11
@@ -49,41 +50,6 @@ class Matrices(NamedTuple):
     known: Any
 
 
-class Numbers(NamedTuple):
-    """Numbers of a time step.
-
-    Attributes:
-        dt: its length [s].
-        beta: Newmark's.
-        gamma: Newmark's.
-        share: where the equation is written, 1 + α.
-        lag: of the contact behind the displacement [s].
-        drag: coefficient of damping by mass [1/s].
-        seen: change of contact per change of displacement.
-        inertia: μ, change of acceleration and drag per change of contact [1/s²].
-        rate: ν, change of velocity where the equation is written per change of contact [1/s].
-    """
-
-    dt: float
-    beta: float
-    gamma: float
-    share: float
-    lag: float
-    drag: float
-    seen: float
-    inertia: float
-    rate: float
-
-
-def numbers_of(dt: float, scheme: tuple[float, float, float], lag: float, drag: float) -> Numbers:
-    """Work out the numbers of a time step from the scheme's (β, γ, α)."""
-    beta, gamma, alpha = scheme
-    share, to_velocity = 1.0 + alpha, gamma / (beta * dt)
-    seen = share * (1.0 + lag * to_velocity)
-    inertia = (1.0 / (beta * dt**2) + drag * share * to_velocity) / seen
-    return Numbers(dt, beta, gamma, share, lag, drag, seen, inertia, share * to_velocity / seen)
-
-
 @numba.njit(cache=True)
 def advance(series, gap, results, ground, matrices, numbers, law):  # type: ignore
     """Take steps until the end, or until one does not settle; return how many were taken.
@@ -93,7 +59,7 @@ def advance(series, gap, results, ground, matrices, numbers, law):  # type: igno
 
     Args:
         series: q, its velocity and acceleration at the start in [0]; filled (steps + 1, 3, n).
-        gap: openings that the law sees at the start (p,); left as at the end.
+        gap: openings that the law sees at the start (p,); overwritten.
         results: N, V, M (steps, n_joints, 3), passes over the joints (steps,) and energies as by
             `energy.Meter.step` (steps, 4), all filled.
         ground: acceleration where the equation is written, and its mean over the step
@@ -104,31 +70,38 @@ def advance(series, gap, results, ground, matrices, numbers, law):  # type: igno
     """
     resultants, passes, energies = results
     size, points = series.shape[2], len(gap)
-    products, contact, change = np.zeros((8, size)), np.empty(size), np.empty(size)
+    images, gaps = np.zeros((2, 3, 3, size)), np.zeros((2, 5, points))
+    contact, right = np.empty(size), np.empty(size)
     force, before, shear = np.empty(points), gap.copy(), np.empty(resultants.shape[1])
-    losses = (np.zeros((2, size)), np.zeros((2, 2, points)))
-    _products(series[0], matrices, numbers, products)
-    _energy(series[0], products, (matrices, numbers, law), losses, energies[0])
-    for row in range(points):
-        force[row] = pull(gap[row], gap[row ^ 1] if law[0] else 0.0, law[1][row], law[0])
+    _start(series[0], images[0], gaps[0], matrices)
+    pulls(gap, law, force)
+    _late(gaps[0], numbers.lag, law)
     for step in range(len(resultants)):
-        _right(ground[0, step], matrices, products, contact)
+        old, new = images[step % 2], images[(step + 1) % 2]
+        _load(right, ground[0, step], matrices)
+        add_mixed(right, old[0], numbers.pushed)
+        if len(matrices.damping[2]) > 0:
+            add_mixed(right, old[2], numbers.dragged)
+        contact[:] = right
         near = _near(gap, before, force, law[0])
         before[:] = gap
-        taken = _contact(contact, gap, (force, near), matrices, law)
-        if taken < 0:
+        passes[step] = _contact(contact, gap, (force, near), matrices, law)
+        if passes[step] < 0:
             return step
-        passes[step] = taken
-        _change(series[step], contact, numbers, change)
-        scheme = (numbers.beta, numbers.gamma, numbers.dt, numbers.lag)
-        finish(series[step], series[step + 1], change, scheme, contact)
+        add_rows(matrices.opening, np.flatnonzero(near), force, right)
+        _follow(contact, right, (old, new), matrices, numbers)
+        follow(contact, series[step], series[step + 1], numbers)
+        follow(gap, gaps[step % 2], gaps[(step + 1) % 2], numbers)
+        _late(gaps[(step + 1) % 2], numbers.lag, law)
         if numbers.share != 1.0:
-            times(matrices.opening, contact, gap)
+            gap[:] = gaps[(step + 1) % 2, 0] + numbers.lag * gaps[(step + 1) % 2, 1]
+            contact[:] = series[step + 1, 0] + numbers.lag * series[step + 1, 1]
+            pulls(gap, law, force)
         times(matrices.shear, contact, shear)
         joint_resultants(resultants[step], gap, shear, law)
-        _products(series[step + 1], matrices, numbers, products)
-        _energy(series[step + 1], products, (matrices, numbers, law), losses, energies[step])
-        _work(change, ground[1, step], matrices.body, losses, energies[step])
+        row = energies[step]
+        _energies(series[step : step + 2], (old, new), (matrices, numbers), ground[1, step], row)
+        _joint_energies(gaps[step % 2], gaps[(step + 1) % 2], row)
     return len(resultants)
 
 
@@ -156,7 +129,7 @@ def _contact(vector, gap, joints, matrices, law):  # type: ignore
                     start[row] = row_times(matrices.opening, row, vector)
             else:
                 held = np.empty(len(rows))
-                gaps(held, gap, rows, matrices.compliance, -force)
+                find_gaps(held, gap, rows, matrices.compliance, -force)
                 start[rows] = held
             taken = release(start, rows, matrices.compliance, law, force, enough)
             if taken < 0:
@@ -232,79 +205,73 @@ def _branches(rows, matrices):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _products(state, matrices, numbers, products):  # type: ignore
-    """M y, M v, C x, C v, K q, K v of a state, then y and x."""
-    beta, gamma, dt = numbers.beta, numbers.gamma, numbers.dt
-    y, x = products[6], products[7]
-    for k in range(state.shape[1]):
-        v, a = state[1, k], state[2, k]
-        velocity = (1.0 - gamma / beta) * v + dt * (1.0 - 0.5 * gamma / beta) * a
-        rate = v + numbers.share * (velocity - v)
-        base = state[0, k] + numbers.lag * rate
-        acceleration = -v / (beta * dt) - (0.5 / beta - 1.0) * a
-        y[k] = numbers.inertia * base - acceleration - numbers.drag * rate
-        x[k] = numbers.rate * base - rate
-    two_times(matrices.mass, y, state[1], products[0:2])
-    if len(matrices.damping[2]) > 0:
-        two_times(matrices.damping, x, state[1], products[2:4])
-    two_times(matrices.closed, state[0], state[1], products[4:6])
+def _start(state, images, gaps, matrices):  # type: ignore
+    """Images of a state under M, K and C, and its gaps."""
+    for k in range(3):
+        times(matrices.mass, state[k], images[0, k])
+        times(matrices.closed, state[k], images[1, k])
+        if len(matrices.damping[2]) > 0:
+            times(matrices.damping, state[k], images[2, k])
+        times(matrices.opening, state[k], gaps[k])
 
 
 @numba.njit(cache=True)
-def _right(ground, matrices, products, result):  # type: ignore
-    """Right side of a step, p + M y + C x."""
-    weight, body = matrices.weight, matrices.body
+def _load(result, ground, matrices):  # type: ignore
+    """Forces of gravity and of the ground."""
+    weight, across, up = matrices.weight, matrices.body[0], matrices.body[1]
+    x, y = ground[0], ground[1]
     for k in range(len(result)):
-        load = weight[k] - body[0, k] * ground[0] - body[1, k] * ground[1]
-        result[k] = load + products[0, k] + products[2, k]
+        result[k] = weight[k] - x * across[k] - y * up[k]
 
 
 @numba.njit(cache=True)
-def _change(state, contact, numbers, change):  # type: ignore
-    """Change of q over a step from the contact where its equation is written."""
-    beta, gamma, dt = numbers.beta, numbers.gamma, numbers.dt
-    for k in range(len(change)):
-        v, a = state[1, k], state[2, k]
-        velocity = (1.0 - gamma / beta) * v + dt * (1.0 - 0.5 * gamma / beta) * a
-        base = state[0, k] + numbers.lag * (v + numbers.share * (velocity - v))
-        change[k] = (contact[k] - base) / numbers.seen
+def _follow(contact, right, images, matrices, numbers):  # type: ignore
+    """Images of the state under M, K and C after a step; overwrites its right side."""
+    old, new = images
+    image = np.empty(len(contact))
+    times(matrices.mass, contact, image)
+    follow(image, old[0], new[0], numbers)
+    for k in range(len(right)):
+        right[k] -= numbers.inertia * image[k]
+    if len(matrices.damping[2]) > 0:
+        times(matrices.damping, contact, image)
+        follow(image, old[2], new[2], numbers)
+        for k in range(len(right)):
+            right[k] -= numbers.rate * image[k]
+    follow(right, old[1], new[1], numbers)
 
 
 @numba.njit(cache=True)
-def _energy(state, products, system, losses, energy):  # type: ignore
-    """Kinetic and potential energy of a state; leaves its damping forces, after the last ones."""
-    matrices, numbers, law = system
-    forces, points = losses
-    forces[0], points[0] = forces[1], points[1]
-    kinetic, potential = 0.0, 0.0
-    for k in range(state.shape[1]):
-        kinetic += 0.5 * state[1, k] * products[1, k]
-        potential += (0.5 * products[4, k] - matrices.weight[k]) * state[0, k]
-        forces[1, k] = numbers.drag * products[1, k] + products[3, k]
-        forces[1, k] += numbers.lag * products[5, k]
-    gap = points[1, 0]
-    times(matrices.opening, state[0], gap)
-    seen = gap
-    if numbers.lag > 0.0:
-        seen = np.empty(len(gap))
-        times(matrices.opening, state[0] + numbers.lag * state[1], seen)
-    for row in range(len(gap)):
-        stiffness, other = law[1][row], row ^ 1 if law[0] else row
-        stored = pull(gap[row], gap[other], stiffness, law[0])
-        potential -= 0.5 * gap[row] * stored
-        points[1, 1, row] = stored - pull(seen[row], seen[other], stiffness, law[0])
-    energy[0], energy[1] = kinetic, potential
+def _late(gaps, lag, law):  # type: ignore
+    """Tension taken out at the gaps as they are, and how much less than where the law sees them."""
+    pulls(gaps[0], law, gaps[3])
+    if lag > 0.0:
+        pulls(gaps[0] + lag * gaps[1], law, gaps[4])
+        gaps[4] -= gaps[3]
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc"})
+def _energies(states, images, system, ground, energy):  # type: ignore
+    """Energies of a step as if all joints were closed and held tension."""
+    (old, new), (matrices, numbers) = images, system
+    weight, across, up = matrices.weight, matrices.body[0], matrices.body[1]
+    before, u, v = states[0, 0], states[1, 0], states[1, 1]
+    inertia, late, rate = (old[0, 1], new[0, 1]), (old[1, 1], new[1, 1]), (old[2, 1], new[2, 1])
+    elastic, drag, lag = new[1, 0], numbers.drag, numbers.lag
+    kinetic, potential, work, lost = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(u)):
+        moved = u[k] - before[k]
+        kinetic += 0.5 * v[k] * inertia[1][k]
+        potential += u[k] * (0.5 * elastic[k] - weight[k])
+        work -= moved * (ground[0] * across[k] + ground[1] * up[k])
+        damping = drag * (inertia[0][k] + inertia[1][k]) + lag * (late[0][k] + late[1][k])
+        lost += 0.5 * moved * (damping + rate[0][k] + rate[1][k])
+    energy[0], energy[1], energy[2], energy[3] = kinetic, potential, work, lost
 
 
 @numba.njit(cache=True)
-def _work(change, ground, body, losses, energy):  # type: ignore
-    """Work of the ground and what is lost over a step."""
-    forces, points = losses
-    work, lost = 0.0, 0.0
-    for k in range(len(change)):
-        work -= change[k] * (body[0, k] * ground[0] + body[1, k] * ground[1])
-        lost += 0.5 * change[k] * (forces[0, k] + forces[1, k])
-    for row in range(points.shape[2]):
-        moved = points[1, 0, row] - points[0, 0, row]
-        lost += 0.5 * moved * (points[0, 1, row] + points[1, 1, row])
-    energy[2], energy[3] = work, lost
+def _joint_energies(old, new, energy):  # type: ignore
+    """Take off what open joints do not store or damp."""
+    for row in range(old.shape[1]):
+        energy[1] -= 0.5 * new[0, row] * new[3, row]
+        energy[3] -= 0.5 * (new[0, row] - old[0, row]) * (old[4, row] + new[4, row])

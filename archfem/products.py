@@ -35,16 +35,3 @@ def times(matrix, vector, result):  # type: ignore
     """Product of sparse rows (indptr, indices, data) and a vector."""
     for row in range(len(result)):
         result[row] = row_times(matrix, row, vector)
-
-
-@numba.njit(cache=True)
-def two_times(matrix, first, second, result):  # type: ignore
-    """Products of a sparse matrix and two vectors, as two rows."""
-    indptr, indices, data = matrix
-    for row in range(len(first)):
-        a, b = 0.0, 0.0
-        for entry in range(indptr[row], indptr[row + 1]):
-            value, column = data[entry], indices[entry]
-            a += value * first[column]
-            b += value * second[column]
-        result[0, row], result[1, row] = a, b

@@ -37,11 +37,11 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
     """
     gap = np.empty(len(rows))
     root = np.zeros((len(rows), 2))
-    gaps(gap, start, rows, compliance, force)
+    find_gaps(gap, start, rows, compliance, force)
     for passes in range(1, ITERATIONS + 1):
         _roots(gap, rows, law, root)
         _forces(start, rows, compliance, (root, gap), law[0], force)
-        gaps(gap, start, rows, compliance, force)
+        find_gaps(gap, start, rows, compliance, force)
         off = 0.0
         for i in range(len(rows)):
             wanted = pull(gap[i], gap[i ^ 1] if law[0] else 0.0, law[1][rows[i]], law[0])
@@ -64,7 +64,15 @@ def pull(gap, other, stiffness, facets):  # type: ignore
 
 
 @numba.njit(cache=True)
-def gaps(result, start, rows, compliance, force):  # type: ignore
+def pulls(gap, law, force):  # type: ignore
+    """λ at all points."""
+    facets, stiffness = law[0], law[1]
+    for row in range(len(gap)):
+        force[row] = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
+
+
+@numba.njit(cache=True)
+def find_gaps(result, start, rows, compliance, force):  # type: ignore
     """Find z = z₀ + F λ at the rows (rows,)."""
     for i in range(len(rows)):
         result[i] = start[rows[i]]

@@ -34,7 +34,7 @@ LAYERS = [
     "newton energy states freebody eigen",
     "statics history",
     "dynamics path verdicts kernel",
-    "batches guard modal_energy products summary",
+    "batches guard modal_energy newmark products summary",
     "contact band factor release stress modal",
     "chain march modal_damping",
     "compliance",
