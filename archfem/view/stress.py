@@ -159,7 +159,13 @@ def _crosses(axes: Axes, shape: Shape, stress: Array, chosen: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
     spacing = APART * np.ptp(shape.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
-    groups = [g for n in chosen for g in _grid(centre, np.flatnonzero(shape.owner == n), spacing)]
+    groups = [
+        np.flatnonzero(shape.owner == number)[group]
+        for number in chosen
+        for group in _grid(
+            shape.places[shape.block == number], centre[shape.owner == number], spacing
+        )
+    ]
     middle = np.array([centre[group].mean(axis=0) for group in groups])
     across, up, shear = np.array([stress[group].mean(axis=0) for group in groups]).T
     angle = 0.5 * np.arctan2(2.0 * shear, across - up)
@@ -177,13 +183,13 @@ def _crosses(axes: Axes, shape: Shape, stress: Array, chosen: Numbers) -> None:
             axes.add_collection(drawn)
 
 
-def _grid(centre: Array, own: Numbers, spacing: float) -> list[Numbers]:
+def _grid(corners: Array, centre: Array, spacing: float) -> list[Numbers]:
     """Groups of neighbouring cells of a block, about equally far from each other."""
-    middle = centre[own].mean(axis=0)
-    axes = np.linalg.svd(centre[own] - middle, full_matrices=False)[2]
-    local = (centre[own] - middle) @ axes.T
-    low, high = local.min(axis=0), local.max(axis=0)
-    spacing = max(spacing, np.sqrt(TOGETHER * np.prod(high - low) / len(own)))
+    middle = corners.mean(axis=0)
+    axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
+    along, local = (corners - middle) @ axes.T, (centre - middle) @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    spacing = max(spacing, np.sqrt(TOGETHER * np.prod(high - low) / len(centre)))
     counts = np.maximum(1, np.round((high - low) / spacing)).astype(int)
     steps = [
         a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts, strict=True)
@@ -192,5 +198,5 @@ def _grid(centre: Array, own: Numbers, spacing: float) -> list[Numbers]:
     for place in np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2):
         distance = np.linalg.norm(local - place, axis=1)
         if distance.min() < 0.5 * spacing:
-            groups.append(own[np.argsort(distance, kind="stable")[:TOGETHER]])
+            groups.append(np.argsort(distance, kind="stable")[:TOGETHER])
     return groups

@@ -13,6 +13,8 @@ from archfem.models.build import build
 from archfem.resultants import joint_dataset
 from archfem.shapes import arch_on_piers
 from archfem.statics import dead_load, equilibrium
+from archfem.view.freebody import draw_free_body
+from archfem.view.results import write_dead
 
 BALANCED = 1e-9
 """Newton's method stops at 1e-10 of the load, and forces on a block are of its order."""
@@ -104,3 +106,48 @@ def test_what_cannot_be_cut_free_is_refused(stack):
     over_time = joint_dataset(stack, np.ones((4, 2, 3)), np.arange(4.0))
     with pytest.raises(InvalidInput, match=r"give one instant of the 2 joints"):
         forces_on(stack, over_time, "block 1")
+
+
+def arrows(axes):
+    """Tails and heads of the arrows in axes (n, 2, 2)."""
+    return np.array([(each.xyann, each.xy) for each in axes.texts if hasattr(each, "xyann")])
+
+
+def test_the_picture_shows_forces_where_they_act_and_a_closed_polygon(ring, ring_model):
+    joints = dead_load(ring_model).joints
+    figure = draw_free_body(ring, joints, "voussoir 5", shape=ring_model.shape)
+    body = forces_on(ring, joints, "voussoir 5", ring_model.shape)
+    left, right = figure.axes
+    beside = arrows(left)
+    assert beside[:-1, 1] == pytest.approx(body.points[:-1])  # joints push at their points
+    assert beside[-1, 0] == pytest.approx(body.points[-1])  # the weight hangs from the centroid
+    ratio = np.linalg.norm(beside[:, 1] - beside[:, 0], axis=1) / body.sizes
+    assert ratio == pytest.approx(ratio[0])
+    chain = arrows(right)
+    assert chain[1:, 0] == pytest.approx(chain[:-1, 1])
+    assert chain[-1, 1] == pytest.approx(chain[0, 0], abs=1e-6 * body.sizes.max() / 1e3)
+    assert sorted(np.linalg.norm(chain[:, 1] - chain[:, 0], axis=1)) == pytest.approx(
+        sorted(body.sizes / 1e3)
+    )
+    assert right.get_title() == f"closes to {body.closing_error:.0e} of the largest force"
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [word.split(":")[0] for word in words] == ["1  joint 4", "2  joint 5", "3  weight"]
+    assert f"{body.sizes[0] / 1e3:.1f} kN" in words[0]
+
+
+def test_a_polygon_of_too_many_forces_is_refused():
+    bridge = Case.read(BRIDGE).structure
+    joints = joint_dataset(bridge, np.tile([1e4, 0.0, 0.0], (len(bridge.joints), 1)))
+    with pytest.raises(InvalidInput, match=r"'backfill' has 53 joints: .* choose a stone"):
+        draw_free_body(bridge, joints, "backfill")
+
+
+def test_a_case_may_ask_for_a_free_body(tmp_path):
+    ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
+    tables = {"structure": {**ring, "voussoirs": 9}, "output": {"free_body": "voussoir 3"}}
+    for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):
+        case = Case.of({**tables, "model": cells})
+        dead = dead_load(build(case.structure, **case.model))
+        files = [path.name for path in write_dead(case, dead, tmp_path)]
+        assert files == ["dead.png", *(f"dead_stress.{kind}" for kind in more), "free_body.png"]
+    assert (tmp_path / "dead_stress.txt").read_text().splitlines()[1].startswith("arch ")

@@ -1,14 +1,18 @@
 """Pictures on paper show what the criteria say, where the joints are, with units."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
 
-from archfem.criteria import hinged, opened, sliding
+from archfem.case import Case
+from archfem.criteria import hinged, opened, part_role, sliding
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
-from archfem.view.envelopes import draw_envelope
+from archfem.view.envelopes import draw_eccentricity, draw_envelope
 from archfem.view.marks import joint_ends, joint_marks
 from archfem.view.plots import draw_joint_histories, draw_structure
 from archfem.view.style import save
@@ -34,6 +38,12 @@ def resultants(ring):
         found[number, 1] = ratio * WEIGHT
     found[APART] = 0.0
     return found
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    """Three rings, two piers, sidewalls, and soil joints over all of them."""
+    return Case.read(Path(__file__).parents[2] / "meshes" / "prusias.toml").structure
 
 
 @pytest.fixture
@@ -114,6 +124,37 @@ def test_structure_is_drawn_true_to_scale_with_units_and_time(ring, joints):
     assert "3.660 s" in axes.get_title()
 
 
+def test_only_joints_of_rings_and_piers_are_marked(bridge):
+    """All joints hinge, or slide, or are open: those of soil and sidewalls show nothing."""
+    judged = np.array([part_role(joint.part) != "other" for joint in bridge.joints])
+    assert 0 < judged.sum() < len(judged)
+    depth = np.array([joint.depth for joint in bridge.joints])
+    rows = np.zeros((len(depth), 3))
+    rows[:, 0], rows[:, 1], rows[:, 2] = WEIGHT, WEIGHT, 0.48 * WEIGHT * depth
+    marks = joint_marks(bridge, joint_dataset(bridge, rows))
+    assert marks.hinges == pytest.approx(
+        np.array([joint.extrados for joint, own in zip(bridge.joints, judged, strict=True) if own])
+    )
+    assert len(marks.slips) == 2 * judged.sum()
+    assert np.isfinite(marks.thrust[:, 0]).tolist() == judged.tolist()
+    assert len(joint_marks(bridge, joint_dataset(bridge, 0.0 * rows)).gaps) == judged.sum()
+
+
+def test_a_thrust_line_runs_through_each_ring_and_pier(bridge):
+    """One link a voussoir and a course between beds; none through soil or skewbacks."""
+    rows = np.tile([WEIGHT, 0.0, 0.0], (len(bridge.joints), 1))
+    links = joint_marks(bridge, joint_dataset(bridge, rows)).links
+    assert len(links) == 14 + 17 + 15 + 2 * 4
+    assert np.linalg.norm(links[:, 1] - links[:, 0], axis=1).max() < 0.7  # a stone is that long
+
+
+def test_a_long_structure_has_a_wide_page_and_a_ring_has_not(ring, bridge):
+    pages = [draw_structure(each).get_size_inches() for each in (ring, bridge)]
+    assert pages[0][0] < 6.5
+    assert pages[1][0] > 10.5
+    assert pages[1][1] < 4.0
+
+
 def test_drawing_into_given_axes_returns_their_figure(ring, joints):
     page = Figure()
     left, right = page.subplots(1, 2)
@@ -144,6 +185,67 @@ def test_envelopes_of_runs_have_their_own_colours(run):
     assert names == ["one", "other", "came apart"]
     lines = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
     assert lines["one"] != lines["other"]
+
+
+def history(structure, e):
+    """Two instants at which all joints have eccentricity e, then -e."""
+    found = np.zeros((2, len(structure.joints), 3))
+    found[..., 0] = WEIGHT
+    depth = np.array([joint.depth for joint in structure.joints])
+    found[0, :, 2], found[1, :, 2] = e * WEIGHT * depth, -e * WEIGHT * depth
+    return History(joint_dataset(structure, found, np.arange(2.0)))
+
+
+def test_each_ring_and_pier_has_a_panel_of_its_own(bridge):
+    figure = draw_envelope({"quake": history(bridge, 0.3)})
+    assert [axes.get_title() for axes in figure.axes] == [
+        "north arch", "main arch", "south arch", "north pier", "south pier",
+    ]  # fmt: skip
+    for axes in figure.axes:
+        count = sum(joint.part == axes.get_title() for joint in bridge.joints)
+        (highest,) = [line for line in axes.lines if line.get_label() == "quake"]
+        assert highest.get_xdata().tolist() == list(range(count))
+        assert highest.get_ydata() == pytest.approx(np.full(count, 0.3))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["quake"]
+
+
+def test_two_bridges_are_told_apart_by_dots(bridge, ring):
+    """Parts of one name share a panel, whatever the number of their joints."""
+    runs = {"before": history(bridge, 0.4), "after": history(bridge, 0.1)}
+    for axes in draw_envelope(runs, dotted=["before"]).axes:
+        lines = {line.get_label(): line.get_linestyle() for line in axes.lines}
+        assert (lines["before"], lines["after"]) == (":", "-")
+    states = {name: run.joints.isel(time=0) for name, run in runs.items()}
+    for axes in draw_eccentricity(states, dotted=["before"]).axes:
+        lines = {line.get_label(): line for line in axes.lines}
+        assert lines["before"].get_linestyle() == ":"
+        assert lines["before"].get_ydata() == pytest.approx(0.4)
+        assert lines["after"].get_ydata() == pytest.approx(0.1)
+
+
+def test_many_parts_go_on_several_rows(ring):
+    """Of ten rings of 18 joints four fit side by side; all panels share one scale."""
+    parts = [f"arch {number}" for number in range(1, 11)]
+    one = draw_envelope({"quake": history(ring, 0.2)}).axes[0]
+    assert one.get_title() == ""
+    dataset = joint_dataset(ring, np.tile([WEIGHT, 0.0, 0.0], (18, 1)))
+    many = xr.concat(
+        [dataset.assign_coords(part=("joint", [part] * 18)) for part in parts], "joint"
+    )
+    axes = draw_eccentricity({"dead load": many}).axes
+    rows = [each.get_subplotspec().get_topmost_subplotspec().rowspan.start for each in axes]
+    assert rows == [0] * 4 + [1] * 4 + [2] * 2
+    assert {each.get_ylim() for each in axes} == {(-0.56, 0.56)}
+
+
+def test_several_parts_do_not_go_into_one_pair_of_axes(bridge):
+    with pytest.raises(InvalidInput, match=r"\['north arch', .* do not fit one pair of axes"):
+        draw_envelope({"quake": history(bridge, 0.3)}, axes=Figure().add_subplot())
+
+
+def test_eccentricity_over_time_is_refused(run):
+    with pytest.raises(InvalidInput, match=r"\['quake'\] have several instants: give one"):
+        draw_eccentricity({"quake": run.joints})
 
 
 @pytest.mark.parametrize("count", [0, 7])

@@ -1,6 +1,7 @@
 """Stress against closed forms, a finer mesh, and the resultants it must agree with."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 from scipy import sparse
 from scipy.integrate import trapezoid
 
+from archfem.case import Case
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.materials import BACKFILL, STONE
@@ -28,6 +30,7 @@ from archfem.stress import (
     utilisation,
 )
 from archfem.units import MPa
+from archfem.view.stress import draw_stress
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
@@ -201,3 +204,41 @@ def test_what_has_no_field_is_refused(ring, ring_model, dead):
             ask(ring_model, np.zeros(3))
     with pytest.raises(InvalidInput, match=r"no fields.*fields_every.*utilisation"):
         strength_use_over(ring_model, History(dead.joints))
+
+
+def named(figure, name):
+    """The one thing of a figure that is called so."""
+    found = figure.findobj(lambda artist: artist.get_gid() == name)
+    return found[0] if found else None
+
+
+def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_model, dead):
+    figure = draw_stress(ring_model, dead.q)
+    shown = named(figure, "compression").get_array() * MPa
+    assert shown.max() == pytest.approx(
+        float(strength_use(ring_model, dead.q)["compression"].max())
+    )
+    assert shown.min() >= 0.0
+    bar = figure.axes[0].child_axes[0]
+    assert bar.get_ylabel() == "largest compression [MPa]"
+    assert named(figure, "thrust").get_xydata().shape == (18, 2)
+    crosses = figure.axes[0].findobj(lambda artist: artist.get_label() == "compression")[0]
+    directions = np.diff(np.array(crosses.get_segments()), axis=1)[:, 0]
+    middles = np.array(crosses.get_segments()).mean(axis=1)
+    radial = np.abs(np.sum(directions * middles, axis=1))
+    apart = np.linalg.norm(directions, axis=1) * np.linalg.norm(middles, axis=1)
+    assert np.median(radial / apart) < 0.2  # compression follows the ring
+
+
+def test_the_map_of_one_part_has_its_own_scale():
+    """Soil is left out unless it is asked for; there stresses are kPa."""
+    bridge = Case.read(Path(__file__).parents[2] / "meshes" / "prusias.toml").structure
+    model = build(bridge, fidelity="full")
+    q = dead_load(model).q
+    labels = [
+        draw_stress(model, q, parts=parts).axes[0].child_axes[0].get_ylabel()
+        for parts in (None, ["backfill"])
+    ]
+    assert labels == ["largest compression [MPa]", "largest compression [kPa]"]
+    with pytest.raises(InvalidInput, match=r"parts \['deck'\] cannot be shaded: .*'backfill'"):
+        draw_stress(model, q, parts=["deck"])
