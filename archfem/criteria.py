@@ -94,9 +94,10 @@ class Mechanism:
         kind: one of `KINDS`: "local" in one ring or one pier, "semi-global" in one ring and one
             pier, "global" in more; "none" where no ring and no pier moves.
         part: the rings and piers concerned, joined by " + ".
-        joints: numbers of the failed joints.
+        joints: numbers of the failed joints; of those that open or slip, where motion tells.
         time: when [s]; None for a static state.
-        blocks: numbers of the blocks that can move; empty where none can, or nobody asked.
+        blocks: numbers of the blocks that can move; empty where rings and piers cannot, or nobody
+            asked.
     """
 
     kind: str

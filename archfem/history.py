@@ -56,12 +56,12 @@ class History:
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
-        """The first mechanism by count, with the blocks that can then move, or None."""
+        """The first mechanism by count, or None; with the blocks that can then move, if any."""
         found = counted_mechanism(self.joints)
         if found is None or self.structure is None:
             return found
-        joints = self.joints.sel(time=found.time)
-        return replace(found, blocks=verified_mechanism(self.structure, joints).moved.blocks)
+        motion = verified_mechanism(self.structure, self.joints.sel(time=found.time))
+        return found if motion.kind == "none" else replace(found, blocks=motion.moved.blocks)
 
     @cached_property
     def verified(self) -> VerifiedMechanism | None:

@@ -12,7 +12,6 @@ from archfem.criteria import (
     HINGE,
     Mechanism,
     counted_mechanism,
-    failed,
     hinged,
     judged_parts,
     mechanism_kind,
@@ -34,8 +33,8 @@ class VerifiedMechanism:
     """What the failed joints of an instant permit, beside what counting them says.
 
     Attributes:
-        moved: the mechanism by motion, with the blocks that move; its kind is "none" where no
-            ring and no pier does.
+        moved: the mechanism by motion, with the blocks that move and the joints that open or
+            slip; its kind is "none" where no ring and no pier moves.
         counted: the mechanism by the count of `counted_mechanism`, or None.
         motion: of all blocks' centroids and rotations (n_blocks, 3) [m, m, rad]; translations, and
             rotations times the mean depth of the joints, are at most 1 m.
@@ -159,17 +158,19 @@ class Verifier:
                 f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
                 f"{len(self.structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
             )
-        motion = self.blocks.motion(_largest_motion(self.blocks, self.freedoms(joints, limit)))
+        scaled = _largest_motion(self.blocks, self.freedoms(joints, limit))
+        gaps = (self.blocks.kinematics @ (self.blocks.coordinates * scaled)).reshape(3, -1)
+        working = np.flatnonzero(np.abs(gaps).max(axis=0) > MOVING)
+        motion = self.blocks.motion(scaled)
         size = np.abs(motion * [1.0, 1.0, self.blocks.length]).max(axis=1)
         moving = np.flatnonzero(size > MOVING)
         blocks = self.skeleton.structure.blocks
         moved_parts = dict.fromkeys(blocks[k].part for k in moving)
         parts = [part for part in moved_parts if part in self.parts]
-        down = failed(joints, limit).values
         moved = Mechanism(
             mechanism_kind(parts),
             " + ".join(parts),
-            tuple(number for number in self.skeleton.joints if down[number]),
+            tuple(self.skeleton.joints[k] for k in working),
             float(joints["time"]) if "time" in joints.coords else None,
             tuple(self.skeleton.blocks[k] for k in moving),
         )

@@ -125,7 +125,7 @@ def _told(found: Mechanism, run: History) -> str:
         return words
     names = [run.structure.blocks[k].name for k in found.blocks]
     if not names:
-        return f"{words}; no block can move then"
+        return f"{words}; rings and piers cannot move then"
     return f"{words}; moving: {_shortened(names, '; ')}"
 
 

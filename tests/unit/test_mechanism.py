@@ -6,6 +6,7 @@ import xarray as xr
 
 from archfem.actions import BodyForce
 from archfem.criteria import counted_mechanism, mechanism_kind, part_role
+from archfem.equilibrium import RigidBlocks
 from archfem.errors import InvalidInput
 from archfem.kinematics import motion_of
 from archfem.limit import collapse_factor
@@ -86,6 +87,17 @@ def test_four_hinges_in_the_wrong_places_are_counted_but_do_not_move(hinges):
     assert "disagree" in str(found)
     assert found.moved.blocks == ()
     assert not found.motion.any()
+
+
+def test_joints_of_a_motion_are_those_that_work_in_it():
+    """A fifth hinge, on the wrong face, fails and stays shut."""
+    structure = ring()
+    joints = joints_with(structure, ALTERNATING | {1: -0.5, 2: 0.5})
+    found = verified_mechanism(structure, joints)
+    assert found.counted.joints == (0, 1, 2, 6, 12, 17)
+    jumps = np.abs(RigidBlocks(structure).gaps(found.motion)).max(axis=0)
+    assert found.moved.joints == tuple(np.flatnonzero(jumps > 1e-6))
+    assert set(found.moved.joints) < set(found.counted.joints)
 
 
 def test_three_hinges_do_not_move_and_are_not_counted():

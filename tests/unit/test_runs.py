@@ -137,13 +137,13 @@ def test_a_joint_by_name_or_number(run, model):
 def test_verdict_tells_count_and_motion(run, tmp_path):
     counted, moved = verdict(run).splitlines()
     assert f"by count: local mechanism of arch at {run.mechanism.time:.3f} s" in counted
-    assert "no block can move then" in counted
+    assert "rings and piers cannot move then" in counted
     assert f"verified: local mechanism of arch at {run.verified.moved.time:.3f} s" in moved
     names = [run.structure.blocks[k].name for k in run.verified.moved.blocks]
     assert f"moving: {names[0]}; " in moved
     assert len(names) <= 8 or f"({len(names)} in all)" in moved
     alone = verdict(History.read(run.save(tmp_path / "run.nc")))
-    assert alone == counted.removesuffix("; no block can move then")
+    assert alone == counted.removesuffix("; rings and piers cannot move then")
 
 
 def test_pair_table_tells_both(run, tmp_path):
