@@ -7,7 +7,7 @@ at the points becomes the forces f is the law's: springs at quadrature points, f
 integral over facets along which opening and slip are linear.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,6 +22,9 @@ from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
 Status = NDArray[np.bool_]
+
+LARGEST_MAP = 20_000_000
+"""Entries of the map from stiffness to tangent up to which it is stored: 240 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,10 +225,18 @@ class JointOperator:
         """The numbers on which the tangent depends, for `normal_stiffness` (entries,) [N/m]."""
         return self.law.stiffness(self.openings(q))
 
-    def normal_stiffness(self, pattern: Pattern) -> sparse.csr_matrix:
-        """Linear map from `stiffness` to the entries of the tangent on a pattern (nnz, entries)."""
-        first, second = self.law.entries
-        return pattern.outer(self.opening[first], self.opening[second])
+    def normal_stiffness(self, pattern: Pattern) -> Callable[[Array], Array]:
+        """The linear map from `stiffness` to the entries of the tangent on a pattern (nnz,).
+
+        Where points depend on few coordinates it is a sparse matrix made once; where they depend
+        on all, as in a modal basis, that would be far larger than the tangent itself.
+        """
+        first, second = (self.opening[side] for side in self.law.entries)
+        if np.diff(first.indptr) @ np.diff(second.indptr) <= LARGEST_MAP:
+            across = pattern.outer(first, second)
+            return lambda stiffness: across @ stiffness
+        rows, columns = first.toarray().T, second.toarray()
+        return lambda stiffness: pattern.taken(rows @ (stiffness[:, None] * columns))
 
     def shear_stiffness(self) -> sparse.csr_matrix:
         """The part of the tangent that never changes (n, n)."""

@@ -56,6 +56,11 @@ class Pattern:
         np.add.at(data, self._places(entries.row, entries.col), entries.data)
         return self.matrix(data)
 
+    def taken(self, matrix: Array) -> Array:
+        """Entries of a full matrix (n, n) on this pattern (nnz,)."""
+        rows = np.repeat(np.arange(self.size), np.diff(self.indptr))
+        return matrix[rows, self.indices]
+
     def outer(self, left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
         """Linear map (nnz, m) from factors d to the entries of Σ_k d_k l_k r_kᵀ.
 
