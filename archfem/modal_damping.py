@@ -88,7 +88,7 @@ def effective_range(
         ratios = found.mass_ratios[:, 0]
         if ratios.sum() > 1.0 - share or count == min(MOST, model.size):
             break
-        count = min(2 * count, MOST, model.size)
+        count = min(4 * count, MOST, model.size)
     numbers = tuple(int(number) + 1 for number in np.flatnonzero(ratios >= share))
     if len(numbers) < 2:
         largest = " and ".join(_percent(ratio) for ratio in np.sort(ratios)[:-3:-1])

@@ -5,6 +5,8 @@ sin(i α_j), i = 1..n, and α_j = (2j - 1) π / (2n + 1) (Clough and Penzien, 19
 """
 
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -199,6 +201,18 @@ def test_negative_stiffness_is_no_frequency():
     stiffness = sparse.diags([-1e6, 2.0, 3.0]).tocsr()
     with pytest.raises(DidNotConverge, match="singular or negative"):
         eigen.lowest(stiffness, sparse.identity(3, format="csr"), 2)
+
+
+def test_slepc_is_needed_for_modes_only():
+    script = """
+import sys
+sys.modules["slepc4py"] = None
+import archfem as af
+from archfem import analysis
+model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
+assert af.dead_load(model).iterations > 0
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_what_cannot_be_asked_for():
