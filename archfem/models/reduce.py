@@ -19,7 +19,7 @@ from archfem.errors import InvalidInput
 from archfem.joints import Facets
 from archfem.kinematics import motion_of
 from archfem.models.jointed import Jointed
-from archfem.structure import Array
+from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
 
@@ -50,8 +50,10 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
 
     "rigid" keeps three motions of a block; "faces" three of each joint face, which moves as a
     plane, and condenses the rest statically; "condensed" keeps all nodes on joints and condenses
-    the others; "full" keeps all. Faces that share a node cannot move as planes independently:
-    there "faces" keeps the nodes, as "condensed" does.
+    the others; "full" keeps all. Where faces of a block share nodes they cannot move on their own:
+    there "faces" keeps the displacements of the faces' ends, and each face moves linearly between
+    its two; it may stretch, but stays straight. The faces of a long thin block would bend: it keeps
+    its nodes, as "condensed" does.
 
     Args:
         model: with all nodes.
@@ -68,7 +70,7 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
         nodes = np.flatnonzero(model.shape.block == number)
         faces = [own for face in joints if len(own := np.intersect1d(face, nodes))]
         rung = rungs[number]
-        if rung == "faces" and sum(map(len, faces)) > len(np.unique(np.concatenate(faces))):
+        if rung == "faces" and _bends(model.structure, number):
             rung = "condensed"
         if rung in ("rigid", "faces"):
             plane.add(number)
@@ -77,6 +79,21 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
     stacked = sparse.block_diag(pieces, format="csr")
     basis = stacked[np.argsort(np.concatenate(order))]
     return projected(_spanned(model, plane), basis, fidelity)
+
+
+def _bends(structure: Structure, number: int) -> bool:
+    """Whether a face is a long beam on its joint as elastic foundation: λ L > π.
+
+    λ⁴ = k_n w / (4 E I); Hetényi, Beams on elastic foundation (1946). The thickness of the beam is
+    about the block's area over its longest extent.
+    """
+    block = structure.blocks[number]
+    thickness = block.area / float(np.linalg.norm(np.ptp(block.points, axis=0)))
+    bending = block.material.young * thickness**3 / 3.0  # 4 E I / w
+    own = [joint for joint in structure.joints if number in joint.blocks]
+    stiffness = np.array([joint.contact.normal_stiffness for joint in own])
+    lengths = np.array([joint.depth for joint in own])
+    return bool(np.any((stiffness / bending) ** 0.25 * lengths > np.pi))
 
 
 def _dofs(nodes: Numbers) -> Numbers:
@@ -103,13 +120,33 @@ def _basis(model: Jointed, nodes: Numbers, faces: list[Numbers], rung: str) -> s
         motion = motion_of(places[nodes], places[nodes].mean(axis=0))
         return sparse.csr_matrix(motion.reshape(-1, 3))
     held = np.unique(np.concatenate(faces))
-    if rung == "faces":
+    if rung == "faces" and sum(map(len, faces)) == len(held):
         motions = [motion_of(places[face], places[face].mean(axis=0)) for face in faces]
         columns = sparse.block_diag([motion.reshape(-1, 3) for motion in motions])
         on_joints = columns.tocsr()[np.argsort(_dofs(np.concatenate(faces)))]
+    elif rung == "faces":
+        on_joints = sparse.kron(_between_ends(places, faces, held), np.eye(2), format="csr")
     else:
         on_joints = sparse.identity(2 * len(held), format="csr")
     return _condensed(model, nodes, held, on_joints)
+
+
+def _between_ends(places: Array, faces: list[Numbers], held: Numbers) -> Array:
+    """Shares of the faces' ends in the displacements of the held nodes (held, ends)."""
+    pairs, weights = [], []
+    for face in faces:
+        relative = places[face] - places[face[0]]
+        far = face[np.argmax(np.sum(relative**2, axis=1))]
+        near = face[np.argmax(np.sum((places[face] - places[far]) ** 2, axis=1))]
+        along = places[far] - places[near]
+        pairs.append((near, far))
+        weights.append((places[face] - places[near]) @ along / (along @ along))
+    ends = np.unique(pairs)
+    shares = np.zeros((len(held), len(ends)))
+    for face, pair, weight in zip(faces, pairs, weights, strict=True):
+        columns = np.searchsorted(ends, pair)
+        shares[np.searchsorted(held, face)[:, None], columns] = np.stack([1.0 - weight, weight], 1)
+    return shares
 
 
 def _condensed(
