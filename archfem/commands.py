@@ -207,7 +207,7 @@ def _run_pair(
 
 def _dead_load(case: Case) -> "Equilibrium":
     from archfem.analysis import at_rest
-    from archfem.stress import strength_use, use_sentence
+    from archfem.strength import strength_use, use_sentence
 
     print(case.title)
     start = perf_counter()
@@ -253,9 +253,11 @@ def _shake(
 
 def _tell(run: "History", dead: "Equilibrium", folder: Path) -> None:
     """Print the table of joints and the mechanisms, and keep them as text."""
+    from archfem.strength import utilisation_sentence
     from archfem.summary import joint_table, verdict
 
-    text = f"{joint_table(run.joints, dead.joints)}\n\n{verdict(run)}"
+    strength = utilisation_sentence(dead.model.structure, run.joints)
+    text = f"{joint_table(run.joints, dead.joints)}\n\n{strength}\n{verdict(run)}"
     (folder / "summary.txt").write_text(text + "\n", encoding="utf-8")
     print(text)
 

@@ -13,7 +13,7 @@ from archfem.criteria import judged
 from archfem.history import History
 from archfem.motion import Motion
 from archfem.statics import Equilibrium
-from archfem.stress import strength_use, use_table
+from archfem.strength import strength_use, use_table
 from archfem.suite import Suite
 from archfem.view.envelopes import draw_envelope
 from archfem.view.freebody import draw_free_body

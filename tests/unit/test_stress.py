@@ -10,6 +10,7 @@ import xarray as xr
 from scipy import sparse
 from scipy.integrate import trapezoid
 
+from archfem.actions import BodyForce
 from archfem.case import Case
 from archfem.errors import InvalidInput
 from archfem.history import History
@@ -18,17 +19,17 @@ from archfem.models.build import build
 from archfem.models.shape import Shape
 from archfem.resultants import joint_dataset
 from archfem.shapes import column
-from archfem.statics import dead_load
-from archfem.stress import (
-    at_corners,
+from archfem.statics import dead_load, equilibrium
+from archfem.strength import (
     joint_stress,
-    principal,
     strength_use,
     strength_use_over,
     use_sentence,
     use_table,
     utilisation,
+    utilisation_sentence,
 )
+from archfem.stress import at_corners, principal
 from archfem.units import MPa
 from archfem.view.stress import draw_stress
 
@@ -156,6 +157,32 @@ def test_utilisation_follows_time_and_the_weaker_block(stack):
     assert found.dims == ("time", "joint")
     assert found.values[:, 0] == pytest.approx(np.array([0.1, 0.2, 0.0]) / 56.0)
     assert found.values[:, 1] == pytest.approx([0.1, 0.2, 0.0])
+
+
+def test_the_gravest_joint_of_a_run_is_named_but_not_a_hinge(stack):
+    """Joint 1 peaks at 0.5 s; joint 0 presses harder at 1 s, but hinges then."""
+    rows = np.zeros((3, 2, 3))
+    rows[..., 0] = [[1e5, 1e5], [1e5, 5.6e5], [9e5, 1e5]]
+    rows[2, 0, 2] = 0.47 * 9e5
+    joints = joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
+    assert utilisation_sentence(stack, joints) == (
+        "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
+        "1.00% of strength, in joint 1 at 0.500 s"
+    )
+    still = joint_dataset(stack, 0.0 * rows, np.array([0.0, 0.5, 1.0]))
+    assert utilisation_sentence(stack, still).startswith("no use of strength is known")
+
+
+def test_near_a_hinge_the_edge_stress_is_nearer_than_a_coarse_field(ring, ring_model):
+    """Pushed sideways to |e| = 0.40: 5 % above 16 × 16 cells, where 4 × 4 are 18 % below."""
+    fields, edges = [], []
+    for model in (ring_model, build(ring, fidelity="full", cells=(16, 16))):
+        state = equilibrium(model, model.load(BodyForce(0.27, -1.0)))
+        assert abs(state.joints["eccentricity"]).max() == pytest.approx(0.395, abs=0.002)
+        fields.append(float(strength_use(model, state.q)["compression"].max()))
+        edges.append(float(joint_stress(ring, state.joints).max()))
+    assert np.array(edges) / fields[1] == pytest.approx(1.05, abs=0.015)
+    assert fields[0] / fields[1] == pytest.approx(0.82, abs=0.02)
 
 
 def test_what_strength_is_unknown_is_not_used(stack):
