@@ -135,7 +135,7 @@ def _edges(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
     """Starts and ends of all straight edges (e, 2), and their blocks (e,)."""
     starts, ends, owner = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=int)]
     for number, block in enumerate(blocks):
-        straight = np.ones(len(block.points), dtype=bool)
+        straight = np.any(block.points != np.roll(block.points, -1, axis=0), axis=1)
         if block.centre is not None:
             straight[[0, 2]] = False
         starts.append(block.points[straight])

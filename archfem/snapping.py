@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from archfem.errors import InvalidStructure
+from archfem.polygons import check_apart, check_simple
 from archfem.structure import TOUCHING, Array
 
 NEARLY = 5.0
@@ -45,7 +46,7 @@ def snapped(
     if not snap > 0.0:
         raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
     for name, points in zip(names, outlines, strict=True):
-        _check_simple(points, name)
+        check_simple(points, name)
     turned = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
     given = np.concatenate(turned)
     places, number = _merged(turned, snap)
@@ -62,8 +63,8 @@ def snapped(
     for name, points, loop in zip(names, found, loops, strict=True):
         if len(loop) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
-        _check_simple(points, name)
-    _check_apart(found, loops, names, snap)
+        check_simple(points, name)
+    check_apart(found, names, NEARLY * snap)
     _check_gaps(places, loops, names, snap)
     return found, float(moved.max())
 
@@ -72,18 +73,6 @@ def _area(points: Array) -> float:
     """Area of a polygon, positive anticlockwise."""
     x, y = (points - points[0]).T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def _check_simple(points: Array, name: str) -> None:
-    """Refuse an outline that crosses or touches itself."""
-    import shapely
-
-    polygon = shapely.Polygon(points)
-    if not polygon.is_valid:
-        raise InvalidStructure(
-            f"the outline of '{name}' crosses or touches itself "
-            f"({shapely.is_valid_reason(polygon)}): correct the drawing"
-        )
 
 
 def _edges(loops: Loops) -> Iterator[tuple[int, int, int]]:
@@ -183,29 +172,6 @@ def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float)
             "snap if the survey is rougher than that; lower it, or leave out vertices, if they "
             "follow one another so closely"
         )
-
-
-def _check_apart(outlines: list[Array], loops: Loops, names: Sequence[str], snap: float) -> None:
-    """Refuse outlines that are the same or overlap."""
-    import shapely
-
-    near = TOUCHING * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
-    polygons = [shapely.Polygon(points) for points in outlines]
-    pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T.tolist()
-    for a, b in pairs:
-        if a >= b:
-            continue
-        if set(loops[a]) == set(loops[b]):
-            raise InvalidStructure(f"'{names[a]}' and '{names[b]}' are the same: leave one out")
-        common = shapely.intersection(polygons[a], polygons[b])
-        depth = 2.0 * common.area / common.length if common.length else 0.0
-        if depth > near:
-            x, y = common.centroid.x, common.centroid.y
-            remedy = ", or raise snap above that" if depth < NEARLY * snap else ""
-            raise InvalidStructure(
-                f"'{names[a]}' and '{names[b]}' overlap by {1e4 * common.area:.3g} cm², about "
-                f"{1e3 * depth:.3g} mm deep at ({x:.3f}, {y:.3f}): correct the drawing{remedy}"
-            )
 
 
 def _check_gaps(places: Array, loops: Loops, names: Sequence[str], snap: float) -> None:

@@ -12,12 +12,12 @@ from archfem.assembly import assembled
 from archfem.errors import InvalidStructure
 from archfem.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.shapes.site import Site, ledge
+from archfem.shapes.site import Face, Site, ledge
 from archfem.structure import Block, Point, Structure
 from archfem.units import G
 
 THIN = 0.02
-"""Least fill above a ring [m]."""
+"""Least fill above rings and sidewalls [m]."""
 
 
 def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
@@ -58,20 +58,18 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     _check(arches, piers, sidewalls, backfill is None and paving is not None)
     site = Site(material, contact, chords)
     faces, extrados = site.build(arches, piers, sidewalls)
-    fill = contact
     if backfill is not None:
-        left, right = faces[0][0], faces[-1][1]
-        ends = [ledge(left, 1.0, sidewalls[:1]), ledge(right, -1.0, sidewalls[1:])]
-        bottom = [*ends[0], *extrados, *reversed(ends[1])]
-        top = backfill.surface(bottom[0][0], bottom[-1][0], max(extrados, key=lambda p: p[1]))
-        _check_cover(extrados, top)
+        bottom = _bottom(faces, extrados, sidewalls)
+        top = backfill.surface(bottom[0][0], bottom[-1][0], _crown(faces, extrados))
+        _check_cover(bottom, top)
         site.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
-        fill = backfill.contact
         if paving is not None:
             site.pave(top, paving)
+    site.check()
+    soil = contact if backfill is None else backfill.contact
 
     def touch(a: Block, b: Block) -> Contact:
-        return fill if "backfill" in (a.part, b.part) else contact
+        return soil if "backfill" in (a.part, b.part) else contact
 
     return assembled(
         site.blocks, touch, joints=site.joints, width=width, gravity=gravity, name="bridge"
@@ -93,13 +91,30 @@ def _check(
         raise InvalidStructure("paving lies on backfill: give backfill too, or no paving")
 
 
-def _check_cover(extrados: Sequence[Point], surface: Sequence[Point]) -> None:
-    """Refuse a fill through which a ring would show."""
-    x, y = np.array(extrados).T
+def _bottom(
+    faces: Sequence[tuple[Face, Face]], extrados: Sequence[Point], sidewalls: Sequence[Sidewall]
+) -> list[Point]:
+    """What the fill lies on, from left to right."""
+    left, right = faces[0][0], faces[-1][1]
+    after = ledge(right, -1.0, sidewalls[1:])
+    return [*ledge(left, 1.0, sidewalls[:1]), *extrados, *reversed(after)]
+
+
+def _crown(faces: Sequence[tuple[Face, Face]], extrados: Sequence[Point]) -> Point:
+    """The highest crown, midway between the springings of its ring; of equal ones the first."""
+    level = max(y for _, y in extrados)
+    x = next(x for x, y in extrados if y > level - 1e-9)
+    springings = ((left[0][0], right[0][0]) for left, right in faces)
+    return next(0.5 * (start + end) for start, end in springings if start < x < end), level
+
+
+def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
+    """Refuse a fill through which a ring or a sidewall would show."""
+    x, y = np.array(bottom).T
     cover = np.interp(x, *np.array(surface).T) - y
     if cover.min() < THIN:
         place = int(np.argmin(cover))
         raise InvalidStructure(
-            f"the fill is {cover[place]:.3f} m above the ring at x = {x[place]:.2f} m, and it must "
-            f"be at least {THIN} m: give more cover or less erosion"
+            f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, and it "
+            f"must be at least {THIN} m: give more cover, less erosion or lower sidewalls"
         )

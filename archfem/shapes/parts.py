@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from math import atan2, radians, sin
 from typing import Any
 
+import numpy as np
+
 from archfem.criteria import part_role
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
@@ -113,6 +115,7 @@ class Sidewall:
     def __post_init__(self) -> None:
         """Refuse an unknown state and impossible lengths."""
         _check_positive(self, "length", "height", "course")
+        _check_not_negative(self, "above", "setback")
         if self.state not in ("free", "retained", "fixed"):
             raise InvalidStructure(
                 f"'{self.name}': state '{self.state}' is not known: free, retained or fixed"
@@ -139,22 +142,26 @@ class Backfill:
     spandrels: float = 0.0
     material: Material = BACKFILL
     contact: Contact = SOIL_TO_STONE
+    name: str = field(default="backfill", init=False)
+
+    def __post_init__(self) -> None:
+        """Refuse impossible lengths."""
+        _check_not_negative(self, "cover", "erosion", "hump", "spandrels")
 
     def surface(self, left: float, right: float, crown: Point) -> list[Point]:
         """Points along the surface between the ends of the deck, given the highest crown."""
         deck = crown[1] + self.cover
-        if self.erosion <= 0.0:
-            return [(left, deck), (right, deck)]
         low, slope = deck - self.erosion, 2.0 * self.erosion
-        reach = (-self.hump - slope, -self.hump, self.hump, self.hump + slope)
-        levels = (low, deck, deck, low)
-        middle = [(crown[0] + x, y) for x, y in zip(reach, levels, strict=True)]
-        return [(left, low), *middle, (right, low)]
+        reach = crown[0] + np.array([-self.hump - slope, -self.hump, self.hump, self.hump + slope])
+        breaks = reach[(reach > left) & (reach < right)] if self.erosion else reach[:0]
+        x = np.array([left, *breaks, right])
+        y = np.interp(x, reach, [low, deck, deck, low])
+        return [(float(px), float(py)) for px, py in zip(x, y, strict=True)]
 
     def loaded(self, width: float, stone: Material) -> Material:
         """The fill with the weight of the spandrels spread over the width [m]."""
         share = self.spandrels / width
-        if not 0.0 <= share < 1.0:
+        if share >= 1.0:
             raise InvalidStructure(
                 f"spandrels of {self.spandrels:.3g} m do not fit into a width of {width:.3g} m"
             )
@@ -188,6 +195,14 @@ def _check_positive(part: Any, *keys: str) -> None:
             raise InvalidStructure(
                 f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
             )
+
+
+def _check_not_negative(part: Any, *keys: str) -> None:
+    """Refuse lengths that can be 0 but no less."""
+    for key in keys:
+        value = getattr(part, key)
+        if not 0.0 <= value < 1e3:
+            raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")
 
 
 def _check_role(name: str, role: str) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from archfem.errors import InvalidStructure
 from archfem.materials import Contact, Material
+from archfem.polygons import check_apart, check_simple
 from archfem.shapes.parts import Arch, Paving, Pier, Sidewall
 from archfem.shapes.rings import circular_arch
 from archfem.structure import Block, Joint, Point, Structure
@@ -77,6 +78,7 @@ class Site:
     ) -> int:
         """Add a block, whichever way round its outline is given; its number."""
         points = [(float(px), float(py)) for px, py in outline]
+        points = [point for k, point in enumerate(points) if point != points[k - 1]]
         x, y = np.array(points).T
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0:
             points = [points[0], *reversed(points[1:])]
@@ -99,6 +101,14 @@ class Site:
             low = [(x[k], y[k]), (x[k + 1], y[k + 1])]
             high = [(px, py + paving.thickness) for px, py in reversed(low)]
             self.add([*low, *high], f"paving stone {k + 1}", part="paving", structured=True)
+
+    def check(self) -> None:
+        """Refuse blocks that cross themselves or one another: their lengths do not go together."""
+        outlines = [block.points for block in self.blocks]
+        names = [block.name for block in self.blocks]
+        for outline, name in zip(outlines, names, strict=True):
+            check_simple(outline, name)
+        check_apart(outlines, names)
 
     def _join(self, pair: tuple[int, int], ends: Face, name: str, part: str) -> None:
         self.joints.append(Joint(pair, *ends, self.contact, name, part))
@@ -190,6 +200,12 @@ class Site:
         (x, y), (edge, level) = face
         steps = ledge(face, inward, [wall])
         outer = steps[0][0]
+        room = wall.length - inward * (x - edge) / 2.0 - (wall.setback if wall.above else 0.0)
+        if room <= 0.0:
+            raise InvalidStructure(
+                f"'{wall.name}': nothing is left of its length {wall.length:.3g} m behind the ring "
+                f"and the setback of {wall.setback:.3g} m: give it more length or less setback"
+            )
         if wall.state == "fixed":
             outline = [(outer, -wall.height), (x, -wall.height), (x, y), (edge, level)]
             return self.add([*outline, *reversed(steps)], wall.name, fixed=True)
