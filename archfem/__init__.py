@@ -15,6 +15,7 @@ masonry side (structures, motions, limit analysis) works without them.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from archfem import shapes as shapes
 from archfem.actions import BodyForce as BodyForce
 from archfem.actions import PointLoad as PointLoad
 from archfem.actions import Settlement as Settlement
@@ -36,11 +37,6 @@ from archfem.resultants import thrust_line as thrust_line
 from archfem.schemes import HHT as HHT
 from archfem.schemes import Newmark as Newmark
 from archfem.schemes import Rayleigh as Rayleigh
-from archfem.shapes import Arch as Arch
-from archfem.shapes import Backfill as Backfill
-from archfem.shapes import Paving as Paving
-from archfem.shapes import Pier as Pier
-from archfem.shapes import Sidewall as Sidewall
 from archfem.shapes import arch_on_piers as arch_on_piers
 from archfem.shapes import bridge as bridge
 from archfem.shapes import circular_arch as circular_arch
@@ -66,9 +62,12 @@ if TYPE_CHECKING:
     from archfem.push import pushover as pushover
     from archfem.runs import Record as Record
     from archfem.runs import time_history as time_history
+    from archfem.scales import mechanism_scales as mechanism_scales
     from archfem.statics import dead_load as dead_load
     from archfem.suite import Suite as Suite
+    from archfem.survey import read_outlines as read_outlines
     from archfem.tradeoff import accuracy as accuracy
+    from archfem.verdicts import first_mechanisms as first_mechanisms
 
 __version__ = "0.1.0"
 
@@ -86,11 +85,14 @@ _LATER = {
     "effective_damping": "modal_damping",
     "Newton": "newton",
     "pushover": "push",
+    "mechanism_scales": "scales",
     "Record": "runs",
     "time_history": "runs",
     "dead_load": "statics",
     "Suite": "suite",
+    "read_outlines": "survey",
     "accuracy": "tradeoff",
+    "first_mechanisms": "verdicts",
 }
 
 
