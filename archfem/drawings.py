@@ -84,22 +84,28 @@ def _geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
     factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
     for number, feature in enumerate(found["features"], 1):
-        told = feature.get("properties") or {}
-        name = str(told.get("name") or f"outline {number}")
-        _check_properties(told, name)
-        layer = str(told.get("part") or "")
-        if layer in ignored:
-            continue
-        geometry = feature.get("geometry") or {}
-        rings = geometry.get("coordinates")
-        if geometry.get("type") != "Polygon" or not rings:
-            raise InvalidInput(
-                f"'{name}' is a {geometry.get('type')}: give each block as one Polygon"
-            )
-        if len(rings) > 1:
-            raise InvalidInput(f"'{name}' has a hole: cut it into blocks without holes")
-        points = _plane(rings[0], name, factor)
-        yield Outline(points, name, layer, told.get("material"), told.get("fixed"))
+        try:
+            outline = _feature(feature, f"outline {number}", factor)
+        except (AttributeError, TypeError) as error:
+            raise InvalidInput(f"feature {number} is not as GeoJSON has it: {error}") from error
+        if outline.layer not in ignored:
+            yield outline
+
+
+def _feature(feature: dict[str, Any], name: str, factor: float) -> Outline:
+    """The polygon of one feature, named so where it has no name."""
+    told = feature.get("properties") or {}
+    name = str(told.get("name") or name)
+    _check_properties(told, name)
+    geometry = feature.get("geometry") or {}
+    rings = geometry.get("coordinates")
+    if geometry.get("type") != "Polygon" or not rings:
+        raise InvalidInput(f"'{name}' is a {geometry.get('type')}: give each block as one Polygon")
+    if len(rings) > 1:
+        raise InvalidInput(f"'{name}' has a hole: cut it into blocks without holes")
+    points = _plane(rings[0], f"'{name}'", factor)
+    part = str(told.get("part") or "")
+    return Outline(points, name, part, told.get("material"), told.get("fixed"))
 
 
 def _check_properties(told: dict[str, Any], name: str) -> None:

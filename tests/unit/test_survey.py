@@ -332,6 +332,7 @@ def test_files_that_are_no_drawings(tmp_path):
         ("a.shp", "", "is no drawing: give a .geojson or a .dxf"),
         ("a.geojson", "{", "it is not JSON"),
         ("b.geojson", "[]", "no GeoJSON FeatureCollection"),
+        ("d.geojson", '{"features": [3]}', "feature 1 is not as GeoJSON has it"),
         ("c.geojson", '{"type": "FeatureCollection", "features": []}', "no closed outlines"),
         ("a.dxf", "nonsense", "it is not DXF"),
     ):
