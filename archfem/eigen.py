@@ -23,6 +23,9 @@ APART = 1e-6
 
 ITERATIONS = 200
 
+LEAST, MOST = 20, 240
+"""Bounds on the size of the projected problem, which is else as large as the number of modes."""
+
 
 def lowest(
     stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
@@ -84,7 +87,7 @@ def _solver(operators: tuple[PETSc.Mat, PETSc.Mat], count: int, shift: float) ->
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
     solver.setOperators(*operators)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-    solver.setDimensions(count)
+    solver.setDimensions(count, mpd=min(max(count, LEAST), MOST))
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(shift)
     solver.setTolerances(ACCURACY, ITERATIONS)

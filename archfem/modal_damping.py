@@ -1,10 +1,11 @@
 """Damping that is right at the first and the last mode that an earthquake along x excites.
 
-A mode counts as effective where its effective mass is at least 5 % of what can move: the measure
-by which Eurocode 8 (EN 1998-1, 4.3.3.3.1(3)) says which modes an analysis may not leave out; the
-Turkish code (TBEC-2018, 4.8.1.2) says 3 %. Its other measure, modes that together make up 90 %, is
-of no use here: where fill has hundreds of modes of a little mass each, the last one needed depends
-on how many were computed.
+Codes take as many modes, the lowest first, as together have 90 % of the mass that can move (EN
+1998-1, 4.3.3.3.1(3); ASCE 7-16, 12.9.1.1): the last of them is the last effective one here. The
+first is the lowest that those below it and itself give 5 %, what the same clause of EN 1998-1 calls
+too much to leave out. Both hold when the mesh changes. Two other definitions do not: modes with 5 %
+each, for modes close to each other share their mass now so, now so; and 90 % by decreasing mass,
+which where fill has hundreds of small modes depends on how many were computed.
 """
 
 import logging
@@ -20,92 +21,95 @@ from archfem.statics import Equilibrium
 
 logger = logging.getLogger("archfem")
 
+FIRST = 0.05
+"""Share of the mass along x that the modes up to the first effective one have together."""
+
 FEW, MOST = 32, 1024
 """Modes computed at first, and at most."""
+
+NAMED = 4
+"""Modes of large mass that are named in the text."""
 
 
 @dataclass(frozen=True, eq=False)
 class EffectiveRange:
-    """The modes that are effective along x.
+    """The first and the last mode that are effective along x.
 
     Attributes:
         modes: all that were computed.
-        numbers: of those that are effective, counted from 1.
-        share: of the mass along x that makes a mode effective [-].
+        first: number of the first, counted from 1.
+        last: number of the last.
     """
 
     modes: Modes
-    numbers: tuple[int, ...]
-    share: float
+    first: int
+    last: int
 
     @property
     def frequencies(self) -> tuple[float, float]:
-        """Of the first and of the last effective mode [Hz]."""
-        first, last = self.numbers[0] - 1, self.numbers[-1] - 1
-        return float(self.modes.frequencies[first]), float(self.modes.frequencies[last])
+        """Of both [Hz]."""
+        low, high = self.modes.frequencies[[self.first - 1, self.last - 1]]
+        return float(low), float(high)
 
     @property
-    def found(self) -> float:
-        """Share of the mass along x of all modes that were computed [-]."""
-        return float(self.modes.mass_ratios[:, 0].sum())
+    def share(self) -> float:
+        """Share of the mass along x of all modes up to the last [-]."""
+        return float(self.modes.mass_ratios[: self.last, 0].sum())
 
     @property
     def text(self) -> str:
-        """Which modes these are, in a sentence."""
-        ratios, frequencies = self.modes.mass_ratios[:, 0], self.modes.frequencies
-        each = ", ".join(
-            f"{number} ({frequencies[number - 1]:.2f} Hz, {_percent(ratios[number - 1])})"
-            for number in self.numbers
+        """Which modes these are, and which of those between have the most mass."""
+        ratios, frequencies = self.modes.mass_ratios[: self.last, 0], self.modes.frequencies
+        large = ", ".join(
+            f"{number + 1} ({frequencies[number]:.2f} Hz, {100.0 * ratios[number]:.1f} %)"
+            for number in np.sort(np.argsort(-ratios)[:NAMED])
         )
         return (
-            f"modes with at least {_percent(self.share)} of the mass along x: {each}; "
-            f"{len(ratios)} modes with {_percent(self.found)} looked at"
+            f"modes {self.first} and {self.last}, the first and the last effective along x; up to "
+            f"the last they have {100.0 * self.share:.1f} % of the mass, most of it {large}"
         )
 
 
 def effective_range(
     model: Model, about: Equilibrium | None = None, *, share: float = EFFECTIVE
 ) -> EffectiveRange:
-    """Find the modes with at least a share of the mass along x.
+    """Find the first and the last mode effective along x.
 
-    Modes are computed until those still unknown have less than the share between them, so that
-    none of them can be effective; where 1024 do not suffice, a warning says how much is unknown.
+    As many modes are computed as it takes; where 1024 do not have the share, the last of them is
+    given, and a warning says how much they have.
 
     Args:
         model: any rung of the ladder.
         about: the state, such as the dead load of this model; None: all joints closed.
-        share: of the mass that can move along x [-].
+        share: of the mass that can move along x, of the modes up to the last [-].
 
     Raises:
-        InvalidInput: the share is not one, or fewer than two modes have it.
+        InvalidInput: the share is not one, or a single mode has it.
         DidNotConverge: the structure is a mechanism in that state, or modes were not found.
     """
-    if not 0.0 < share < 1.0:
-        raise InvalidInput(f"share {share} of the mass is not between 0 and 1: 5 % is 0.05")
-    count = min(FEW, model.size)
-    while True:
+    if not FIRST < share < 1.0:
+        raise InvalidInput(f"share {share} of the mass is not between {FIRST} and 1: 90 % is 0.9")
+    count = 0
+    while count < min(MOST, model.size):
+        count = min(max(FEW, 2 * count), MOST, model.size)
         found = modes(model, count, about)
-        ratios = found.mass_ratios[:, 0]
-        if ratios.sum() > 1.0 - share or count == min(MOST, model.size):
+        reached = np.cumsum(found.mass_ratios[:, 0])
+        if reached[-1] >= share:
             break
-        count = min(4 * count, MOST, model.size)
-    numbers = tuple(int(number) + 1 for number in np.flatnonzero(ratios >= share))
-    if len(numbers) < 2:
-        largest = " and ".join(_percent(ratio) for ratio in np.sort(ratios)[:-3:-1])
-        raise InvalidInput(
-            f"{len(numbers)} of {count} modes have at least {_percent(share)} of the mass along x, "
-            f"and damping needs two; the largest have {largest}: lower the share, or give the "
-            "frequencies"
-        )
-    if ratios.sum() <= 1.0 - share:
+    else:
         logger.warning(
-            "%d modes, up to %.1f Hz, have %s of the mass along x: one with %s may lie above them",
-            count,
-            found.frequencies[-1],
-            _percent(ratios.sum()),
-            _percent(share),
+            "%d modes, up to %.1f Hz, have only %.1f %% of the mass along x, not %.0f %%: the last "
+            "of them is taken for the last effective one",
+            *(count, found.frequencies[-1], 100.0 * reached[-1], 100.0 * share),
         )
-    return EffectiveRange(found, numbers, share)
+    first = int(np.searchsorted(reached, FIRST)) + 1
+    last = min(int(np.searchsorted(reached, share)) + 1, count)
+    if first >= last:
+        raise InvalidInput(
+            f"mode {last} alone has {100.0 * found.mass_ratios[last - 1, 0]:.1f} % of the mass "
+            "along x, and damping needs two modes: raise the share, or give the frequencies"
+        )
+    return EffectiveRange(found, first, last)
 
 
 def effective_damping(
@@ -126,14 +130,10 @@ def effective_damping(
         ratio: of critical damping [-].
         about: the state, such as the dead load of this model; None: all joints closed.
         joints: what the stiffness part acts on, as in `Rayleigh`.
-        share: of the mass along x that makes a mode effective [-].
+        share: of the mass that can move along x, of the modes up to the last [-].
 
     Raises:
-        InvalidInput: a value cannot be meant, or fewer than two modes are effective.
+        InvalidInput: a value cannot be meant, or a single mode has the share.
         DidNotConverge: the structure is a mechanism in that state, or modes were not found.
     """
     return Rayleigh(ratio, effective_range(model, about, share=share).frequencies, joints)
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"

@@ -7,8 +7,8 @@ from archfem.errors import InvalidInput
 
 JOINTS = ("closed", "initial", "none")
 
-EFFECTIVE = 0.05
-"""Share of the mass along an axis from which a mode counts: EN 1998-1, 4.3.3.3.1(3)."""
+EFFECTIVE = 0.90
+"""Share of the mass along an axis that the modes up to the last effective one have together."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class EffectiveRayleigh:
     Attributes:
         ratio: at the first and the last mode effective along x [-].
         joints: what the stiffness part acts on, as in `Rayleigh`.
-        share: of the mass along x that makes a mode effective [-].
+        share: of the mass along x, of the modes up to the last effective one [-].
     """
 
     ratio: float
