@@ -1,6 +1,7 @@
 """Pictures on paper: a structure at an instant, histories of joints."""
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any, cast
 
 import numpy as np
@@ -34,6 +35,9 @@ from archfem.view.style import (
     legend,
 )
 from archfem.view.style import HINGE as RED
+
+LETTERS = 20
+"""That fit beside a panel."""
 
 LOOSE = 2.0
 """Mobilised friction at which its axis ends, relative to the largest coefficient: a joint about
@@ -95,7 +99,8 @@ def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = 
     for axes in panels[0]:
         _ground(axes, run)
     if len(panels[0, 1].lines) > 1:
-        panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, loc="upper right")
+        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96)}
+        panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, **above)
     for (left, right), number in zip(panels[1:], joints, strict=True):
         _eccentricity(left, run.joints.sel(joint=number), limit)
         _friction(right, run.joints.sel(joint=number))
@@ -196,7 +201,8 @@ def _ground(axes: Axes, run: History) -> None:
 
 def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
     """Draw where the thrust crosses a joint, against its faces."""
-    dress(axes, "", f"{joint['name'].values!s}\nM / (N h) [-]")
+    name = "\n".join(wrap(str(joint["name"].values), LETTERS))
+    dress(axes, "", f"{name}\nM / (N h) [-]")
     draw_faces(axes, limit)
     axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)

@@ -269,6 +269,17 @@ def test_joint_histories_show_the_recorded_values_and_limits(run):
     assert ground["vertical"] == pytest.approx(run.dataset["ground"].values[:, 1])
 
 
+def test_long_names_of_joints_are_broken_into_lines(bridge):
+    run = history(bridge, 0.3)
+    run.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
+    names = [joint.name for joint in bridge.joints]
+    long = "main arch, voussoir 12 to backfill"
+    axes = draw_joint_histories(run, [names.index(long)]).axes[2]
+    lines = axes.get_ylabel().splitlines()[:-1]
+    assert " ".join(lines) == long
+    assert max(map(len, lines)) <= 20
+
+
 @pytest.mark.parametrize(("numbers", "said"), [([0, 18], r"\[18\]"), ([], "none")])
 def test_joints_that_do_not_exist_are_refused(run, numbers, said):
     with pytest.raises(InvalidInput, match=rf"joints {said} cannot be drawn: .* 0 to 17"):
