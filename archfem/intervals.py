@@ -3,7 +3,7 @@
 A block with corners is meshed from side to side, so its opposite sides need the same number of
 cells, and neighbours share edges: the numbers hang together through the whole structure. They are
 the solution of a small integer program (Tam and Armstrong, International Journal for Numerical
-Methods in Engineering 36 (1993) 2581): the fewest cells with which opposite sides agree, no side
+Methods in Engineering 36 (1993) 2581): the fewest cells with which opposite sides agree, no edge
 has fewer than wished, and, for quadrilaterals, each edge of a freely meshed block has an even one,
 without which it could not be filled. The last is no obstacle: any solution may be doubled.
 
@@ -26,8 +26,14 @@ CELLS = ("quadrilateral", "triangle")
 SLENDER = 2.0
 """Longest cell of a stone, in multiples of the stone's thickness across it [-]."""
 
+ROUNDING = 1e-6
+"""Part of a cell that makes no further one."""
+
 GROWTH = 0.35
 """By how much the cells of a freely meshed block grow with the distance from its stones [-]."""
+
+PIECES = 500
+"""Into which an edge is cut to count the cells that fit on it."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,7 @@ class Meshing:
     """How finely blocks are cut into cells.
 
     These are least numbers: a side gets more where a neighbour needs them, where it bends or is
-    touched at more points, or where cells would be longer than twice the block's thickness.
+    touched at more points, or where cells of a polygon would be longer than twice its thickness.
 
     Attributes:
         through: cells through the thickness, so facets on a joint.
@@ -133,24 +139,24 @@ def _wanted(outlines: Outlines, number: int, meshing: Meshing) -> list[int]:
     lengths = [outlines.lengths[side].sum() for side in outlines.sides(number)]
     long = [0.5 * (lengths[k] + lengths[k + 2]) for k in range(2)]
     wanted = [_along(block.fixed, meshing), meshing.through]
-    if not block.fixed:
+    if not block.fixed and block.centre is None:  # arcs are drawn in so many chords already
         slender = [long[k] / (SLENDER * long[1 - k]) for k in range(2)]
-        wanted = [max(n, int(np.ceil(s - 1e-9))) for n, s in zip(wanted, slender, strict=True)]
+        wanted = [max(n, int(np.ceil(s - ROUNDING))) for n, s in zip(wanted, slender, strict=True)]
     return wanted
 
 
 def _wishes(outlines: Outlines, meshing: Meshing) -> tuple[Numbers, Array]:
     """Least number of cells on each edge, and whether it is a stone's or on a joint.
 
-    A side's cells are dealt to its edges in proportion to their lengths, at least one to each; so
-    are a joint's between two blocks without corners.
+    Where a side has several edges, none of their cells is longer than the side's would be; so it
+    is with a joint between two blocks without corners.
     """
     least = np.ones(len(outlines.edges), dtype=np.intp)
     fine = np.zeros(len(outlines.edges), dtype=bool)
 
     def deal(edges: Numbers, cells: int) -> None:
-        share = cells * outlines.lengths[edges] / outlines.lengths[edges].sum()
-        least[edges] = np.maximum(least[edges], np.round(share).astype(int))
+        shares = cells * outlines.lengths[edges] / outlines.lengths[edges].sum()
+        least[edges] = np.maximum(least[edges], np.ceil(shares - ROUNDING).astype(int))
         fine[edges] = True
 
     for number in outlines.structured:
@@ -168,25 +174,19 @@ def _assigned(outlines: Outlines, least: Numbers, meshing: Meshing) -> Numbers:
     """Solve for the numbers of cells; long edges take additional ones first."""
     size = len(outlines.edges)
     unit = _units(outlines, meshing)
-    rows, low, high = [], [], []
-
-    def require(edges: Numbers, signs: Array, bounds: tuple[float, float]) -> None:
-        place = (np.zeros(len(edges), dtype=int), edges)
-        rows.append(sparse.csr_matrix((signs * unit[edges], place), (1, size)))
-        low.append(bounds[0])
-        high.append(bounds[1])
-
+    rows = []
     for number in outlines.structured:
-        sides, wanted = outlines.sides(number), _wanted(outlines, number, meshing)
-        for side, other, cells in zip(sides[:2], sides[2:], wanted, strict=True):
-            signs = np.repeat([1.0, -1.0], [len(side), len(other)])
-            require(np.concatenate([side, other]), signs, (0.0, 0.0))
-            require(side, np.ones(len(side)), (float(cells), np.inf))
+        sides = outlines.sides(number)
+        for side, other in zip(sides[:2], sides[2:], strict=True):
+            edges = np.concatenate([side, other])
+            signs = np.repeat([1, -1], [len(side), len(other)])
+            places = (np.zeros(len(edges), dtype=int), edges)
+            rows.append(sparse.csr_matrix((signs * unit[edges], places), (1, size)))
     found = milp(
         unit * outlines.lengths.mean() / outlines.lengths,
         integrality=np.ones(size),
         bounds=Bounds(np.ceil(least / unit), np.inf),
-        constraints=LinearConstraint(sparse.vstack(rows), low, high) if rows else (),
+        constraints=LinearConstraint(sparse.vstack(rows), 0.0, 0.0) if rows else (),
     )
     if found.x is None:
         raise MeshError(
@@ -228,10 +228,9 @@ def _graded(outlines: Outlines, sizes: dict[int, Sizes]) -> dict[int, Array]:
     for number, size in sizes.items():
         for edge in set(outlines.around[number].tolist()) - taken:
             start, end = outlines.points[outlines.edges[edge]]
-            pieces = 8 + int(8.0 * outlines.lengths[edge] / size.lengths.min())
-            places = start + (end - start) * np.linspace(0.0, 1.0, pieces + 1)[:, None]
+            places = start + (end - start) * np.linspace(0.0, 1.0, PIECES + 1)[:, None]
             density = outlines.lengths[edge] / size.at(places)
-            steps = 0.5 * (density[1:] + density[:-1]) / pieces
+            steps = 0.5 * (density[1:] + density[:-1]) / PIECES
             through = np.append(0.0, np.cumsum(steps))
             if edge not in found or found[edge][-1] < through[-1]:
                 found[edge] = through
