@@ -9,7 +9,7 @@ from archfem.factor import Factor, backward, forward
 from archfem.kernel import ITERATIONS, SETTLED, joint_resultants
 from archfem.newmark import add_mixed, follow
 from archfem.products import Rows, add_rows, row_times, times
-from archfem.release import find_gaps, pull, pulls, release
+from archfem.release import pull, pulls, release
 from archfem.structure import Array
 
 EXACT = 1e-11
@@ -128,9 +128,7 @@ def _contact(vector, gap, joints, matrices, law):  # type: ignore
                 for row in rows:
                     start[row] = row_times(matrices.opening, row, vector)
             else:
-                held = np.empty(len(rows))
-                find_gaps(held, gap, rows, matrices.compliance, -force)
-                start[rows] = held
+                _unload(start, gap, rows, matrices.compliance, force)
             taken = release(start, rows, matrices.compliance, law, force, enough)
             if taken < 0:
                 return -1
@@ -176,17 +174,32 @@ def _exact(gap, force, near, law):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _know(rows, matrices, room):  # type: ignore
-    """Find the rows of F that are not known yet."""
-    everywhere = np.ones(len(matrices.factor.parent), dtype=np.bool_)
+def _unload(start, gap, rows, compliance, force):  # type: ignore
+    """Gaps at the rows without the forces that act, z₀ = z - F λ."""
+    start[rows] = gap[rows]
     for row in rows:
-        if not matrices.known[row]:
+        if force[row] != 0.0:
+            line = compliance[row]
+            for other in rows:
+                start[other] -= line[other] * force[row]
+
+
+@numba.njit(cache=True)
+def _know(rows, matrices, room):  # type: ignore
+    """Find the rows of F that are not known yet, as far as they meet those that are."""
+    known, compliance = matrices.known, matrices.compliance
+    force = np.ones(len(known))
+    for row in rows:
+        if not known[row]:
+            known[row] = True
+            held = np.flatnonzero(known)
             vector = np.zeros(len(matrices.weight))
-            add_rows(matrices.opening, np.array([row]), np.ones(len(matrices.known)), vector)
+            add_rows(matrices.opening, np.array([row]), force, vector)
             forward(matrices.factor, vector, room)
-            backward(matrices.factor, vector, room, everywhere)
-            times(matrices.opening, vector, matrices.compliance[row])
-            matrices.known[row] = True
+            backward(matrices.factor, vector, room, _branches(held, matrices))
+            for other in held:
+                compliance[row, other] = row_times(matrices.opening, other, vector)
+                compliance[other, row] = compliance[row, other]
 
 
 @numba.njit(cache=True)

@@ -19,8 +19,9 @@ import numpy as np
 
 from archfem.kernel import ITERATIONS, integrals, open_part
 
-RESIDUAL = 1e-14
-"""Residual of the conjugate gradients, relative to the right side."""
+ROUGH = 1e-3
+"""What the first pass leaves of its residual; later ones leave the less the better they converge,
+as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
 
 
 @numba.njit(cache=True)
@@ -35,19 +36,20 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
         force: λ, as a first guess (p,); changed at the rows.
         enough: error of λ that is left [N].
     """
-    gap = np.empty(len(rows))
-    root = np.zeros((len(rows), 2))
-    find_gaps(gap, start, rows, compliance, force)
+    facets, stiffness = law[0], law[1][rows]
+    matrix, free, own = _chosen(compliance, rows), start[rows], force[rows]
+    root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
+    gap, left, last = free + matrix @ own, ROUGH, 0.0
     for passes in range(1, ITERATIONS + 1):
-        _roots(gap, rows, law, root)
-        _forces(start, rows, compliance, (root, gap), law[0], force)
-        find_gaps(gap, start, rows, compliance, force)
-        off = 0.0
-        for i in range(len(rows)):
-            wanted = pull(gap[i], gap[i ^ 1] if law[0] else 0.0, law[1][rows[i]], law[0])
-            off = max(off, abs(wanted - force[rows[i]]))
+        _roots(gap, stiffness, facets, root)
+        gap = _solve(free, matrix, (root, facets), own, (left, 0.1 * enough))
+        pulls(gap, (facets, stiffness), wanted)
+        off = np.max(np.abs(wanted - own))
         if off <= enough:
+            force[rows] = own
             return passes
+        left = min(ROUGH, (off / last) ** 2) if last > 0.0 else ROUGH
+        last = off
     return -1
 
 
@@ -72,24 +74,22 @@ def pulls(gap, law, force):  # type: ignore
 
 
 @numba.njit(cache=True)
-def find_gaps(result, start, rows, compliance, force):  # type: ignore
-    """Find z = z₀ + F λ at the rows (rows,)."""
+def _chosen(matrix, rows):  # type: ignore
+    """Rows and columns of a matrix."""
+    result = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
-        result[i] = start[rows[i]]
-    for row in rows:
-        if force[row] != 0.0:
-            column = compliance[row]
-            for i in range(len(rows)):
-                result[i] += column[rows[i]] * force[row]
+        line = matrix[rows[i]]
+        for j in range(len(rows)):
+            result[i, j] = line[rows[j]]
+    return result
 
 
 @numba.njit(cache=True)
-def _roots(gap, rows, law, root):  # type: ignore
+def _roots(gap, stiffness, facets, root):  # type: ignore
     """R: the diagonal entry of each row and, for the first end of a facet, the one below it."""
-    facets, stiffness = law[0], law[1]
     root[:] = 0.0
-    for i in range(0, len(rows), 2 if facets else 1):
-        scale = np.sqrt(stiffness[rows[i]])
+    for i in range(0, len(gap), 2 if facets else 1):
+        scale = np.sqrt(stiffness[i])
         if not facets:
             root[i, 0] = scale if gap[i] > 0.0 else 0.0
         elif gap[i] > 0.0 or gap[i + 1] > 0.0:
@@ -102,70 +102,48 @@ def _roots(gap, rows, law, root):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _forces(start, rows, compliance, joints, facets, force):  # type: ignore
-    """Solve for μ with R given, from the last gaps, and set λ."""
-    root, gap = joints
-    force[rows] = 0.0
-    acts = root[:, 0] != 0.0
+def _times_root(roots, vector):  # type: ignore
+    """R times a vector."""
+    root, facets = roots
+    result = root[:, 0] * vector
     if facets:
-        acts[1::2] = acts[0::2]
-    active = np.flatnonzero(acts)
-    if len(active) == 0:
-        return
-    own, chosen = root[active], rows[active]
-    matrix = _whole(compliance, chosen, own, facets)
-    right, solution = start[chosen], gap[active]
-    _whiten(right, own, facets)
-    _whiten(solution, own, facets)
-    _conjugate_gradients(matrix, right, solution)
-    for i in range(len(active)):
-        force[chosen[i]] = solution[i] * own[i, 0]
-        if facets and i % 2 == 1:
-            force[chosen[i]] += solution[i - 1] * own[i - 1, 1]
+        for i in range(1, len(vector), 2):
+            result[i] += root[i - 1, 1] * vector[i - 1]
+    return result
 
 
 @numba.njit(cache=True)
-def _whiten(vector, root, facets):  # type: ignore
-    """Rᵀ times a vector, in place."""
-    for i in range(len(vector)):
-        vector[i] *= root[i, 0]
-        if facets and i % 2 == 0:
-            vector[i] += root[i, 1] * vector[i + 1]
+def _times_transposed(roots, vector):  # type: ignore
+    """Rᵀ times a vector."""
+    root, facets = roots
+    result = root[:, 0] * vector
+    if facets:
+        for i in range(0, len(vector), 2):
+            result[i] += root[i, 1] * vector[i + 1]
+    return result
 
 
 @numba.njit(cache=True)
-def _whole(compliance, rows, root, facets):  # type: ignore
-    """1 - Rᵀ F R of the active rows."""
-    size = len(rows)
-    matrix = np.empty((size, size))
-    for i in range(size):
-        column = compliance[rows[i]]
-        for j in range(size):
-            matrix[i, j] = -column[rows[j]]
-        _whiten(matrix[i], root, facets)
-    for i in range(size):
-        matrix[i] *= root[i, 0]
-        if facets and i % 2 == 0:
-            matrix[i] += root[i, 1] * matrix[i + 1]
-        matrix[i, i] += 1.0
-    return matrix
+def _solve(free, matrix, roots, force, until):  # type: ignore
+    """Solve for μ with R given by conjugate gradients, from the last λ; the gaps, and λ in place.
 
-
-@numba.njit(cache=True)
-def _conjugate_gradients(matrix, right, solution):  # type: ignore
-    """Solve a symmetric positive definite system from a first guess, in place."""
-    rest = right - matrix @ solution
-    direction = rest.copy()
-    square = rest @ rest
-    enough = RESIDUAL**2 * (right @ right)
-    for _ in range(4 * len(right)):
-        if square <= enough:
+    Ends when the residual is a fraction of the first, or an error of λ small enough.
+    """
+    solution = _times_transposed(roots, free + matrix @ force)
+    image = _times_root(roots, solution)
+    rest = _times_transposed(roots, free + matrix @ image) - solution
+    direction, square = rest.copy(), rest @ rest
+    stiffest = max(np.max(np.abs(roots[0])) ** 2, 1e-300)
+    end = max(until[0] ** 2 * square, until[1] ** 2 / stiffest)
+    for _ in range(4 * len(free)):
+        if square <= end:
             break
-        image = matrix @ direction
+        image = direction - _times_transposed(roots, matrix @ _times_root(roots, direction))
         length = square / (direction @ image)
         solution += length * direction
         rest -= length * image
         new = rest @ rest
-        direction *= new / square
-        direction += rest
+        direction = rest + (new / square) * direction
         square = new
+    force[:] = _times_root(roots, solution)
+    return free + matrix @ force
