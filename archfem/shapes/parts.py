@@ -99,7 +99,7 @@ class Sidewall:
         height: from foundation to springing level [m].
         course: height of a course, about [m].
         above: height of the courses above the springing, an abutment to the fill [m].
-        setback: of those courses, behind the extrados [m].
+        setback: of those courses, and so the depth of the skewback, behind the extrados [m].
         state: "free" courses; "retained" by a fixed wall at their outer end; or "fixed".
         name: of the part.
     """

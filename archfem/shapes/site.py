@@ -200,7 +200,8 @@ class Site:
         (x, y), (edge, level) = face
         steps = ledge(face, inward, [wall])
         outer = steps[0][0]
-        room = wall.length - inward * (x - edge) / 2.0 - (wall.setback if wall.above else 0.0)
+        back = edge - inward * wall.setback
+        room = inward * (back - outer)
         if room <= 0.0:
             raise InvalidStructure(
                 f"'{wall.name}': nothing is left of its length {wall.length:.3g} m behind the ring "
@@ -211,17 +212,19 @@ class Site:
             return self.add([*outline, *reversed(steps)], wall.name, fixed=True)
         step = wall.height / max(1, round(wall.height / wall.course))
         below = self._courses((outer, x), (-wall.height, -step), wall.course, wall.name)
-        outline = [(outer, -step), (x, -step), (x, y), (edge, level), (outer, level)]
-        top = self.add(outline, f"{wall.name}, skewback", part=wall.name)
-        self._bed((below, top), (outer, x), -step, wall.name)
-        high = level + max(0.0, wall.above)
-        if wall.above > 0.0:
-            self._stack(top, (outer, steps[1][0]), (level, high), wall.course, wall.name)
+        corner = [(back, level)] if wall.setback > 0.0 else []
+        outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]
+        skewback = self.add(outline, f"{wall.name}, skewback", part=wall.name)
+        self._bed((below, skewback), (back, x), -step, wall.name)
+        behind = self._course((outer, back), (-step, level), wall.name)
+        self._bed((below, behind), (outer, back), -step, wall.name)
+        high = level + wall.above
+        self._stack(behind, (outer, back), (level, high), wall.course, wall.name)
         if wall.state == "retained":
-            behind = outer - inward * DEEP
-            corners = [(outer, -wall.height), (outer, high), (behind, high), (behind, -wall.height)]
+            far = outer - inward * DEEP
+            corners = [(outer, -wall.height), (outer, high), (far, high), (far, -wall.height)]
             self.add(corners, f"{wall.name}, retaining wall", part=wall.name, fixed=True)
-        return top
+        return skewback
 
 
 def _face(joint: Joint) -> Face:
