@@ -17,6 +17,12 @@ from archfem.structure import Array
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""
 
+STEPS = 2000
+"""Steps over which set-up is spread where methods are compared."""
+
+POINT = 0.45
+"""What open points take of a step under strong motion, for each joint point there is [µs]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Room:

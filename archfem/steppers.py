@@ -30,8 +30,8 @@ def stepper_for(
     """The stepper of a run.
 
     Args:
-        method: "snes", "contact", "chain", "compliance", or "auto": of the last three the one with
-            the least work, where one applies.
+        method: "snes", "contact", "chain", "compliance", or "auto": of the last three the
+            fastest, by estimate, where one applies.
         model: any rung.
         motion: of the ground.
         damping: None is undamped.
@@ -70,7 +70,7 @@ def _method(name: str, exact: Stepper, damping: Rayleigh | None) -> Method:
 
 
 def _fitting(model: Model, damping: Rayleigh | None) -> dict[str, float]:
-    """Compiled steppers that apply, and about how much work a step is for each."""
+    """Compiled methods that apply, and about how long a step takes each [µs]."""
     if not isinstance(model, Jointed):
         return {}
     fitting = {}

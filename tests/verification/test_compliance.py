@@ -1,0 +1,180 @@
+"""The stepper for large structures: its factor, its small problem, and the histories it gives."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from archfem import march
+from archfem.actions import Settlement
+from archfem.errors import InvalidInput
+from archfem.factor import Plan, backward, factorised, forward
+from archfem.joints import Facets, JointPoints, Springs
+from archfem.models.build import build
+from archfem.motion import Motion
+from archfem.newmark import follow, numbers_of
+from archfem.newton import Newton
+from archfem.release import release
+from archfem.runs import time_history
+from archfem.schemes import HHT, Rayleigh
+from archfem.shapes import Arch, Backfill, bridge
+from archfem.statics import dead_load
+from archfem.steppers import stepper_for
+
+TIGHT = Newton(tolerance=1e-13)
+STRONG = Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
+
+
+@pytest.fixture(scope="module")
+def filled():
+    """One span under backfill."""
+    arch = Arch(span=5.8, embrace=159.0, thickness=0.58, voussoirs=9, name="main arch")
+    return bridge(arches=[arch], backfill=Backfill(cover=0.4))
+
+
+@pytest.mark.parametrize("rule", ["lobatto", "exact"])
+@pytest.mark.parametrize(
+    ("joints", "scheme"), [("closed", None), ("initial", HHT(-0.1)), ("none", HHT(-0.2))]
+)
+def test_history_is_that_of_snes(filled, rule, joints, scheme):
+    """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too."""
+    model = build(filled, quadrature=rule, cells=(2, 2))
+    given = {
+        "start": dead_load(model, TIGHT),
+        "damping": Rayleigh(0.05, (4.0, 20.0), joints),
+        "scheme": scheme,
+        "newton": TIGHT,
+    }
+    slow, fast = (
+        time_history(model, STRONG, method=method, **given) for method in ("snes", "compliance")
+    )
+    assert fast.dataset.attrs["method"] == "compliance"
+    assert fast.dataset.attrs["fallback_steps"] == 0
+    last = model.joints.openings(fast.dataset["last_q"].values)
+    assert np.mean(last > 0.0) > 1.0 / 6.0
+    for key in ("N", "V", "M"):
+        off = np.abs(fast.joints[key] - slow.joints[key]).max()
+        assert off < 1e-8 * np.abs(slow.joints[key]).max()
+    drift = fast.dataset["energy_drift"] - slow.dataset["energy_drift"]
+    assert np.abs(drift).max() < 1e-6  # of a joule, where hundreds are exchanged
+
+
+def test_steps_that_do_not_settle_are_left_to_snes(filled, monkeypatch):
+    model = build(filled, fidelity="rigid")
+    given = {"damping": Rayleigh(0.05, (4.0, 20.0)), "newton": TIGHT}
+    exact = time_history(model, STRONG, method="snes", **given)
+    whole = march.advance
+
+    def impatient(series, gap, results, *rest):
+        count = whole(series, gap, results, *rest)
+        many = np.flatnonzero(results[1][:count] > 4)
+        return int(many[0]) if len(many) else count
+
+    monkeypatch.setattr(march, "advance", impatient)
+    run = time_history(model, STRONG, method="compliance", **given)
+    assert run.dataset.attrs["fallback_steps"] > 3
+    off = np.abs(run.joints["M"] - exact.joints["M"]).max()
+    assert off < 1e-8 * np.abs(exact.joints["M"]).max()
+
+
+def test_the_fastest_method_is_taken(ring, filled):
+    """Modes where joints have few points, bands for chains, one sparse factor for the rest."""
+    chosen = [
+        stepper_for("auto", model, STRONG).name
+        for model in (
+            build(ring, fidelity="faces", quadrature="exact"),
+            build(ring, fidelity="rigid", cells=(16, 1)),
+            build(filled, cells=(4, 4)),
+        )
+    ]
+    assert chosen == ["contact", "chain", "compliance"]
+
+
+def test_supports_that_have_moved_are_refused(ring):
+    model = build(ring, fidelity="rigid")
+    moved = model.settled(Settlement(0, (0.0, -1e-3, 0.0)))
+    with pytest.raises(InvalidInput, match="supports have not moved"):
+        stepper_for("compliance", moved, STRONG)
+
+
+def laplacian(side):
+    """A matrix of a grid, and one of a piece apart from it."""
+    line = sparse.diags([-1.0, 2.01, -1.0], [-1, 0, 1], (side, side))
+    whole = sparse.identity(side)
+    grid = sparse.kron(line, whole) + sparse.kron(whole, line)
+    return sparse.block_diag([grid, line], format="csr")
+
+
+@pytest.mark.parametrize("side", [2, 7, 30])
+def test_factor_solves(side):
+    matrix = laplacian(side)
+    plan = Plan.of(matrix)
+    factor = factorised(matrix[plan.order][:, plan.order], plan)
+    right = np.random.default_rng(1).standard_normal(matrix.shape[0])
+    everywhere, room = np.ones(len(factor.parent), dtype=bool), np.empty(len(right))
+    found = right[plan.order]
+    forward(factor, found, room)
+    half = found.copy()
+    backward(factor, found, room, everywhere)
+    solution = np.empty(len(right))
+    solution[plan.order] = found
+    assert matrix @ solution == pytest.approx(right, abs=1e-12)
+    # A part of the tree is solved the same without the rest.
+    branch, group = np.zeros(len(factor.parent), dtype=bool), 0
+    while group >= 0:
+        branch[group] = True
+        group = factor.parent[group]
+    backward(factor, half, room, branch)
+    kept = branch[plan.group_of]
+    assert half[kept] == pytest.approx(found[kept], abs=1e-13)
+
+
+def test_factor_keeps_sparse():
+    """A grid of 900 fills in to a tenth of the dense factor at most."""
+    matrix = laplacian(30)
+    plan = Plan.of(matrix)
+    factor = factorised(matrix[plan.order][:, plan.order], plan)
+    assert len(factor.panels) < 0.1 * matrix.shape[0] ** 2 / 2.0
+
+
+def test_matrix_that_is_not_definite_is_refused():
+    matrix = laplacian(4)
+    plan = Plan.of(matrix)
+    matrix = matrix - 3.0 * sparse.identity(matrix.shape[0], format="csr")
+    with pytest.raises(np.linalg.LinAlgError):
+        factorised(matrix[plan.order][:, plan.order], plan)
+
+
+@pytest.mark.parametrize("rule", ["springs", "facets"])
+def test_released_forces_leave_no_tension(rule):
+    """Against the joint law as SNES has it: closed stiffness less λ is the law's own force."""
+    rng = np.random.default_rng(3)
+    points = JointPoints(
+        np.zeros(40, dtype=int), np.zeros(40), np.full(40, 0.5), np.full(40, 2.0), np.ones(40), 1
+    )
+    facets = rule == "facets"
+    law = Facets(points) if facets else Springs(points)
+    spread = rng.standard_normal((40, 60))
+    compliance = spread @ spread.T
+    compliance *= 0.9 / np.linalg.eigvalsh(compliance)[-1] / 2.0  # 1 - F J stays definite
+    start, force = rng.standard_normal(40), np.zeros(40)
+    rows, stiffness = np.arange(40), np.full(40, 2.0 if facets else 1.0)
+    compiled = (facets, stiffness, points.arm, points.joint)
+    passes = release(start, rows, compliance, compiled, force, 1e-13)
+    gap = start + compliance @ force
+    first, second = law.entries
+    closed = sparse.csr_matrix((law.stiffness(np.full(40, -1.0)), (first, second)))
+    assert passes > 1
+    assert np.count_nonzero(force) > 10
+    assert closed @ gap - force == pytest.approx(law.forces(gap), abs=1e-12)
+
+
+def test_images_follow_the_state():
+    """Of a random matrix, under HHT, against its products with the state."""
+    rng = np.random.default_rng(4)
+    numbers = numbers_of(0.005, (0.3025, 0.6, -0.1), 1e-3, 0.4)
+    matrix = rng.standard_normal((8, 8))
+    before, contact = rng.standard_normal((3, 8)), rng.standard_normal(8)
+    after, image = np.empty((3, 8)), np.empty((3, 8))
+    follow(contact, before, after, numbers)
+    follow(matrix @ contact, before @ matrix.T, image, numbers)
+    assert image == pytest.approx(after @ matrix.T, rel=1e-9)
