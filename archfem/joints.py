@@ -17,7 +17,7 @@ from scipy import sparse
 
 from archfem.laws import is_closed, normal_traction
 from archfem.quadrature import Quadrature
-from archfem.sparsity import Pattern
+from archfem.sparsity import Pattern, product
 from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
@@ -240,14 +240,14 @@ class JointOperator:
 
     def shear_stiffness(self) -> sparse.csr_matrix:
         """The part of the tangent that never changes (n, n)."""
-        return (self._back[1] @ self.slip).tocsr()
+        return product(self._back[1], self.slip)
 
     def couplings(self) -> sparse.csr_matrix:
         """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
         first, second = self.law.entries
         opening, slip = _ones(self.opening), _ones(self.slip)
-        across = opening[first].T @ opening[second]
-        return (across + slip.T @ _ones(self.law.shear) @ slip).tocsr()
+        across = product(opening[first].T.tocsr(), opening[second])
+        return (across + product(slip.T.tocsr(), product(_ones(self.law.shear), slip))).tocsr()
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint (n_joints, 3) [N, N, N m].
@@ -261,9 +261,7 @@ class JointOperator:
 
     def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
         """Express the same joints in the coordinates of a basis (n, m): G B."""
-        return replace(
-            self, opening=(self.opening @ basis).tocsr(), slip=(self.slip @ basis).tocsr()
-        )
+        return replace(self, opening=product(self.opening, basis), slip=product(self.slip, basis))
 
     def spanned(self, whole: Sequence[bool]) -> "JointOperator":
         """One facet instead of several on each joint that moves as a plane (n_joints,).

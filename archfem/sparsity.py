@@ -8,6 +8,25 @@ from scipy import sparse
 
 from archfem.structure import Array
 
+FULL = 0.3
+"""Share of entries from which matrices are multiplied as full ones."""
+
+
+def product(left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The product of two matrices, either of which may be nearly full, as a modal basis is."""
+    few, many = sorted((left, right), key=_share)
+    if _share(many) < FULL:
+        return (left @ right).tocsr()
+    if _share(few) >= FULL:
+        return sparse.csr_matrix(left.toarray() @ right.toarray())
+    if many is right:
+        return sparse.csr_matrix(left @ right.toarray())
+    return sparse.csr_matrix((right.T @ left.toarray().T).T)
+
+
+def _share(matrix: sparse.csr_matrix) -> float:
+    return float(matrix.nnz / max(1, matrix.shape[0] * matrix.shape[1]))
+
 
 @dataclass(frozen=True, eq=False)
 class Pattern:

@@ -19,6 +19,7 @@ from archfem.errors import InvalidInput
 from archfem.joints import Facets
 from archfem.kinematics import motion_of
 from archfem.models.jointed import Jointed
+from archfem.sparsity import product
 from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
@@ -29,18 +30,18 @@ RUNGS = ("rigid", "faces", "condensed", "full")
 
 def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointed:
     """Express a model in the coordinates of a basis (n, m)."""
-    shape = model.shape
+    shape, back = model.shape, basis.T.tocsr()
     return Jointed(
         model.structure,
         fidelity,
-        mass=(basis.T @ model.mass @ basis).tocsr(),
-        blocks=(basis.T @ model.blocks @ basis).tocsr(),
+        mass=product(back, product(model.mass, basis)),
+        blocks=product(back, product(model.blocks, basis)),
         body=basis.T @ model.body,
         joints=model.joints.projected(basis),
         shape=replace(
             shape,
-            lift=(shape.lift @ basis).tocsr(),
-            stress=None if shape.stress is None else (shape.stress @ basis).tocsr(),
+            lift=product(shape.lift, basis),
+            stress=None if shape.stress is None else product(shape.stress, basis),
         ),
     ).moved(model.supports)
 
@@ -218,7 +219,7 @@ def _joint_loads(model: Jointed) -> Array:
 def _modes(model: Jointed, closed: sparse.csc_matrix, below: float) -> Array:
     """Modes of the closed structure up to a frequency (n, modes)."""
     limit = (2.0 * np.pi * below) ** 2
-    count = 8
+    count = 32
     while True:
         if count >= model.size // 2:
             squares, shapes = eigh(closed.toarray(), model.mass.toarray())

@@ -432,6 +432,6 @@ def test_soil_meets_stone_as_the_preset_says(tmp_path):
 def test_check_command(capsys):
     changes = ["--set", "model.fidelity=rigid"]
     assert main(["check", str(SHIPPED), *changes]) == 0
-    assert "49 blocks, 85 joints" in capsys.readouterr().out
+    assert "51 blocks, 89 joints" in capsys.readouterr().out
     assert main(["check", str(SHIPPED), *changes, "--set", "structure.snap=1 mm"]) == 1
     assert "raise snap if the survey is rougher" in capsys.readouterr().err
