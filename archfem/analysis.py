@@ -42,7 +42,7 @@ def _wanted(case: Case) -> dict[str, Any]:
         motion = case.ground_motion()
     elif case.suite is not None:
         motion = case.ground_suite().motions[0]
-    return {"motion": motion, "damping": expected_damping(case)}
+    return {"motion": motion, "damping": expected_damping(case), "dt": case.analysis.get("dt")}
 
 
 def expected_damping(case: Case) -> Rayleigh | None:

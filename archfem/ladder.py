@@ -46,6 +46,10 @@ STEPS = (0.005, 0.0025)
 REFERENCE = (("condensed", (6, 6)), ("condensed", (4, 4)), ("faces", (4, 4)))
 """Models against which errors are measured, the best first; the first that is small enough."""
 
+WITH_SOIL = ("full", (4, 4))
+"""The same where there is soil, whose nodes are all kept: errors are then those of the rung, and of
+coarser meshes, against this mesh."""
+
 CANDIDATES = (
     ("rigid", (1, 1)),
     ("faces", (2, 2)),
@@ -76,7 +80,9 @@ class Setting:
     @property
     def label(self) -> str:
         """The setting in a few words."""
-        rung = self.fidelity if isinstance(self.fidelity, str) else "mixed"
+        rung = (
+            self.fidelity if isinstance(self.fidelity, str) else self.fidelity["rest"] + " + soil"
+        )
         rule = self.quadrature + (f" {self.points}" if self.points else "")
         return f"{rung} {self.cells[0]}×{self.cells[1]} {rule} {1e3 * self.dt:g} ms"
 
@@ -104,6 +110,7 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
     tolerance: float = 0.005,
     motion: Motion | None = None,
     damping: Rayleigh | None = None,
+    dt: float | None = None,
 ) -> Model:
     """Build a model of a structure, on a rung that is named or chosen.
 
@@ -122,13 +129,15 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
         motion: for "auto", the ground motion to come; without it a synthetic one is used that
             brings |e| to 0.4, and the prediction is the less certain.
         damping: for "auto", that of the run to come.
+        dt: for "auto", the time step of the run to come [s]; errors are then those of the model
+            alone. Without it the step is chosen too, and its error counts.
 
     Raises:
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be cut as asked.
     """
     if fidelity == "auto":
-        return choose(structure, tolerance, motion, damping)
+        return choose(structure, tolerance, motion, damping, dt)
     return plain.build(
         structure,
         fidelity=fidelity,
@@ -146,20 +155,24 @@ def choose(
     tolerance: float,
     motion: Motion | None = None,
     damping: Rayleigh | None = None,
+    dt: float | None = None,
 ) -> Model:
-    """Find the cheapest model and time step whose predicted error is within a tolerance.
+    """Find the cheapest model, and time step, whose predicted error is within a tolerance.
 
     Where none is, the best is given, and a warning says so.
     """
-    damping = damping or _usual_damping(structure)
-    window = strongest(motion) if motion is not None else _probe(structure)
     best = finest(structure).build(structure)
+    probe = best if soft_blocks(structure) else rigid(structure, rule=Quadrature("exact"))
+    assert isinstance(probe, Jointed)
+    damping = damping or _usual_damping(probe)
+    window = strongest(motion) if motion is not None else _probe(probe)
     references: dict[float, Array] = {}
     considered: list[tuple[Setting, float, Model]] = []
-    for setting in _candidates(structure):
+    for setting in _candidates(structure, STEPS if dt is None else (dt,)):
         model = setting.build(structure)
         if setting.dt not in references:
-            references[setting.dt] = envelope(best, window, damping, setting.dt / 2.0)
+            step = setting.dt / 2.0 if dt is None else dt
+            references[setting.dt] = envelope(best, window, damping, step)
         try:
             found = envelope(model, window, damping, setting.dt)
             error = SAFETY * largest_difference(found, references[setting.dt])
@@ -207,41 +220,39 @@ def _mixed(structure: Structure, rung: str) -> str | dict[str, str]:
     return {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
 
 
-def _candidates(structure: Structure) -> Iterator[Setting]:
-    """Settings to try, the cheapest first; small enough for the contact stepper."""
-    for dt in STEPS:
-        for rung, cells in CANDIDATES:
-            fits = rung == "rigid" or _size(structure, rung, cells) <= LARGEST
+def _candidates(structure: Structure, steps: tuple[float, ...]) -> Iterator[Setting]:
+    """Settings to try, the cheapest first; without soil, small enough for the contact stepper."""
+    soil = bool(soft_blocks(structure))
+    rungs = CANDIDATES[1:] if soil else CANDIDATES
+    for dt in steps:
+        for rung, cells in rungs:
+            fits = soil or rung == "rigid" or _size(structure, rung, cells) <= LARGEST
             if fits or (rung, cells) == CANDIDATES[1]:
                 yield Setting(_mixed(structure, rung), cells, "exact", dt)
 
 
 def finest(structure: Structure) -> Setting:
-    """The finest model that the contact stepper still takes, with half the smallest step."""
-    for rung, cells in REFERENCE:
-        if _size(structure, rung, cells) <= LARGEST:
-            break
+    """The model against which errors are measured, with half the smallest step.
+
+    Without soil the finest that the contact stepper still takes.
+    """
+    small = (each for each in REFERENCE if _size(structure, *each) <= LARGEST)
+    rung, cells = WITH_SOIL if soft_blocks(structure) else next(small, REFERENCE[-1])
     return Setting(_mixed(structure, rung), cells, "exact", min(STEPS) / 2.0)
 
 
 def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
     """About how many coordinates a rung has."""
-    soft = set(soft_blocks(structure))
-    through, along = cells[0] + 1, cells[1] + 1
     sides = np.bincount(
         [block for joint in structure.joints for block in joint.blocks],
         minlength=len(structure.blocks),
     )
-    each = 3 if rung == "faces" else 2 * through
-    return sum(
-        2 * through * along if number in soft else each * int(sides[number])
-        for number in structure.free
-    )
+    each = 3 if rung == "faces" else 2 * (cells[0] + 1)
+    return each * int(sum(sides[number] for number in structure.free))
 
 
-def _usual_damping(structure: Structure) -> Rayleigh:
+def _usual_damping(model: Jointed) -> Rayleigh:
     """Five per cent at the first closed frequency and at three times that."""
-    model = rigid(structure, rule=Quadrature("exact"))
     square = eigsh(
         model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
     )[0]
@@ -249,9 +260,8 @@ def _usual_damping(structure: Structure) -> Rayleigh:
     return Rayleigh(0.05, (first, 3.0 * first))
 
 
-def _probe(structure: Structure) -> Motion:
+def _probe(model: Jointed) -> Motion:
     """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
-    model = rigid(structure, rule=Quadrature("exact"))
     weight, low, high = self_weight(model), 0.0, 2.0
     for _ in range(10):
         middle = 0.5 * (low + high)
@@ -261,5 +271,5 @@ def _probe(structure: Structure) -> Motion:
         except DidNotConverge:
             severe = True
         low, high = (low, middle) if severe else (middle, high)
-    pga = max(low, 0.02) * structure.gravity
+    pga = max(low, 0.02) * model.structure.gravity
     return Motion.synthetic(duration=WINDOW, pga=pga, seed=1)

@@ -8,9 +8,12 @@ import pytest
 from archfem.ladder import Setting, _usual_damping, build, envelope, largest_difference, strongest
 from archfem.materials import BACKFILL, Contact
 from archfem.models.build import build as plain
+from archfem.models.rigid import rigid
 from archfem.motion import Motion
+from archfem.quadrature import Quadrature
 from archfem.runs import time_history
-from archfem.shapes import circular_arch, column
+from archfem.schemes import Rayleigh
+from archfem.shapes import Arch, Backfill, bridge, circular_arch, column
 from archfem.tradeoff import accuracy
 
 STIFF = Contact(1.48e10, 0.3e10)
@@ -23,6 +26,10 @@ SCENES = {
     ),
     "column": (column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
 }
+
+
+def usual_damping(structure):
+    return _usual_damping(rigid(structure, rule=Quadrature("exact")))
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005])
@@ -39,7 +46,7 @@ def test_prediction_is_within_a_factor_of_three(scene, tolerance):
     """Predicted over actual error, the actual one over a whole motion and on a finer model."""
     structure, pga = SCENES[scene]
     motion = Motion.synthetic(duration=12.0, pga=pga, seed=1)
-    damping = _usual_damping(structure)
+    damping = usual_damping(structure)
     model = build(structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping)
     predicted = model.prediction
     best = plain(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
@@ -66,6 +73,27 @@ def test_a_soft_block_keeps_its_nodes():
     model = build(stack, fidelity="auto", tolerance=0.01)
     assert "block 1: full" in model.fidelity
     assert model.prediction.met
+
+
+def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not():
+    """The error predicted of the model, against all nodes over the whole motion."""
+    arch = Arch(span=5.0, rise=2.0, thickness=0.5, voussoirs=13)
+    structure = bridge(arches=[arch], backfill=Backfill(cover=0.5), width=4.0)
+    motion = Motion.synthetic(duration=10.0, pga=2.5, seed=2)
+    damping = Rayleigh(0.05, (4.0, 20.0))
+    given = {"motion": motion, "damping": damping, "dt": 0.005}
+    model = build(structure, fidelity="auto", tolerance=0.005, **given)
+    assert model.fidelity == "backfill: full, rest: faces"
+    assert model.prediction.met
+    assert model.prediction.dt == 0.005
+    runs = [
+        envelope(each, motion, damping, 0.005)
+        for each in (model, plain(structure, quadrature="exact"))
+    ]
+    assert 0.3 < runs[1].max() < 0.5  # the motion is severe, and no ring comes apart
+    actual = largest_difference(*runs)
+    assert actual <= 0.005
+    assert 1.0 / 3.0 < model.prediction.error / actual < 3.0
 
 
 def test_without_a_motion_a_severe_one_is_assumed(ring):
@@ -97,7 +125,7 @@ def test_study_of_speed_against_error(ring):
     found = accuracy(
         ring,
         motion,
-        damping=_usual_damping(ring),
+        damping=usual_damping(ring),
         rungs=("rigid", "faces"),
         cells=((4, 4),),
         rules=(("nodal", None), ("exact", None)),
