@@ -24,7 +24,7 @@ from archfem.structure import Structure
 from archfem.suite import Suite
 
 MODEL = {
-    "fidelity": str,
+    "fidelity": (str, dict),
     "cells": [int],
     "cell": str,
     "coarse": "m",

@@ -29,7 +29,7 @@ from archfem.verdicts import DEFINITIONS, first_mechanisms
 logger = logging.getLogger("archfem")
 
 CASE = {"case": str, "set": [str]}
-KEYS = ("title", "scales", "pairs", "cases")
+KEYS = ("title", "scales", "pairs", "set", "cases")
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Study:
 
         Args:
             path: with a table [cases."name"] for each, of `case`, a file, and `set`, a list of
-                "section.key=value".
+                "section.key=value"; `set` above the tables changes all cases, before their own.
             changes: made to every case.
 
         Raises:
@@ -79,7 +79,8 @@ class Study:
             own = checked(table, CASE, f"cases.{name}")
             if "case" not in own:
                 raise InvalidInput(f"{path}: cases.{name} names no case file")
-            cases[name] = Case.read(path.parent / own["case"], [*own.get("set", []), *changes])
+            both = [*given.get("set", []), *own.get("set", []), *changes]
+            cases[name] = Case.read(path.parent / own["case"], both)
             if cases[name].suite is None:
                 raise InvalidInput(f"{path}: the case of '{name}' has no [suite] to compare under")
         if not cases:
