@@ -223,7 +223,7 @@ def forward(factor, vector, room):  # type: ignore
     for group in range(len(factor.parent)):
         start, width = factor.first[group], factor.first[group + 1] - factor.first[group]
         own = vector[start : start + width]
-        if not np.any(own):
+        if _zero(own):
             continue
         rows = factor.rows[factor.below[group] : factor.below[group + 1]]
         height = width + len(rows)
@@ -241,7 +241,8 @@ def forward(factor, vector, room):  # type: ignore
             a, p = panel[column * height : (column + 1) * height], own[column]
             for i in range(height):
                 total[i] += a[i] * p
-        own[:] = total[:width]
+        for i in range(width):
+            own[i] = total[i]
         for i in range(len(rows)):
             vector[rows[i]] -= total[width + i]
 
@@ -265,7 +266,8 @@ def backward(factor, vector, room, wanted):  # type: ignore
         height = width + len(rows)
         panel = factor.panels[factor.places[group] : factor.places[group + 1]]
         known = room[:height]
-        known[:width] = own
+        for i in range(width):
+            known[i] = own[i]
         for i in range(len(rows)):
             known[width + i] = -vector[rows[i]]
         done = 0
@@ -284,6 +286,15 @@ def backward(factor, vector, room, wanted):  # type: ignore
             for i in range(height):
                 p += a[i] * known[i]
             own[column] = p
+
+
+@numba.njit(cache=True)
+def _zero(vector):  # type: ignore
+    """Whether there is nothing in a vector."""
+    for value in vector:  # noqa: SIM110  (numba compiles no generators)
+        if value != 0.0:
+            return False
+    return True
 
 
 @numba.njit(cache=True, inline="always")

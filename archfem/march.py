@@ -7,7 +7,7 @@ import numpy as np
 
 from archfem.factor import Factor, backward, forward
 from archfem.kernel import ITERATIONS, SETTLED, joint_resultants
-from archfem.newmark import add_mixed, follow
+from archfem.newmark import add_mixed, follow, mix
 from archfem.products import Rows, add_rows, row_times, times
 from archfem.release import pull, pulls, release
 from archfem.structure import Array
@@ -94,8 +94,8 @@ def advance(series, gap, results, ground, matrices, numbers, law):  # type: igno
         follow(gap, gaps[step % 2], gaps[(step + 1) % 2], numbers)
         _late(gaps[(step + 1) % 2], numbers.lag, law)
         if numbers.share != 1.0:
-            gap[:] = gaps[(step + 1) % 2, 0] + numbers.lag * gaps[(step + 1) % 2, 1]
-            contact[:] = series[step + 1, 0] + numbers.lag * series[step + 1, 1]
+            mix(gap, gaps[(step + 1) % 2], (1.0, numbers.lag, 0.0))
+            mix(contact, series[step + 1], (1.0, numbers.lag, 0.0))
             pulls(gap, law, force)
         times(matrices.shear, contact, shear)
         joint_resultants(resultants[step], gap, shear, law)
@@ -136,7 +136,8 @@ def _contact(vector, gap, joints, matrices, law):  # type: ignore
             vector[:] = 0.0
             add_rows(matrices.opening, rows, force, vector)
             forward(factor, vector, room)
-            vector += half
+            for k in range(len(half)):
+                vector[k] += half[k]
         backward(factor, vector, room, everywhere)
         times(matrices.opening, vector, gap)
         if _exact(gap, force, near, law):
@@ -176,7 +177,8 @@ def _exact(gap, force, near, law):  # type: ignore
 @numba.njit(cache=True)
 def _unload(start, gap, rows, compliance, force):  # type: ignore
     """Gaps at the rows without the forces that act, z₀ = z - F λ."""
-    start[rows] = gap[rows]
+    for row in rows:
+        start[row] = gap[row]
     for row in rows:
         if force[row] != 0.0:
             line = compliance[row]
@@ -259,8 +261,11 @@ def _late(gaps, lag, law):  # type: ignore
     """Tension taken out at the gaps as they are, and how much less than where the law sees them."""
     pulls(gaps[0], law, gaps[3])
     if lag > 0.0:
-        pulls(gaps[0] + lag * gaps[1], law, gaps[4])
-        gaps[4] -= gaps[3]
+        seen, stored, late = np.empty(gaps.shape[1]), gaps[3], gaps[4]
+        mix(seen, gaps, (1.0, lag, 0.0))
+        pulls(seen, law, late)
+        for row in range(len(late)):
+            late[row] -= stored[row]
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc"})

@@ -104,3 +104,10 @@ def add_mixed(result, images, factors):  # type: ignore
     p, q, r = factors[0], factors[1], factors[2]
     for k in range(len(result)):
         result[k] += p * u[k] + q * v[k] + r * a[k]
+
+
+@numba.njit(cache=True)
+def mix(result, images, factors):  # type: ignore
+    """Images of u, v and a, each times its factor."""
+    result[:] = 0.0
+    add_mixed(result, images, factors)

@@ -36,8 +36,8 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
         force: λ, as a first guess (p,); changed at the rows.
         enough: error of λ that is left [N].
     """
-    facets, stiffness = law[0], law[1][rows]
-    matrix, free, own = _chosen(compliance, rows), start[rows], force[rows]
+    facets, stiffness = law[0], chosen(law[1], rows)
+    matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
     root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
     gap, left, last = free + matrix @ own, ROUGH, 0.0
     for passes in range(1, ITERATIONS + 1):
@@ -46,7 +46,8 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
         pulls(gap, (facets, stiffness), wanted)
         off = np.max(np.abs(wanted - own))
         if off <= enough:
-            force[rows] = own
+            for i in range(len(rows)):
+                force[rows[i]] = own[i]
             return passes
         left = min(ROUGH, (off / last) ** 2) if last > 0.0 else ROUGH
         last = off
@@ -74,7 +75,16 @@ def pulls(gap, law, force):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _chosen(matrix, rows):  # type: ignore
+def chosen(vector, rows):  # type: ignore
+    """Entries of a vector."""
+    result = np.empty(len(rows))
+    for i in range(len(rows)):
+        result[i] = vector[rows[i]]
+    return result
+
+
+@numba.njit(cache=True)
+def _square(matrix, rows):  # type: ignore
     """Rows and columns of a matrix."""
     result = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
@@ -145,5 +155,7 @@ def _solve(free, matrix, roots, force, until):  # type: ignore
         new = rest @ rest
         direction = rest + (new / square) * direction
         square = new
-    force[:] = _times_root(roots, solution)
+    image = _times_root(roots, solution)
+    for i in range(len(force)):
+        force[i] = image[i]
     return free + matrix @ force

@@ -16,19 +16,20 @@ from archfem.view.style import HINGE as RED
 from archfem.view.style import INK, LINES, NORMAL, SMALL, WIDE, canvas, dress
 
 
-def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset]]) -> Figure:
-    """Draw thrust lines and failed joints of several structures, one below the other.
+def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> Figure:
+    """Draw several structures, one below the other, with thrust lines and failed joints.
 
     Args:
-        states: what to call each, the structure, and its joints at one instant.
+        states: what to call each, the structure, and its joints at one instant or None.
     """
     size = canvas(next(iter(states.values()))[0]).get_size_inches()
     figure = Figure(figsize=(size[0], size[1] * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
-        when = f", t = {float(joints['time']):.3f} s" if "time" in joints.coords else ""
-        axes.set_title(f"{label}{when}", fontsize=NORMAL, color=INK)
+        if joints is not None and "time" in joints.coords:
+            label = f"{label}, t = {float(joints['time']):.3f} s"
+        axes.set_title(label, fontsize=NORMAL, color=INK)
         axes.label_outer()
     return figure
 
