@@ -88,7 +88,7 @@ def study(given: argparse.Namespace) -> None:
     (folder / "study.txt").write_text(f"{asked.title}\n\n{table}\n", encoding="utf-8")
     print(table)
     written = [folder / "study.txt"]
-    if asked.scales:
+    if asked.scales is not None:
         written.append(save(draw_study(found, asked.reduction), folder / "study.png"))
     _tell_written(written)
 

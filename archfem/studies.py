@@ -29,6 +29,7 @@ from archfem.verdicts import DEFINITIONS, first_mechanisms
 logger = logging.getLogger("archfem")
 
 CASE = {"case": str, "set": [str]}
+SCALES = {"precision": "1", "between": ["1"]}
 KEYS = ("title", "scales", "pairs", "set", "cases")
 
 
@@ -40,13 +41,14 @@ class Study:
         title: in words.
         cases: by the name of each.
         pairs: pairs of the suites that are run; None for all.
-        scales: whether to find the factors on the whole motions at which mechanisms begin.
+        scales: options of `mechanism_scales`, which finds the factors on the whole motions at
+            which mechanisms begin; None finds none.
     """
 
     title: str
     cases: dict[str, Case]
     pairs: tuple[str, ...] | None = None
-    scales: bool = False
+    scales: dict[str, Any] | None = None
 
     @property
     def reduction(self) -> float:
@@ -90,7 +92,7 @@ class Study:
             str(given.get("title", path.stem)),
             cases,
             None if pairs is None else tuple(pairs),
-            bool(given.get("scales", False)),
+            _search(given.get("scales", False)),
         )
 
 
@@ -162,9 +164,9 @@ def _found(
     for motion, pair in zip(suite.motions, suite.pairs, strict=True):
         if motion.name in pairs:
             finding.runs[motion.name] = _run(case, motion, dead)
-            if study.scales:
+            if study.scales is not None:
                 whole = pair.scaled(suite.scale)
-                finding.scales[motion.name] = _scales(case, whole, dead)
+                finding.scales[motion.name] = _scales(case, whole, dead, study.scales)
             _write(finding, path)
     return finding
 
@@ -234,7 +236,19 @@ def _run(case: Case, motion: Motion, dead: Equilibrium) -> dict[str, Any]:
         return of_run(error.history)
 
 
-def _scales(case: Case, motion: Motion, dead: Equilibrium) -> dict[str, tuple[float, float]]:
+def _search(given: Any) -> dict[str, Any] | None:
+    """What a study says of the search for factors: a table of options, true or false."""
+    if isinstance(given, bool):
+        return {} if given else None
+    options = checked(given, SCALES, "scales")
+    if "between" in options:
+        options["between"] = tuple(options["between"])
+    return options
+
+
+def _scales(
+    case: Case, motion: Motion, dead: Equilibrium, options: Mapping[str, Any]
+) -> dict[str, tuple[float, float]]:
     """Factors on a motion at which mechanisms begin, and the largest below at which they do not."""
     found = mechanism_scales(
         dead.model,
@@ -242,6 +256,7 @@ def _scales(case: Case, motion: Motion, dead: Equilibrium) -> dict[str, tuple[fl
         start=dead,
         damping=damping_of(case, dead)[0],
         dt=case.analysis.get("dt"),
+        **options,
     )
     return {name: (found[name].upper, found[name].lower) for name in DEFINITIONS}
 
@@ -270,7 +285,7 @@ def _complete(study: Study, finding: Finding | None, pair: str) -> bool:
     """Whether everything that is asked of a pair has been found."""
     if finding is None:
         return False
-    return pair in finding.runs and (pair in finding.scales or not study.scales)
+    return pair in finding.runs and (pair in finding.scales or study.scales is None)
 
 
 def _write(finding: Finding, path: Path) -> None:
