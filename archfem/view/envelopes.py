@@ -20,6 +20,9 @@ ROW, LEAST = 80, 6
 
 LABEL = "eccentricity e = M / (N h) [-]"
 
+SHADE = 0.15
+"""Of the band between the least and the largest eccentricity of one run alone."""
+
 STEP = 0.05
 """Distance of the crosses of one run from those of the next, above the upper face."""
 
@@ -54,7 +57,7 @@ def draw_envelope(
     for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
         for part, panel in shown.items():
             own = _of_part(run.joints, part)
-            draw_band(panel, own, label, colour, dotted=label in dotted)
+            draw_band(panel, own, label, colour, shade=SHADE * (label not in dotted) / len(runs))
             crosses = np.flatnonzero(opened(own).any("time"))
             height = np.full(len(crosses), 0.56 + STEP * row)
             panel.plot(crosses, height, "x", ms=4, color=colour)
@@ -101,7 +104,7 @@ def draw_eccentricity(
 
 
 def draw_band(
-    axes: Axes, joints: xr.Dataset, label: str, colour: str, *, dotted: bool = False
+    axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float = SHADE
 ) -> None:
     """Draw the least and the largest eccentricity of joints, which count from 0.
 
@@ -110,14 +113,14 @@ def draw_band(
         joints: over time and joint.
         label: of the lines.
         colour: of the lines, and of the band between them.
-        dotted: draw dotted lines, and no band.
+        shade: of the band, 0 to 1; without a band the lines are dotted.
     """
     span, number = envelope(joints), np.arange(joints.sizes["joint"])
     style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
-    if dotted:
-        style |= {"ls": ":", "ms": 2.0}
+    if shade > 0.0:
+        axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=shade, lw=0)
     else:
-        axes.fill_between(number, span["lowest"], span["highest"], color=colour, alpha=0.15, lw=0)
+        style |= {"ls": ":", "ms": 2.0}
     axes.plot(number, span["highest"], **style, label=label)
     axes.plot(number, span["lowest"], **style)
 
