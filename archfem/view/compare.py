@@ -15,6 +15,9 @@ from archfem.view.plots import draw_structure
 from archfem.view.style import HINGE as RED
 from archfem.view.style import INK, LINES, NORMAL, SMALL, WIDE, canvas, dress
 
+SNUG = 0.78
+"""Height of a picture among others, relative to one by itself."""
+
 
 def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> Figure:
     """Draw several structures, one below the other, with thrust lines and failed joints.
@@ -22,15 +25,25 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     Args:
         states: what to call each, the structure, and its joints at one instant or None.
     """
-    size = canvas(next(iter(states.values()))[0]).get_size_inches()
-    figure = Figure(figsize=(size[0], size[1] * len(states)), layout="constrained")
+    wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
+    figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
+    marks = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
         if joints is not None and "time" in joints.coords:
             label = f"{label}, t = {float(joints['time']):.3f} s"
         axes.set_title(label, fontsize=NORMAL, color=INK)
         axes.label_outer()
+        handles, words = axes.get_legend_handles_labels()
+        marks |= dict(zip(words, handles, strict=True))
+        if axes.get_legend() is not None:
+            axes.get_legend().remove()
+    if marks:
+        figure.legend(
+            list(marks.values()), list(marks), loc="outside lower center", ncols=4, frameon=False,
+            fontsize=SMALL,
+        )  # fmt: skip
     return figure
 
 
