@@ -1,7 +1,7 @@
 """Two or more structures side by side: at one instant, and at one joint over time."""
 
 from collections.abc import Mapping
-from typing import cast
+from typing import Any, cast
 
 import xarray as xr
 from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
     figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
-    marks = {}
+    marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
         if joints is not None and "time" in joints.coords:
@@ -41,8 +41,8 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
             axes.get_legend().remove()
     if marks:
         figure.legend(
-            list(marks.values()), list(marks), loc="outside lower center", ncols=4, frameon=False,
-            fontsize=SMALL,
+            handles=list(marks.values()), labels=list(marks), loc="outside lower center", ncols=4,
+            frameon=False, fontsize=SMALL,
         )  # fmt: skip
     return figure
 
