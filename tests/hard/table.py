@@ -1,6 +1,12 @@
 """All hard cases, in the order of the table."""
 
-from hard import cases_of_joints, cases_of_motion, cases_of_shape, cases_of_time  # noqa: F401
+from hard import (  # noqa: F401
+    cases_of_bridges,
+    cases_of_joints,
+    cases_of_motion,
+    cases_of_shape,
+    cases_of_time,
+)
 from hard.setting import CASES as CASES
 
 
