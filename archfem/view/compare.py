@@ -27,7 +27,7 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     """
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
     figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
-    panels = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
+    panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
