@@ -27,6 +27,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:  # whoever read the output has gone, as in `archfem … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:  # a folder that cannot be made, a full disk
+        print(f"archfem: {error}", file=sys.stderr)
+        return 1
     return 0
 
 

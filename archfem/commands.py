@@ -74,7 +74,8 @@ def accuracy(given: argparse.Namespace) -> None:
 
 def study(given: argparse.Namespace) -> None:
     """Carry out a study: its tables, and a picture of the factors at first mechanism."""
-    from archfem.studies import Study, carried_out, study_table
+    from archfem.findings import study_table
+    from archfem.studies import Study, carried_out
     from archfem.view.studies import draw_study
     from archfem.view.style import save
 

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 import numpy as np
@@ -92,10 +92,12 @@ class MechanismScales:
     Attributes:
         asked: definitions that the structure has joints for.
         trials: all runs, in order of their scales.
+        interrupted: whether Ctrl-C ended the search.
     """
 
     asked: tuple[str, ...]
     trials: tuple[Trial, ...] = ()
+    interrupted: bool = False
 
     def with_(self, trial: Trial) -> "MechanismScales":
         """These and one run more."""
@@ -230,6 +232,7 @@ def _searched(
                     raise KeyboardInterrupt
     except KeyboardInterrupt:
         logger.warning("interrupted after %d runs: what is known is kept", len(found.trials))
+        found = replace(found, interrupted=True)
     return found
 
 

@@ -1,36 +1,30 @@
 """Several cases side by side: what a measure buys, what an assumption decides."""
 
-import json
 import logging
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
 from archfem.analysis import at_rest, damping_of, shaken
 from archfem.case import Case
-from archfem.criteria import judged, part_role
+from archfem.criteria import judged
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.history import History
+from archfem.findings import Finding, by_part, kept, of_run, write
 from archfem.modal import modes
 from archfem.motion import Motion
 from archfem.scales import mechanism_scales
 from archfem.settings import checked, refuse_unknown
 from archfem.statics import Equilibrium
-from archfem.summary import aligned
-from archfem.verdicts import DEFINITIONS, first_mechanisms
+from archfem.verdicts import DEFINITIONS
 
 logger = logging.getLogger("archfem")
 
 CASE = {"case": str, "set": [str]}
 SCALES = {"precision": "1", "between": ["1"]}
-KEYS = ("title", "scales", "pairs", "set", "cases")
+STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
 
 
 @dataclass(frozen=True)
@@ -75,8 +69,8 @@ class Study:
             given = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InvalidInput(f"{path} is not TOML: {error}") from error
-        refuse_unknown(given, KEYS)
-        cases = {}
+        refuse_unknown(given, STUDY)
+        given, cases = checked(given, STUDY, "study"), {}
         for name, table in given.get("cases", {}).items():
             own = checked(table, CASE, f"cases.{name}")
             if "case" not in own:
@@ -88,38 +82,13 @@ class Study:
         if not cases:
             raise InvalidInput(f'{path} has no cases: write [cases."name"] with case = "file.toml"')
         pairs = given.get("pairs")
+        _check_names(path, cases, pairs or ())
         return cls(
-            str(given.get("title", path.stem)),
+            given.get("title", path.stem),
             cases,
             None if pairs is None else tuple(pairs),
             _search(given.get("scales", False)),
         )
-
-
-@dataclass
-class Finding:
-    """What was found of one case.
-
-    Attributes:
-        case: the case as text, by which a finding is known again.
-        frequency: of the first mode about the dead load [Hz].
-        mass: its share of the mass along x [-].
-        dead: largest |e| of each ring and pier under dead load [-].
-        runs: by pair, what `of_run` gives.
-        scales: by pair and definition, the least factor found to fail and the largest below it
-            found not to; infinite where none failed.
-    """
-
-    case: str
-    frequency: float
-    mass: float
-    dead: dict[str, float]
-    runs: dict[str, dict[str, Any]] = field(default_factory=dict)
-    scales: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
-
-    def least(self, definition: str) -> np.ndarray:
-        """Least factor that fails by a definition, of each pair (pairs,) [-]."""
-        return np.array([found[definition][0] for found in self.scales.values()])
 
 
 def carried_out(study: Study, folder: Path) -> Iterator[tuple[str, Finding]]:
@@ -131,17 +100,22 @@ def carried_out(study: Study, folder: Path) -> Iterator[tuple[str, Finding]]:
 
     Raises:
         DidNotConverge: a case does not stand under dead load.
+        KeyboardInterrupt: on Ctrl-C; what was found of whole pairs is kept.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, case in study.cases.items():
         path = folder / f"{_file_name(name)}.json"
-        finding = _kept(path, case)
+        finding = kept(path, case.text(), study.scales)
         wanted = _wanted(study, case, name)
         missing = [pair for pair in wanted if not _complete(study, finding, pair)]
         if missing:
-            finding = _found(study, case, missing, finding, path)
+            try:
+                finding = _found(study, case, missing, finding, path)
+            except DidNotConverge as error:
+                error.args = (f"'{name}': {error}",)
+                raise
         assert finding is not None
-        yield name, finding
+        yield name, finding.of_pairs(wanted)
 
 
 def _wanted(study: Study, case: Case, name: str) -> list[str]:
@@ -161,65 +135,21 @@ def _found(
     """Run some pairs of a case, and add to what was found of it before."""
     suite, dead = case.ground_suite(), at_rest(case)
     finding = finding or _at_rest(case, dead)
+    finding.search = study.scales
     for motion, pair in zip(suite.motions, suite.pairs, strict=True):
         if motion.name in pairs:
             finding.runs[motion.name] = _run(case, motion, dead)
             if study.scales is not None:
                 whole = pair.scaled(suite.scale)
                 finding.scales[motion.name] = _scales(case, whole, dead, study.scales)
-            _write(finding, path)
+            write(finding, path)
     return finding
-
-
-def of_run(run: History) -> dict[str, Any]:
-    """What a study keeps of a run: maxima by part, and the first mechanism by each definition."""
-    joints = judged(run.joints)
-    return {
-        "eccentricity": _by_part(abs(joints["eccentricity"]).max("time").fillna(0.5)),
-        "friction": _by_part(joints["friction"].max("time").fillna(np.inf)),
-        "mechanisms": {
-            definition: None if found is None else {"kind": found.kind, "time": found.time}
-            for definition, found in first_mechanisms(run).items()
-        },
-        "outcome": run.outcome,
-    }
-
-
-def study_table(findings: Mapping[str, Finding]) -> str:
-    """Two tables, a line for each case.
-
-    The first tells of the motions as each case applies them: the first mode, the gravest joint of
-    rings and piers (its median over the pairs), and in how many pairs each definition of a
-    mechanism is met. The second, where they were looked for, tells by what factor on the whole
-    motions they begin: the median over the pairs, and their range.
-
-    Args:
-        findings: by name of the case.
-    """
-    head = ["case", "mode 1", "mass x", "|e| dead", "|e| rings", "|e| piers", *DEFINITIONS]
-    rows = []
-    for name, found in findings.items():
-        cells = [name, f"{found.frequency:.2f} Hz", f"{found.mass:.0%}"]
-        cells.append(f"{max(found.dead.values()):.3f}")
-        cells += [_largest(found, role) for role in ("ring", "pier")]
-        for definition in DEFINITIONS:
-            met = [run["mechanisms"][definition] is not None for run in found.runs.values()]
-            cells.append(f"{sum(met)} of {len(met)}")
-        rows.append(cells)
-    tables = [aligned(head, rows)]
-    if any(found.scales for found in findings.values()):
-        rows = [
-            [name, *(_range(found.least(definition)) for definition in DEFINITIONS)]
-            for name, found in findings.items()
-        ]
-        tables.append(aligned(["factor at first mechanism", *DEFINITIONS], rows))
-    return "\n\n".join(tables)
 
 
 def _at_rest(case: Case, dead: Equilibrium) -> Finding:
     """What there is to say before the ground moves."""
     first = modes(dead.model, 1, about=dead)
-    largest = _by_part(abs(judged(dead.joints)["eccentricity"]).fillna(0.5))
+    largest = by_part(abs(judged(dead.joints)["eccentricity"]).fillna(0.5))
     return Finding(
         case.text(), float(first.frequencies[0]), float(first.mass_ratios[0, 0]), largest
     )
@@ -228,12 +158,15 @@ def _at_rest(case: Case, dead: Equilibrium) -> Finding:
 def _run(case: Case, motion: Motion, dead: Equilibrium) -> dict[str, Any]:
     """Run one pair; where a step fails, what was found up to it counts."""
     try:
-        return of_run(shaken(case, motion, dead))
+        run = shaken(case, motion, dead)
     except DidNotConverge as error:
         if error.history is None:
             raise
         logger.warning("%s, %s: %s", case.title, motion.name, error)
-        return of_run(error.history)
+        run = error.history
+    if run.outcome.startswith("interrupted"):
+        raise KeyboardInterrupt
+    return of_run(run)
 
 
 def _search(given: Any) -> dict[str, Any] | None:
@@ -241,8 +174,8 @@ def _search(given: Any) -> dict[str, Any] | None:
     if isinstance(given, bool):
         return {} if given else None
     options = checked(given, SCALES, "scales")
-    if "between" in options:
-        options["between"] = tuple(options["between"])
+    if len(options.get("between", (0, 0))) != 2:
+        raise InvalidInput(f"scales.between = {options['between']}: give the least and the largest")
     return options
 
 
@@ -258,13 +191,9 @@ def _scales(
         dt=case.analysis.get("dt"),
         **options,
     )
+    if found.interrupted:
+        raise KeyboardInterrupt
     return {name: (found[name].upper, found[name].lower) for name in DEFINITIONS}
-
-
-def _by_part(values: xr.DataArray) -> dict[str, float]:
-    """Largest value of each part's joints."""
-    largest = values.groupby("part").max()
-    return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
 
 
 def _file_name(name: str) -> str:
@@ -272,13 +201,18 @@ def _file_name(name: str) -> str:
     return re.sub(r"[^\w+-]+", "_", name).strip("_")
 
 
-def _kept(path: Path, case: Case) -> Finding | None:
-    """Findings of an earlier command, where they are of the same case."""
-    try:
-        found = Finding(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return None
-    return found if found.case == case.text() else None
+def _check_names(path: Path, cases: Mapping[str, Case], pairs: Sequence[str]) -> None:
+    """Refuse cases that would share a file of findings, and pairs that no case has."""
+    files = [_file_name(name) for name in cases]
+    for name, file in zip(cases, files, strict=True):
+        if not file or files.count(file) > 1:
+            raise InvalidInput(
+                f"{path}: '{name}' names a file of results too, and '{file}.json' is not its own: "
+                "let names differ in letters and digits"
+            )
+    known = {pair for case in cases.values() for pair in (case.suite or {})["pairs"]}
+    if strange := [pair for pair in pairs if pair not in known]:
+        raise InvalidInput(f"{path}: no case has the pairs {strange}, but {sorted(known)}")
 
 
 def _complete(study: Study, finding: Finding | None, pair: str) -> bool:
@@ -286,32 +220,3 @@ def _complete(study: Study, finding: Finding | None, pair: str) -> bool:
     if finding is None:
         return False
     return pair in finding.runs and (pair in finding.scales or study.scales is None)
-
-
-def _write(finding: Finding, path: Path) -> None:
-    """Write findings in one stroke."""
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
-    os.replace(draft, path)
-
-
-def _largest(finding: Finding, role: str) -> str:
-    """Median over the pairs of the largest |e| in all rings, or in all piers."""
-    each = [
-        max((e for part, e in run["eccentricity"].items() if part_role(part) == role), default=None)
-        for run in finding.runs.values()
-    ]
-    known = [e for e in each if e is not None]
-    return f"{np.median(known):.3f}" if known else "-"
-
-
-def _range(factors: np.ndarray) -> str:
-    """Median and range of factors; a dash where there is none up to the largest that was tried."""
-    if not len(factors) or np.isinf(factors).all():
-        return "-"
-    low, middle, high = np.quantile(factors, [0.0, 0.5, 1.0], method="nearest")
-    return f"{_factor(middle)} ({_factor(low)} to {_factor(high)})"
-
-
-def _factor(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "-"

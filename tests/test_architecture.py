@@ -36,7 +36,7 @@ LAYERS = [
     "dynamics path verdicts kernel",
     "batches guard modal_energy newmark products summary",
     "contact band factor release strength modal",
-    "chain march modal_damping",
+    "chain march modal_damping findings",
     "compliance",
     "steppers",
     "tape",

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from archfem.studies import Finding
+from archfem.findings import Finding
 from archfem.verdicts import DEFINITIONS
 from archfem.view.style import EDGE, FAINT, LINES, SMALL, WIDE, dress
 

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import archfem.runs
 from archfem.analysis import at_rest, shaken
 from archfem.case import Case
 from archfem.cli import main
-from archfem.errors import InvalidInput
-from archfem.studies import Study, carried_out, study_table
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.findings import Finding, kept, study_table, write
+from archfem.studies import Study, carried_out
 from archfem.verdicts import DEFINITIONS
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -22,12 +24,15 @@ QUICK = [
 ]
 
 
+CASE = f'[cases."a b"]\ncase = "{MESHES}/ring_suite.toml"'
+
+
 @pytest.fixture
 def study(tmp_path):
     """Two rings, one of them thin, under one short motion."""
     path = tmp_path / "study.toml"
     path.write_text(
-        f'title = "two rings"\nscales = true\npairs = ["pair-1"]\n[cases]\n'
+        f'title = "two rings"\nscales = {{ precision = 0.2, between = [0.3, 2.0] }}\npairs = ["pair-1"]\n[cases]\n'
         f'"thick" = {{ case = "{MESHES}/ring_suite.toml" }}\n'
         f'"thin" = {{ case = "{MESHES}/ring_suite.toml", set = ["structure.thickness=0.4"] }}\n'
     )
@@ -86,6 +91,14 @@ def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch, capsys
         (f'[cases."a"]\ncase = "{MESHES}/ring.toml"', "no \\[suite\\] to compare under"),
         ("pears = 1", "unknown key 'pears'"),
         ("title =", "is not TOML"),
+        ("cases = 3", "study.cases = 3 is not a table"),
+        ('pairs = "pair-1"', "study.pairs = 'pair-1' is not a list"),
+        ('set = "analysis.dt=0.01"', "study.set = .* is not a list"),
+        ('[cases."a"]\ncase = "a.toml"\nsets = []', "unknown key 'cases.a.sets'"),
+        (f'pairs = ["pair-1", "pair-9"]\n{CASE}', r"no case has the pairs \['pair-9'\]"),
+        (f"scales = {{ between = [1.0] }}\n{CASE}", "scales.between = .* least and the largest"),
+        (f"scales = {{ precisions = 0.1 }}\n{CASE}", "unknown key 'scales.precisions'"),
+        (f"{CASE}\n{CASE.replace('a b', 'a/b')}", "'a b' names a file of results too"),
     ],
 )
 def test_studies_that_cannot_be_meant(text, says, tmp_path):
@@ -96,7 +109,65 @@ def test_studies_that_cannot_be_meant(text, says, tmp_path):
         Study.read(tmp_path / "other.toml")
 
 
-def test_pairs_that_no_case_has(study, tmp_path):
-    study.write_text(study.read_text().replace("pair-1", "pair-9"))
-    with pytest.raises(InvalidInput, match="none of the pairs"):
-        dict(carried_out(Study.read(study), tmp_path))
+def finding(**given):
+    brackets = dict.fromkeys(DEFINITIONS, (1.0, 0.9))
+    run = {
+        "eccentricity": {"arch": 0.4},
+        "friction": {"arch": float("inf")},
+        "mechanisms": dict.fromkeys(DEFINITIONS),
+        "outcome": "reached the end of the motion",
+    }
+    every = {
+        "case": "text",
+        "frequency": 9.0,
+        "mass": 0.7,
+        "dead": {"arch": 0.2},
+        "runs": {"a": run, "b": run},
+        "scales": {"a": brackets, "b": brackets},
+    }
+    return Finding(**every | given)
+
+
+def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):
+    path = tmp_path / "case.json"
+    write(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
+    same = kept(path, "text", {"precision": 0.1, "between": [0.2, 2.0]})
+    assert set(same.scales) == {"a", "b"}
+    assert same.runs["a"]["friction"]["arch"] == float("inf")
+    finer = kept(path, "text", {"precision": 0.05, "between": [0.2, 2.0]})
+    assert (set(finer.runs), finer.scales) == ({"a", "b"}, {})
+    assert kept(path, "another text", None) is None
+    assert kept(tmp_path / "none.json", "text", None) is None
+
+
+def test_a_table_counts_the_pairs_asked_for_and_runs_that_broke_off():
+    broken = finding().runs["a"] | {"outcome": "failed at 0.4 s: no equilibrium"}
+    found = finding(runs={"a": finding().runs["a"], "b": broken})
+    assert "ring: 1 of 2 runs broke off" in study_table({"ring": found})
+    assert "broke off" not in study_table({"ring": found.of_pairs(["a"])})
+    assert "0 of 1" in study_table({"ring": found.of_pairs(["a"])})
+
+
+@pytest.mark.parametrize("during", ["run", "search"])
+def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, during):
+    whole = archfem.runs.time_history
+
+    def interrupted(*given, until=None, **more):
+        history = whole(*given, until=until, **more)
+        if (until is None) == (during == "run"):
+            history.dataset.attrs["outcome"] = "interrupted at 0.1 s"
+        return history
+
+    place = {"run": "archfem.analysis", "search": "archfem.scales"}[during]
+    monkeypatch.setattr(f"{place}.time_history", interrupted)
+    folder = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        dict(carried_out(Study.read(study, QUICK), folder))
+    assert list(folder.iterdir()) == []
+
+
+def test_a_case_that_does_not_stand_is_named(study, tmp_path):
+    study.write_text(study.read_text().replace("thickness=0.4", "thickness=0.1"))
+    with pytest.raises(DidNotConverge, match=r"^'thin': no equilibrium"):
+        dict(carried_out(Study.read(study, QUICK), tmp_path))
+    assert (tmp_path / "thick.json").is_file()
