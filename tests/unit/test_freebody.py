@@ -138,7 +138,7 @@ def test_the_picture_shows_forces_where_they_act_and_a_closed_polygon(ring, ring
 def test_a_polygon_of_too_many_forces_is_refused():
     bridge = Case.read(BRIDGE).structure
     joints = joint_dataset(bridge, np.tile([1e4, 0.0, 0.0], (len(bridge.joints), 1)))
-    with pytest.raises(InvalidInput, match=r"'backfill' has 53 joints: .* choose a stone"):
+    with pytest.raises(InvalidInput, match=r"'backfill' has \d+ joints: .* choose a stone"):
         draw_free_body(bridge, joints, "backfill")
 
 
