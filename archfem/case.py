@@ -16,7 +16,7 @@ from archfem import ground
 from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
-from archfem.naming import joint_number
+from archfem.naming import block_number, joint_number
 from archfem.plans import planned
 from archfem.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
 from archfem.settings import Table, change, checked, merged, refuse_unknown, remove
@@ -130,8 +130,17 @@ class Case:
             settings=dict(settings),
             folder=folder,
         )
-        _ = case.damping, case.scheme, case.joints
+        case._check()
         return case
+
+    def _check(self) -> None:
+        """Refuse what would otherwise be found out only after the dead load."""
+        _ = self.damping, self.scheme, self.joints
+        step = self.analysis.get("dt", 0.005)
+        if not 0.0 < step <= 0.1:
+            raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
+        if "free_body" in self.output:
+            block_number([block.name for block in self.structure.blocks], self.output["free_body"])
 
     @property
     def damping(self) -> Rayleigh | EffectiveRayleigh | None:

@@ -1,13 +1,13 @@
 """One block cut free: the forces on it from its joints and its weight, and whether they balance."""
 
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import numpy as np
 import xarray as xr
 
-from archfem.errors import InvalidInput, InvalidStructure
+from archfem.errors import InvalidInput
 from archfem.models.shape import Shape
+from archfem.naming import block_number
 from archfem.resultants import thrust_line
 from archfem.structure import Array, Block, Structure
 
@@ -74,7 +74,7 @@ def forces_on(
             structure.
         InvalidStructure: there is no such block.
     """
-    number = _number(structure, block)
+    number = block_number([each.name for each in structure.blocks], block)
     own = structure.blocks[number]
     if own.fixed:
         raise InvalidInput(
@@ -101,19 +101,6 @@ def forces_on(
         tuple(around),
         np.concatenate([np.where(np.isnan(crossings), middles, crossings), centroid[None]]),
         np.concatenate([pushes, [[0.0, -weight]]]),
-    )
-
-
-def _number(structure: Structure, block: int | str) -> int:
-    """Number of a block given by number or name."""
-    names = [each.name for each in structure.blocks]
-    if isinstance(block, str) and block in names:
-        return names.index(block)
-    if isinstance(block, int) and 0 <= block < len(names):
-        return block
-    near = get_close_matches(str(block), names, n=3) or [*names[:3], "…"]
-    raise InvalidStructure(
-        f"there is no block {block!r}: give a number below {len(names)}, or a name such as {near}"
     )
 
 

@@ -127,7 +127,7 @@ def target_spectrum(settings: Table) -> DesignSpectrum | None:
         return None
     given = dict(settings["target"])
     code = given.pop("code", None)
-    if code not in TARGETS:
+    if code not in list(TARGETS):
         raise InvalidInput(f"suite.target.code = {code!r} is not known: use one of {list(TARGETS)}")
     make, keys = TARGETS[code]
     try:

@@ -139,6 +139,8 @@ class Motion:
                 f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
                 f"{vertical_ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
             )
+        if seed < 0:
+            raise InvalidInput(f"synthetic motion of seed {seed}: seeds are 0, 1, 2, …")
         random = np.random.default_rng(seed)
         count = round(duration / dt) + 1
         level = pga * enveloped_noise(count, dt, random=random)

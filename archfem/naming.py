@@ -1,11 +1,11 @@
-"""Joints found by name or by number."""
+"""Joints and blocks found by name or by number."""
 
 import difflib
 from collections.abc import Sequence
 
 import xarray as xr
 
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, InvalidStructure
 
 
 def joint_number(names: Sequence[str], joint: str | int) -> int:
@@ -29,6 +29,26 @@ def joint_number(names: Sequence[str], joint: str | int) -> int:
             f"such as '{names[0]}'"
         )
     return int(joint)
+
+
+def block_number(names: Sequence[str], block: str | int) -> int:
+    """Number of a block, given by its name or by that number.
+
+    Args:
+        names: of all blocks, in order.
+        block: its name or number.
+
+    Raises:
+        InvalidStructure: there is no such block; the nearest names are suggested.
+    """
+    if isinstance(block, str) and block in names:
+        return list(names).index(block)
+    if isinstance(block, int) and 0 <= block < len(names):
+        return block
+    near = difflib.get_close_matches(str(block), names, n=3) or [*names[:3], "…"]
+    raise InvalidStructure(
+        f"there is no block {block!r}: give a number below {len(names)}, or a name such as {near}"
+    )
 
 
 def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:

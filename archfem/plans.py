@@ -21,6 +21,7 @@ from archfem.shapes import (
 from archfem.structure import Structure
 from archfem.survey import Layer, surveyed
 
+WORDS = {"shape": str, "material": str, "contact": str}
 COMMON = {"width": "m", "gravity": "m/s**2"}
 RING = {
     "radius": "m",
@@ -112,19 +113,28 @@ def planned(settings: Table, folder: Path = Path()) -> Structure:
         InvalidInput: a shape, key, material or contact is not known, or a value cannot be meant.
         InvalidStructure: the lengths do not make a structure.
     """
-    given = dict(settings.get("structure", {}))
-    name = given.pop("shape", None)
-    if name not in SHAPES:
+    given = settings.get("structure", {})
+    name = given.get("shape")
+    if name not in list(SHAPES):
         raise InvalidInput(f"structure.shape = {name!r} is not known: use one of {list(SHAPES)}")
     shape, keys = SHAPES[name]
-    stone = _material(settings, given.pop("material", "stone"))
-    contact = _contact(settings, given.pop("contact", "stone to stone"))
-    values = checked(given, keys, "structure")
+    values = checked(given, {**WORDS, **keys}, "structure")
+    del values["shape"]
+    stone = _material(settings, values.pop("material", "stone"))
+    contact = _contact(settings, values.pop("contact", "stone to stone"))
+    _check_tables(settings)
     if name == "bridge":
         values = _parts(values, settings)
     elif name == "outlines":
         values = _outlines(values, settings, folder)
     return _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
+
+
+def _check_tables(settings: Table) -> None:
+    """Make all that the case's own tables name, used or not: a misspelt preset is then missed."""
+    for section, named in (("materials", _material), ("contacts", _contact)):
+        for name in settings.get(section, {}):
+            named(settings, name)
 
 
 def _parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:

@@ -160,11 +160,11 @@ class Backfill:
 
     def loaded(self, width: float, stone: Material) -> Material:
         """The fill with the weight of the spandrels spread over the width [m]."""
-        share = self.spandrels / width
-        if share >= 1.0:
+        if not self.spandrels < width:
             raise InvalidStructure(
                 f"spandrels of {self.spandrels:.3g} m do not fit into a width of {width:.3g} m"
             )
+        share = self.spandrels / width
         weight = (1.0 - share) * self.material.unit_weight + share * stone.unit_weight
         return replace(self.material, unit_weight=weight)
 

@@ -68,7 +68,13 @@ def test_changes_from_the_command_line():
         ("structure.voussoirs=1.5", "structure.voussoirs = 1.5 is not a whole number"),
         ("structure.shape=cone", "structure.shape = 'cone' is not known"),
         ("structure.material=jelly", "'jelly' is not among the materials"),
-        ("materials.jelly={young=1e9}", None),
+        ("structure.material=['stone']", r"structure.material = \['stone'\] is not a word"),
+        ("structure.shape=['column']", r"structure.shape = \['column'\] is not known"),
+        ("materials.stne={young=1e9}", "materials.stne: .*missing .*'poisson'"),
+        ("contacts.x={normal_stifness=1e9}", "'contacts.x.normal_stifness': did you mean"),
+        ("analysis.dt=-1", "analysis.dt = -1 s is not between 0 and 0.1 s"),
+        ("analysis.dt='5 s'", "analysis.dt = 5 s is not between"),
+        ("output.free_body='vousoir 3'", "no block 'vousoir 3': .*'voussoir 3'"),
         ("model.cells=4", r"model.cells = 4 is not a list"),
         ("analysis.damping={ratio=0.05}", "give a ratio and two frequencies"),
         ("analysis.scheme=euler", "use 'newmark', or 'hht'"),
@@ -79,11 +85,33 @@ def test_changes_from_the_command_line():
     ],
 )
 def test_refusals_name_the_key(change, says):
-    if says is None:
-        Case.read(RING, [change])  # a material nobody uses is not looked at
-        return
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises((InvalidInput, InvalidStructure), match=says):
         Case.read(RING, [change])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("structure.width=0", "do not fit into a width of 0 m"),
+        ("structure.arches.main arch.spn=3", "structure.arches.main arch.spn': did you mean"),
+        ("structure.piers.gapp=3", "'structure.piers.gapp': did you mean 'gap'"),
+        ("structure.backfill.hmp=3", "'structure.backfill.hmp': did you mean 'hump'"),
+        ("structure.paving={thickness=0.2,lenght=1}", "structure.paving.lenght': did you mean"),
+        ("suite.pairs.pair-1.synthetic.sed=1", "'suite.pairs.pair-1.synthetic.sed': did you mean"),
+        ("suite.target.code=['EC8']", r"suite.target.code = \['EC8'\] is not known"),
+        ("analysis.damping.jonts='closed'", "'analysis.damping.jonts': did you mean"),
+    ],
+)
+def test_refusals_name_the_key_in_tables_of_a_bridge(change, says):
+    with pytest.raises((InvalidInput, InvalidStructure), match=says):
+        Case.read(RING.with_name("prusias.toml"), [change])
+
+
+def test_an_output_that_is_no_folder_is_an_error_of_one_line(tmp_path, capsys):
+    (tmp_path / "out").write_text("a file")
+    given = ["run", str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / "out")]
+    assert main(given) == 1
+    assert "File exists" in capsys.readouterr().err
 
 
 def test_geometry_errors_name_the_file():
