@@ -183,6 +183,8 @@ def test_synthetic_motion_repeats_and_ends_at_rest():
         assert first.displacement(component)[-1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InvalidInput, match="50 samples or more"):
         Motion.synthetic(duration=0.1)
+    with pytest.raises(InvalidInput, match="seed -1"):
+        Motion.synthetic(seed=-1)
 
 
 def test_each_file_is_read_by_its_own_units_and_step(tmp_path):
