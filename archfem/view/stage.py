@@ -12,9 +12,10 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
+from archfem.criteria import judged_parts
 from archfem.models import Model
 from archfem.models.shape import Shape
-from archfem.structure import Array
+from archfem.structure import Array, Structure
 from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines
 from archfem.view.shades import Scale, scale_for, shade
@@ -23,7 +24,10 @@ from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 Numbers = NDArray[np.intp]
 
 DISC = 0.0125
-"""Radius of a hinge in a picture, relative to the size of the structure."""
+"""Radius of a hinge in a picture, relative to the size of the structure; and at most"""
+
+SNUG = 0.3
+"""relative to the depth of the shallowest joint that is judged."""
 
 FULL = 1100.0
 """Width of a photograph at which lines are as wide as given [pixels]."""
@@ -107,6 +111,7 @@ class Stage:
         shape = setting.model.shape
         self._pen = max(0.6, size[0] / FULL)
         self._height = 1e-3 * setting.model.structure.size
+        self._disc = _disc(setting.model.structure)
         self._blocks = _surface(shape)
         self._edges = shape.rims
         self._outlines = _lines(self._flat(shape.places, EDGES), self._edges)
@@ -247,8 +252,14 @@ class Stage:
 
     def _discs(self, centres: Array, layer: float, size: float) -> pv.PolyData:
         """Discs about points (n, 2), of a size relative to a hinge's."""
-        radius = size * DISC * self._setting.model.structure.size
-        return self._polygons(centres[:, None] + radius * CIRCLE, layer)
+        return self._polygons(centres[:, None] + size * self._disc * CIRCLE, layer)
+
+
+def _disc(structure: Structure) -> float:
+    """Radius of a hinge [m]."""
+    parts = judged_parts(joint.part for joint in structure.joints)
+    depth = min(joint.depth for joint in structure.joints if joint.part in parts)
+    return min(DISC * structure.size, SNUG * depth)
 
 
 def _go_headless() -> None:
