@@ -25,6 +25,9 @@ from archfem.units import STANDARD_GRAVITY
 SHOWN = 8
 """Names in a list, beyond which those in the middle are left out."""
 
+LOOSE = 100.0
+"""Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
+
 
 def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None, limit: float = HINGE) -> str:
     """One line a joint: envelope, and when and how long it hinged, slid and was open.
@@ -219,7 +222,9 @@ def _class_and_time(found: Mechanism | None) -> tuple[str, str]:
 
 
 def _number(value: float) -> str:
-    return "open" if np.isnan(value) else f"{value:.3f}"
+    if np.isnan(value):
+        return "open"
+    return f"{value:.3f}" if value < LOOSE else f"> {LOOSE:g}"
 
 
 def _seconds(value: float) -> str:
