@@ -115,6 +115,7 @@ def divided(structure: Structure, meshing: Meshing) -> Division:
     outlines = outlines_of(structure, [_along(block.fixed, meshing) for block in structure.blocks])
     least, fine = _wishes(outlines, meshing)
     counts = _assigned(outlines, least, meshing)
+    counts = _assigned(outlines, _even(outlines, counts, least, meshing), meshing)
     free = outlines.unstructured
     sizes = {number: _sizes(outlines, number, fine, counts, meshing) for number in free}
     graded = _graded(outlines, sizes)
@@ -194,6 +195,17 @@ def _assigned(outlines: Outlines, least: Numbers, meshing: Meshing) -> Numbers:
             "them freely, by leaving out their corners"
         )
     return unit * np.round(found.x).astype(np.intp)
+
+
+def _even(outlines: Outlines, counts: Numbers, least: Numbers, meshing: Meshing) -> Numbers:
+    """Least numbers with which the cells of each side are dealt to its edges by their lengths."""
+    dealt, unit = least.copy(), _units(outlines, meshing)
+    for number in outlines.structured:
+        for side in outlines.sides(number):
+            lengths = outlines.lengths[side]
+            shares = counts[side].sum() * lengths / lengths.sum() + ROUNDING
+            dealt[side] = np.maximum(dealt[side], (shares // unit[side]).astype(int) * unit[side])
+    return dealt
 
 
 def _units(outlines: Outlines, meshing: Meshing) -> Numbers:

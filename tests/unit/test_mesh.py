@@ -9,6 +9,7 @@ import pytest
 
 from archfem.assembly import assembled
 from archfem.errors import InvalidInput, MeshError
+from archfem.intervals import divided
 from archfem.materials import STONE, STONE_TO_STONE
 from archfem.mesh import Meshing, mesh, read_mesh, write_mesh
 from archfem.models.full import full
@@ -271,6 +272,43 @@ def test_stones_in_bond_fit(cell, cells):
     of_block = np.bincount(made.blocks)[1:]
     assert of_block.min() >= cells[0] * cells[1] * (1 if cell == "quadrilateral" else 2)
     assert scaled_jacobians(made).min() > (0.3 if cell == "quadrilateral" else 0.05)
+
+
+def cells_on_edges(structure, meshing):
+    """Middles of the edges of blocks that can move (m, 2), and the cells on each (m,)."""
+    division = divided(structure, meshing)
+    own = np.unique(np.concatenate([division.outlines.around[k] for k in structure.free]))
+    middles = division.outlines.points[division.outlines.edges[own]].mean(axis=1)
+    return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
+
+
+@pytest.mark.parametrize("cells", [(2, 2), (3, 5), (4, 4)])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("make", ["ring of 16", "ring in chords", "fill", "fill on chords"])
+def test_mirror_images_are_cut_alike(make, cell, cells):
+    lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 16}
+    made = {
+        "ring of 16": lambda: circular_arch(**lengths),
+        "ring in chords": lambda: circular_arch(**lengths, chords=2),
+        "fill": one_arch,
+        "fill on chords": lambda: one_arch(chords=3),
+    }[make]()
+    middles, counts = cells_on_edges(made, Meshing(*cells, cell))
+    x = middles[:, 0]
+    turned = middles * [-1.0, 1.0] + [x.min() + x.max(), 0.0]
+    away = np.linalg.norm(middles[:, None] - turned, axis=2)
+    assert away.min(axis=0).max() < 1e-9
+    assert counts[away.argmin(axis=0)].tolist() == counts.tolist()
+
+
+def test_cells_forced_by_another_side_are_dealt_evenly():
+    """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
+    made = one_arch(chords=3)
+    division = divided(made, Meshing(2, 2))
+    keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
+    faces = division.outlines.sides(keystone)
+    found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
+    assert sorted(found) == [[2], [2], [2, 2, 2], [2, 2, 2]]
 
 
 def test_neighbours_that_wish_different_numbers_take_the_larger():
