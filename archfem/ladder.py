@@ -13,9 +13,9 @@ import numpy as np
 from scipy.sparse.linalg import eigsh
 
 from archfem.actions import BodyForce
-from archfem.contact import LARGEST
+from archfem.compiled.contact import LARGEST
 from archfem.criteria import judged
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
 from archfem.models import build as plain
 from archfem.models.jointed import Jointed, Prediction
@@ -136,6 +136,8 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be cut as asked.
     """
+    if not 0.0 < tolerance < 1.0:
+        raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
     if fidelity == "auto":
         return choose(structure, tolerance, motion, damping, dt)
     return plain.build(

@@ -31,7 +31,8 @@ def draw_free_body(
 
     Left, the resultant of each joint, N and V together, points at where it acts on the block, and
     the weight hangs from the centroid; all to one scale. Right, the same forces tail to head in
-    the order of their directions. What is left open is said relative to the largest force.
+    the order of their directions. What is left open is said relative to the largest force. Open
+    joints are named, and have no arrow.
 
     Args:
         structure: whose block it is.
@@ -67,7 +68,9 @@ def _words(body: FreeBody, joints: xr.Dataset) -> list[str]:
     words = []
     for name, number, size in zip(body.names, (*body.joints, -1), body.sizes / kN, strict=True):
         words.append(f"{name}: {size:.1f} kN")
-        if number >= 0:
+        if number >= 0 and size == 0.0:
+            words[-1] = f"{name}: open"
+        elif number >= 0:
             own = joints.isel(joint=number)
             normal, shear = float(own["N"]) / kN, float(own["V"]) / kN
             words[-1] += f" (N {normal:.1f}, V {shear:.1f}, e {float(own['eccentricity']):+.3f})"
@@ -91,6 +94,8 @@ def _block(axes: Axes, structure: Structure, body: FreeBody, colours: list[str])
     heads[-1] += length * body.forces[-1]
     tails = heads - length * body.forces
     for k, (tail, head, colour) in enumerate(zip(tails, heads, colours, strict=True)):
+        if not body.sizes[k]:  # an open joint
+            continue
         _arrow(axes, tail, head, colour)
         away = (tail - head) / np.linalg.norm(tail - head) if k < len(tails) - 1 else [1.0, 0.0]
         _number(axes, k, tail + 0.07 * size * np.array(away), colour)
@@ -107,6 +112,7 @@ def _polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
     axes.set_aspect("equal")
     forces = body.forces / kN
     order = np.argsort(np.arctan2(forces[:, 1], forces[:, 0]), kind="stable")
+    order = order[body.sizes[order] > 0.0]
     corners = np.concatenate([np.zeros((1, 2)), np.cumsum(forces[order], axis=0)])
     span = float(np.ptp(corners, axis=0).max())
     for k, tail, head in zip(order, corners[:-1], corners[1:], strict=True):

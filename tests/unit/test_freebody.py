@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from archfem.actions import BodyForce
+from archfem.assembly import assembled
 from archfem.case import Case
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.freebody import forces_on
+from archfem.materials import STONE, STONE_TO_STONE
 from archfem.models.build import build
 from archfem.resultants import joint_dataset
 from archfem.shapes import arch_on_piers
 from archfem.statics import dead_load, equilibrium
+from archfem.structure import Block
 from archfem.view.freebody import draw_free_body
 from archfem.view.results import write_dead
 
@@ -133,6 +136,24 @@ def test_the_picture_shows_forces_where_they_act_and_a_closed_polygon(ring, ring
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert [word.split(":")[0] for word in words] == ["1  joint 4", "2  joint 5", "3  weight"]
     assert f"{body.sizes[0] / 1e3:.1f} kN" in words[0]
+
+
+def test_an_open_joint_is_named_and_has_no_arrow():
+    """Two stones side by side on the ground touch without a push."""
+
+    def box(name, left, right, low, high, fixed=False):
+        outline = ((left, low), (right, low), (right, high), (left, high))
+        return Block(outline, STONE, name, fixed)
+
+    stones = [box("a", 0.0, 1.0, 0.0, 1.0), box("b", 1.0, 2.0, 0.0, 1.0)]
+    pair = assembled([box("ground", 0.0, 2.0, -0.3, 0.0, True), *stones], STONE_TO_STONE)
+    dead = dead_load(build(pair, fidelity="rigid"))
+    figure = draw_free_body(pair, dead.joints, "a")
+    figure.draw_without_rendering()
+    left, right = figure.axes
+    assert (len(arrows(left)), len(arrows(right))) == (2, 2)  # weight and ground
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any(each.endswith("a to b: open") for each in words)
 
 
 def test_a_polygon_of_too_many_forces_is_refused():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archfem.errors import InvalidInput
 from archfem.ladder import Setting, _usual_damping, build, envelope, largest_difference, strongest
 from archfem.materials import BACKFILL, Contact
 from archfem.models.build import build as plain
@@ -64,6 +65,12 @@ def test_choice_climbs_as_the_tolerance_falls():
         for t in (0.05, 0.005)
     ]
     assert tried[0] == 1 < tried[1]
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, float("nan")])
+def test_a_tolerance_that_cannot_be_meant(tolerance):
+    with pytest.raises(InvalidInput, match=r"tolerance .* is not between 0 and 1"):
+        build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
 
 
 def test_a_soft_block_keeps_its_nodes():
