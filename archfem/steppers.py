@@ -1,10 +1,10 @@
 """Which stepper takes a run: the fastest that gives the history of the equilibrium solves."""
 
-from archfem import chain, compliance, contact
-from archfem.batches import CompiledStepper, Method
-from archfem.chain import ChainMethod
-from archfem.compliance import ComplianceMethod
-from archfem.contact import ContactMethod
+from archfem.compiled import chain, compliance, contact
+from archfem.compiled.batches import CompiledStepper, Method
+from archfem.compiled.chain import ChainMethod
+from archfem.compiled.compliance import ComplianceMethod
+from archfem.compiled.contact import ContactMethod
 from archfem.dynamics import Stepper
 from archfem.errors import InvalidInput
 from archfem.models import Model

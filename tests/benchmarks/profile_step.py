@@ -18,7 +18,7 @@ from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
-from archfem import kernel
+from archfem.compiled import kernel
 from archfem.steppers import METHODS
 
 LINES = 12

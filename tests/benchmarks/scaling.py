@@ -19,7 +19,7 @@ from stepping import Run, warm_up
 from timing import table
 
 import archfem as af
-from archfem.contact import applies
+from archfem.compiled.contact import applies
 
 SIZES = [17, 34, 68, 125, 250, 500]
 CASES = [

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from archfem import kernel
+from archfem.compiled import kernel
 from archfem.dynamics import State, Stepper
 from archfem.energy import Balance
 from archfem.errors import DidNotConverge
@@ -126,7 +126,7 @@ def test_contact_stepper_falls_back(ring, monkeypatch, rule):
     given = {"damping": DAMPING, "newton": Newton(tolerance=1e-13)}
     short = MOTION.cut(0.8, 1.8)
     exact = time_history(model, short, method="snes", **given)
-    monkeypatch.setattr("archfem.contact.kernel.advance", _one_pass)
+    monkeypatch.setattr("archfem.compiled.contact.kernel.advance", _one_pass)
     run = time_history(model, short, method="contact", **given)
     assert run.dataset.attrs["fallback_steps"] > 10
     assert exact.dataset.attrs["fallback_steps"] == 0

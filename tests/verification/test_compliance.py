@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem import march
 from archfem.actions import Settlement
+from archfem.compiled import march
+from archfem.compiled.factor import Plan, backward, factorised, forward
+from archfem.compiled.newmark import follow, numbers_of
+from archfem.compiled.release import release
 from archfem.errors import InvalidInput
-from archfem.factor import Plan, backward, factorised, forward
 from archfem.joints import Facets, JointPoints, Springs
 from archfem.models.build import build
 from archfem.motion import Motion
-from archfem.newmark import follow, numbers_of
 from archfem.newton import Newton
-from archfem.release import release
 from archfem.runs import time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.shapes import Arch, Backfill, bridge

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from archfem.kernel import integrals, open_part
+from archfem.compiled.kernel import integrals, open_part
 
 
 @numba.njit(cache=True)

@@ -17,7 +17,7 @@ from the gaps of the last pass, and those of the first pass from the λ of the l
 import numba
 import numpy as np
 
-from archfem.kernel import ITERATIONS, integrals, open_part
+from archfem.compiled.kernel import ITERATIONS, integrals, open_part
 
 ROUGH = 1e-3
 """What the first pass leaves of its residual; later ones leave the less the better they converge,

@@ -3,8 +3,8 @@
 import numba
 import numpy as np
 
-from archfem.kernel import ITERATIONS, SETTLED, finish, integrals, open_part
-from archfem.products import times
+from archfem.compiled.kernel import ITERATIONS, SETTLED, finish, integrals, open_part
+from archfem.compiled.products import times
 
 
 @numba.njit(cache=True)

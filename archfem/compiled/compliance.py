@@ -15,13 +15,13 @@ have too many of them, and takes any damping: the history is that of the equilib
 import numpy as np
 from scipy import sparse
 
-from archfem import march
-from archfem.batches import POINT, STEPS, Room, compiled_law, shear_resultants
+from archfem.compiled import march
+from archfem.compiled.batches import POINT, STEPS, Room, compiled_law, shear_resultants
+from archfem.compiled.factor import Plan, factorised
+from archfem.compiled.newmark import Numbers, numbers_of
+from archfem.compiled.products import Rows
 from archfem.dynamics import Stepper
-from archfem.factor import Plan, factorised
 from archfem.models.jointed import Jointed
-from archfem.newmark import Numbers, numbers_of
-from archfem.products import Rows
 from archfem.schemes import Rayleigh
 from archfem.structure import Array
 

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from archfem import kernel
-from archfem.batches import POINT, STEPS, Room, compiled_law, shear_resultants
+from archfem.compiled import kernel
+from archfem.compiled.batches import POINT, STEPS, Room, compiled_law, shear_resultants
+from archfem.compiled.modal_energy import energies
 from archfem.dynamics import Stepper
-from archfem.modal_energy import energies
 from archfem.models.jointed import Jointed
 from archfem.schemes import Rayleigh
 from archfem.structure import Array

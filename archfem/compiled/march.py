@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from archfem.factor import Factor, backward, forward
-from archfem.kernel import ITERATIONS, SETTLED, joint_resultants
-from archfem.newmark import add_mixed, follow, mix
-from archfem.products import Rows, add_rows, row_times, times
-from archfem.release import pull, pulls, release
+from archfem.compiled.factor import Factor, backward, forward
+from archfem.compiled.kernel import ITERATIONS, SETTLED, joint_resultants
+from archfem.compiled.newmark import add_mixed, follow, mix
+from archfem.compiled.products import Rows, add_rows, row_times, times
+from archfem.compiled.release import pull, pulls, release
 from archfem.structure import Array
 
 EXACT = 1e-11

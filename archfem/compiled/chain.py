@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from archfem import band
-from archfem.batches import Room, compiled_law, shear_resultants
+from archfem.compiled import band
+from archfem.compiled.batches import Room, compiled_law, shear_resultants
 from archfem.dynamics import Stepper
 from archfem.models.jointed import Jointed
 from archfem.structure import Array

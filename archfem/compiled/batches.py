@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from archfem.compiled.kernel import ITERATIONS
 from archfem.dynamics import Batch, State, Stepper
 from archfem.joints import Facets
-from archfem.kernel import ITERATIONS
 from archfem.models.jointed import Jointed
 from archfem.structure import Array
 
