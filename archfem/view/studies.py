@@ -42,11 +42,11 @@ def draw_study(findings: Mapping[str, Finding], reduction: float = 1.0) -> Figur
         )  # fmt: skip
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(0.85 * min(finite.min(initial=1.0), 1.0 / reduction), 1.06 * end)
     ticks = [
         tick for tick in (0.1, 0.2, 0.333, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if tick < end
     ]
     axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    axes.set_xlim(0.85 * min(finite.min(initial=1.0), 1.0 / reduction), 1.06 * end)
     axes.minorticks_off()
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
     return figure
