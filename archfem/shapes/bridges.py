@@ -5,6 +5,7 @@ them. What a bridge does not have is not modelled.
 """
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     site = Site(material, contact, chords)
     faces, extrados = site.build(arches, piers, sidewalls)
     if backfill is not None:
-        bottom = _bottom(faces, extrados, sidewalls)
+        bottom = _bottom(faces, list(chain(*extrados)), sidewalls)
         top = backfill.surface(bottom[0][0], bottom[-1][0], _crown(faces, extrados))
         _check_cover(bottom, top)
         site.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
@@ -100,12 +101,12 @@ def _bottom(
     return [*ledge(left, 1.0, sidewalls[:1]), *extrados, *reversed(after)]
 
 
-def _crown(faces: Sequence[tuple[Face, Face]], extrados: Sequence[Point]) -> Point:
+def _crown(faces: Sequence[tuple[Face, Face]], extrados: Sequence[Sequence[Point]]) -> Point:
     """The highest crown, midway between the springings of its ring; of equal ones the first."""
-    level = max(y for _, y in extrados)
-    x = next(x for x, y in extrados if y > level - 1e-9)
-    springings = ((left[0][0], right[0][0]) for left, right in faces)
-    return next(0.5 * (start + end) for start, end in springings if start < x < end), level
+    levels = [max(y for _, y in points) for points in extrados]
+    level = max(levels)
+    left, right = next(f for f, y in zip(faces, levels, strict=True) if y > level - 1e-9)
+    return 0.5 * (left[0][0] + right[0][0]), level
 
 
 def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:

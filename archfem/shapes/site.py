@@ -43,8 +43,8 @@ class Site:
 
     def build(
         self, arches: Sequence[Arch], piers: Sequence[Pier], sidewalls: Sequence[Sidewall]
-    ) -> tuple[list[tuple[Face, Face]], list[Point]]:
-        """Build all stonework below the fill; springings of each ring, and the whole extrados."""
+    ) -> tuple[list[tuple[Face, Face]], list[list[Point]]]:
+        """Build all stonework below the fill; springings and extrados of each ring."""
         rings, x = [], sidewalls[0].length if sidewalls else 0.0
         for number, arch in enumerate(arches):
             rings.append(self._ring(arch, x))
@@ -64,7 +64,7 @@ class Site:
             for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
                 self._join(pair, _face(joint), f"{arch.name}, joint {k}", arch.name)
             support = after
-        return springings, [point for ring in rings for point in _extrados(ring)]
+        return springings, [_extrados(ring) for ring in rings]
 
     def add(
         self,

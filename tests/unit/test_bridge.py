@@ -241,6 +241,19 @@ def test_states_of_sidewalls(state, filled, above):
     assert_apart(made)
 
 
+@pytest.mark.parametrize("stones", [1, 2, 3])
+def test_the_hump_is_over_the_crown_of_rings_of_few_thick_stones(stones):
+    """The highest points of one stone are the outer ends of its springings."""
+    arch = Arch(span=0.8, rise=0.2, thickness=0.7, voussoirs=stones)
+    sides = walls(above=0.0, setback=0.1, length=4.0)
+    fill = Backfill(cover=0.5, erosion=0.1, hump=0.6)
+    made = bridge(arches=[arch], sidewalls=sides, backfill=fill)
+    points = block(made, "backfill").points
+    high = points[points[:, 1] > points[:, 1].max() - 1e-9, 0]
+    crown = 4.0 + 0.4
+    assert (high.min(), high.max()) == pytest.approx((crown - 0.6, crown + 0.6))
+
+
 @pytest.mark.parametrize("spot", ["west", "east"])
 def test_a_sidewall_without_setback(spot):
     change = {"setback": 0.0}
