@@ -138,6 +138,9 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
     """
     if not 0.0 < tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
+    rungs = ("auto", *plain.FIDELITIES)
+    if isinstance(fidelity, str) and fidelity not in rungs:
+        raise InvalidInput(f"fidelity '{fidelity}' is not known: use one of {rungs}")
     if fidelity == "auto":
         return choose(structure, tolerance, motion, damping, dt)
     return plain.build(
