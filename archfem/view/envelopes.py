@@ -69,7 +69,7 @@ def draw_envelope(
         for part, panel in shown.items():
             at_rest = _of_part(dead, part)["eccentricity"]
             panel.plot(at_rest.values, ":", color=INK, lw=1.4, label="dead load")
-    first.set_ylim(-0.56, 0.56 + STEP * len(runs))
+    first.set_ylim(-0.56, 0.56 + (STEP * len(runs) if apart else 0.0))
     return _explained(shown)
 
 
