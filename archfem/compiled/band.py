@@ -3,7 +3,14 @@
 import numba
 import numpy as np
 
-from archfem.compiled.kernel import ITERATIONS, SETTLED, finish, integrals, open_part
+from archfem.compiled.kernel import (
+    ITERATIONS,
+    SETTLED,
+    facet_product,
+    finish,
+    integrals,
+    open_part,
+)
 from archfem.compiled.products import times
 
 
@@ -107,21 +114,13 @@ def _closed(gap, law, stiffness):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _force(stiffness, gap, row, facets):  # type: ignore
-    """One entry of D g."""
-    if facets:
-        return stiffness[row, 0] * gap[row] + stiffness[row, 1] * gap[row ^ 1]
-    return stiffness[row, 0] * gap[row]
-
-
-@numba.njit(cache=True)
 def _settled(gap, old, new, facets):  # type: ignore
     """Whether the gaps ask for the stiffness they were found with."""
     largest, off = 0.0, 0.0
     for row in range(len(gap)):
-        force = _force(new, gap, row, facets)
+        force = facet_product(new, gap, row, facets)
         largest = max(largest, abs(force))
-        off = max(off, abs(force - _force(old, gap, row, facets)))
+        off = max(off, abs(force - facet_product(old, gap, row, facets)))
     return off <= SETTLED * largest
 
 
@@ -190,7 +189,7 @@ def _right(result, load, constant, joints, opening, law):  # type: ignore
     for k in range(len(result)):
         result[k] = load[k] - constant[k]
     for row in range(len(gap)):
-        force = _force(stiffness, gap, row, law[0])
+        force = facet_product(stiffness, gap, row, law[0])
         if force != 0.0:
             for entry in range(indptr[row], indptr[row + 1]):
                 result[indices[entry]] -= data[entry] * force
@@ -205,7 +204,7 @@ def _resultants(result, gap, stiffness, shear, contact, law):  # type: ignore
     for row in range(len(gap)):
         if gap[row] > 0.0 and (not facets or gap[row ^ 1] > 0.0):
             continue  # open: it carries exactly nothing
-        pull = _force(stiffness, gap, row, facets)
+        pull = facet_product(stiffness, gap, row, facets)
         result[joint[row], 0] -= pull
         result[joint[row], 2] -= pull * arm[row]
 
@@ -269,9 +268,9 @@ def _loss(state, matrices, lag, law, damping):  # type: ignore
     _closed(seen, law, acting)
     rows, columns, data = matrices.opening
     for row in range(len(gap)):
-        force = _force(stored, gap, row, law[0])
+        force = facet_product(stored, gap, row, law[0])
         potential += 0.5 * gap[row] * force
-        extra = _force(acting, seen, row, law[0]) - force
+        extra = facet_product(acting, seen, row, law[0]) - force
         for entry in range(rows[row], rows[row + 1]):
             damping[columns[entry]] += data[entry] * extra
     return kinetic, potential

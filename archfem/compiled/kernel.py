@@ -144,7 +144,7 @@ def _settle(start, compliance, law, jacobian, other, force):  # type: ignore
         _jacobians(gap, law, other)
         largest, off = 0.0, 0.0
         for row in range(len(gap)):
-            new = _product(other, gap, row, facets)
+            new = facet_product(other, gap, row, facets)
             largest = max(largest, abs(new))
             off = max(off, abs(new - force[row]))
         jacobian[:] = other
@@ -167,7 +167,7 @@ def _acts(jacobian, facets):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _product(jacobian, gap, row, facets):  # type: ignore
+def facet_product(jacobian, gap, row, facets):  # type: ignore
     """One entry of J z; a facet's row holds its own entry and that of its partner."""
     if facets:
         return jacobian[row, 0] * gap[row] + jacobian[row, 1] * gap[row ^ 1]
