@@ -41,7 +41,8 @@ def _wanted(case: Case) -> dict[str, Any]:
     if case.motion is not None:
         motion = case.ground_motion()
     elif case.suite is not None:
-        motion = case.ground_suite().motions[0]
+        first = next(iter(case.suite["pairs"]))  # the others need not be matched for this
+        motion = case.alone(first).ground_suite().motions[0]
     return {"motion": motion, "damping": expected_damping(case), "dt": case.analysis.get("dt")}
 
 

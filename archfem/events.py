@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,8 +119,7 @@ class EveryMechanism:
         self._met.update(name for name, found in counted.items() if found is not None)
         if "verified" not in self._met and watch.verifier.moving(joints, self.limit) is not None:
             self._met.add("verified")
-        wanted = {"verified", *possible_counts(structure)}
-        return "a mechanism by each definition" if self._met >= wanted else None
+        return "a mechanism by each definition" if self._met >= watch.wanted else None
 
 
 def possible_counts(structure: Structure) -> tuple[str, ...]:
@@ -145,8 +145,14 @@ class _Watch:
         self.judged = np.array([k for k, joint in enumerate(joints) if joint.part in parts])
         self.skeleton = np.array(self.verifier.skeleton.joints)
         self.idle: set[bytes] = set()
+        self._structure = structure
         self._depth = np.array([joint.depth for joint in joints])
         self._friction = np.array([joint.contact.friction for joint in joints])
+
+    @cached_property
+    def wanted(self) -> set[str]:
+        """Definitions of a mechanism that the structure has joints enough for."""
+        return {"verified", *possible_counts(self._structure)}
 
     def state(
         self, resultants: Array, numbers: NDArray[np.int64], limit: float

@@ -16,6 +16,7 @@ from archfem.findings import Finding, by_part, kept, of_run, write
 from archfem.modal import modes
 from archfem.motion import Motion
 from archfem.scales import mechanism_scales
+from archfem.schemes import Rayleigh
 from archfem.settings import checked, refuse_unknown
 from archfem.statics import Equilibrium
 from archfem.verdicts import DEFINITIONS
@@ -133,16 +134,17 @@ def _found(
     study: Study, case: Case, pairs: Sequence[str], finding: Finding | None, path: Path
 ) -> Finding:
     """Run some pairs of a case, and add to what was found of it before."""
-    suite, dead = case.ground_suite(), at_rest(case)
+    dead = at_rest(case)
+    damping, _ = damping_of(case, dead)
     finding = finding or _at_rest(case, dead)
     finding.search = study.scales
-    for motion, pair in zip(suite.motions, suite.pairs, strict=True):
-        if motion.name in pairs:
-            finding.runs[motion.name] = _run(case, motion, dead)
-            if study.scales is not None:
-                whole = pair.scaled(suite.scale)
-                finding.scales[motion.name] = _scales(case, whole, dead, study.scales)
-            write(finding, path)
+    for name in pairs:
+        suite = case.alone(name).ground_suite()
+        finding.runs[name] = _run(case, suite.motions[0], dead, damping)
+        if study.scales is not None:
+            whole = suite.pairs[0].scaled(suite.scale)
+            finding.scales[name] = _scales(case, whole, dead, damping, study.scales)
+        write(finding, path)
     return finding
 
 
@@ -155,10 +157,10 @@ def _at_rest(case: Case, dead: Equilibrium) -> Finding:
     )
 
 
-def _run(case: Case, motion: Motion, dead: Equilibrium) -> dict[str, Any]:
+def _run(case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None) -> dict[str, Any]:
     """Run one pair; where a step fails, what was found up to it counts."""
     try:
-        run = shaken(case, motion, dead)
+        run = shaken(case, motion, dead, damping)
     except DidNotConverge as error:
         if error.history is None:
             raise
@@ -180,14 +182,18 @@ def _search(given: Any) -> dict[str, Any] | None:
 
 
 def _scales(
-    case: Case, motion: Motion, dead: Equilibrium, options: Mapping[str, Any]
+    case: Case,
+    motion: Motion,
+    dead: Equilibrium,
+    damping: Rayleigh | None,
+    options: Mapping[str, Any],
 ) -> dict[str, tuple[float, float]]:
     """Factors on a motion at which mechanisms begin, and the largest below at which they do not."""
     found = mechanism_scales(
         dead.model,
         motion,
         start=dead,
-        damping=damping_of(case, dead)[0],
+        damping=damping,
         dt=case.analysis.get("dt"),
         **options,
     )

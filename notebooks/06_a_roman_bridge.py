@@ -28,7 +28,6 @@ import archfem as af
 from archfem.analysis import at_rest, damping_of
 from archfem.criteria import judged
 from archfem.freebody import forces_on
-from archfem.modal_damping import effective_range
 from archfem.strength import strength_use, use_table
 from archfem.view.compare import draw_instants, draw_joint
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
@@ -105,8 +104,10 @@ draw_free_body(existing, joints, stone, shape=model.shape)
 found = {name: af.modes(each.model, 6, about=each) for name, each in dead.items()}
 for name, shapes in found.items():
     print(f"{name}\n{shapes.table()}\n")
-effective = effective_range(model, dead["as it stands"])
-print(effective.text)
+damping = {}
+for name, each in dead.items():
+    damping[name], words = damping_of(cases[name], each)
+    print(f"{name}: {words}")
 draw_modes(found["as it stands"])
 
 # %% [markdown]
@@ -125,8 +126,7 @@ springs = {
 
 def run(model, name, factor=1.0):
     """One bridge under the first pair, times a factor."""
-    damping, _ = damping_of(cases[name], dead[name])
-    return af.time_history(model, motion.scaled(factor), dt=0.005, damping=damping)
+    return af.time_history(model, motion.scaled(factor), dt=0.005, damping=damping[name])
 
 
 def tell(runs):
@@ -208,7 +208,7 @@ factors = {
         each.model,
         motion.scaled(3.0),
         start=each,
-        damping=damping_of(cases[name], each)[0],
+        damping=damping[name],
         dt=0.005,
         **steps,
     )
