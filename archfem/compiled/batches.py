@@ -71,6 +71,26 @@ class Method(Protocol):
         """
 
 
+class Reordered:
+    """Coordinates in an order that suits the factor of a method.
+
+    Args:
+        order: numbers of the coordinates, the first one first (n,).
+    """
+
+    def __init__(self, order: NDArray[np.int64]) -> None:
+        self._order = order
+        self._place = np.argsort(order)
+
+    def enter(self, vectors: Array) -> Array:
+        """From coordinates to those in order (3, n)."""
+        return vectors[:, self._order]
+
+    def leave(self, vectors: Array) -> Array:
+        """Back from those (3, n)."""
+        return vectors[:, self._place]
+
+
 class CompiledStepper:
     """Advances a model under a ground motion by a compiled method.
 

@@ -9,11 +9,12 @@ long structures; it also takes any damping.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem.compiled import band
-from archfem.compiled.batches import Room, compiled_law, shear_resultants
+from archfem.compiled.batches import Reordered, Room, compiled_law, shear_resultants
 from archfem.dynamics import Stepper
 from archfem.models.jointed import Jointed
 from archfem.structure import Array
@@ -57,7 +58,7 @@ def work(model: Jointed, width: int) -> float:
     return model.size * (0.3 + 0.015 * width + 0.45e-3 * width**2)
 
 
-def order(model: Jointed) -> tuple[Array, int]:
+def order(model: Jointed) -> tuple[NDArray[np.int64], int]:
     """An order of the coordinates that brings couplings near the diagonal, and the bandwidth."""
     found = reverse_cuthill_mckee(model.mass, symmetric_mode=True)
     natural = np.arange(model.size)
@@ -71,7 +72,7 @@ def _bandwidth(matrix: sparse.csr_matrix, permutation: Array) -> int:
     return int(np.abs(place[rows] - place[matrix.indices]).max(initial=0))
 
 
-class ChainMethod:
+class ChainMethod(Reordered):
     """Steps on a model's matrices of small bandwidth.
 
     Args:
@@ -84,20 +85,12 @@ class ChainMethod:
         assert isinstance(exact.model, Jointed)
         self._exact = exact
         self._model = exact.model
-        self._order, self._width = order(self._model)
-        self._place = np.argsort(self._order)
+        places, self._width = order(self._model)
+        super().__init__(places)
         self._weight = exact.weight[self._order]
         self._body = self._model.body[self._order]
         self._law = compiled_law(self._model)
         self._step: tuple[float, Matrices, tuple[float, ...]] | None = None
-
-    def enter(self, vectors: Array) -> Array:
-        """From coordinates to those of small bandwidth (3, n)."""
-        return vectors[:, self._order]
-
-    def leave(self, vectors: Array) -> Array:
-        """Back from those (3, n)."""
-        return vectors[:, self._place]
 
     def take(self, dt: float, room: Room) -> int:
         """Take steps up to the last, or up to one whose joints do not settle."""

@@ -16,14 +16,13 @@ import numpy as np
 from scipy import sparse
 
 from archfem.compiled import march
-from archfem.compiled.batches import POINT, STEPS, Room, compiled_law, shear_resultants
+from archfem.compiled.batches import POINT, STEPS, Reordered, Room, compiled_law, shear_resultants
 from archfem.compiled.factor import Plan, factorised
 from archfem.compiled.newmark import Numbers, numbers_of
 from archfem.compiled.products import Rows
 from archfem.dynamics import Stepper
 from archfem.models.jointed import Jointed
 from archfem.schemes import Rayleigh
-from archfem.structure import Array
 
 NOTHING = 1e-16
 """Entries of a matrix, relative to its largest, that are rounding left by cancellation."""
@@ -39,7 +38,7 @@ def work(model: Jointed) -> float:
     return 25.0 + POINT * model.joints.opening.shape[0] + (4e-3 + 5.0 / STEPS) * model.mass.nnz
 
 
-class ComplianceMethod:
+class ComplianceMethod(Reordered):
     """Steps with one sparse factor of a model's effective matrix.
 
     Args:
@@ -58,20 +57,11 @@ class ComplianceMethod:
         model, rest = self._model, exact.damping - self._drag * self._model.mass
         parts = [_trimmed(each) for each in (model.mass, rest, model.closed())]
         self._plan = Plan.of(sum(abs(part) for part in parts))
-        self._order = self._plan.order
-        self._place = np.argsort(self._order)
+        super().__init__(self._plan.order)
         self._parts = [part[self._order][:, self._order] for part in parts]
         self._weight = exact.weight[self._order]
         self._law = compiled_law(self._model)
         self._step: tuple[float, march.Matrices, Numbers] | None = None
-
-    def enter(self, vectors: Array) -> Array:
-        """From coordinates to those in the order of the factor (3, n)."""
-        return vectors[:, self._order]
-
-    def leave(self, vectors: Array) -> Array:
-        """Back from those (3, n)."""
-        return vectors[:, self._place]
 
     def take(self, dt: float, room: Room) -> int:
         """Take steps up to the last, or up to one whose open points do not settle."""
