@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from archfem.criteria import part_role
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import Contact
+from archfem.roles import part_role
 from archfem.rows import Row, rows_of
 from archfem.structure import TOUCHING, Array, Block, Joint, Structure
 from archfem.units import G

@@ -7,17 +7,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.criteria import (
-    FAILURES,
-    HINGE,
-    KINDS,
-    USED_UP,
-    counted_mechanism,
-    counted_mechanisms,
-    judged_parts,
-)
+from archfem.counted import FAILURES, KINDS, counted_mechanism, counted_mechanisms
+from archfem.criteria import HINGE, USED_UP
 from archfem.mechanism import Verifier
 from archfem.resultants import joint_dataset
+from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 
 Event = Callable[[Structure, Array], str | None]

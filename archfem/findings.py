@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import judged, part_role
+from archfem.criteria import judged
 from archfem.history import History
+from archfem.roles import part_role
 from archfem.summary import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import Mechanism, counted_mechanism
+from archfem.counted import Mechanism, counted_mechanism
 from archfem.errors import InvalidInput
 from archfem.mechanism import (
     VerifiedMechanism,

@@ -8,19 +8,12 @@ import xarray as xr
 from scipy import sparse
 from scipy.optimize import linprog
 
-from archfem.criteria import (
-    HINGE,
-    Mechanism,
-    counted_mechanism,
-    hinged,
-    judged_parts,
-    mechanism_kind,
-    opened,
-    sliding,
-)
+from archfem.counted import Mechanism, counted_mechanism, mechanism_kind
+from archfem.criteria import HINGE, hinged, opened, sliding
 from archfem.equilibrium import RigidBlocks
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.loops import Loops
+from archfem.roles import judged_parts
 from archfem.skeleton import Skeleton, skeleton_of
 from archfem.structure import Array, Structure
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem.criteria import part_role
+from archfem.roles import part_role
 from archfem.structure import Array, Block
 
 STRAIGHT = 0.005

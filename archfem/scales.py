@@ -8,7 +8,8 @@ from math import inf, sqrt
 import numpy as np
 from tqdm import tqdm
 
-from archfem.criteria import HINGE, Mechanism
+from archfem.counted import Mechanism
+from archfem.criteria import HINGE
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import EveryMechanism, possible_counts
 from archfem.models import Model

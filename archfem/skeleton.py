@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from archfem.criteria import part_role
+from archfem.roles import part_role
 from archfem.soft import softness
 from archfem.structure import Array, Structure
 

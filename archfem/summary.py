@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from archfem.counted import Mechanism
 from archfem.criteria import (
     HINGE,
-    Mechanism,
     envelope,
     first_time,
     hinged,

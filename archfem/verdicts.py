@@ -1,6 +1,7 @@
 """When a run first meets a mechanism, by each of the definitions in use."""
 
-from archfem.criteria import HINGE, Mechanism, counted_mechanisms
+from archfem.counted import Mechanism, counted_mechanisms
+from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import first_verified_mechanism

@@ -11,9 +11,9 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
-    "errors units laws criteria _petsc",
-    "materials quadrature quantities schemes signals oscillator records naming _slepc",
-    "structure synthetic codes settings",
+    "errors units laws roles _petsc",
+    "criteria materials quadrature quantities schemes signals oscillator records naming _slepc",
+    "structure synthetic codes settings counted",
     "actions drawings polygons rows sparsity resultants motion soft",
     "assembly snapping",
     "shapes survey",

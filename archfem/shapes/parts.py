@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from archfem.criteria import part_role
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
+from archfem.roles import part_role
 from archfem.structure import Point
 
 

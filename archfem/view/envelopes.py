@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from archfem.criteria import HINGE, envelope, judged_parts, opened, part_role
+from archfem.criteria import HINGE, envelope, opened
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.roles import judged_parts, part_role
 from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
 from archfem.view.style import HINGE as RED
 

@@ -7,11 +7,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.criteria import HINGE, hinged, judged_parts, opened, sliding
+from archfem.criteria import HINGE, hinged, opened, sliding
 from archfem.equilibrium import RigidBlocks
 from archfem.kinematics import motion_of
 from archfem.models import Model
 from archfem.resultants import thrust_line
+from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 
 ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])

@@ -12,9 +12,9 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from archfem.criteria import judged_parts
 from archfem.models import Model
 from archfem.models.shape import Shape
+from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines

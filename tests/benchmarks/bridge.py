@@ -20,8 +20,8 @@ from scaling import peak
 from timing import stopwatch, table
 
 import archfem as af
-from archfem.criteria import part_role
 from archfem.resultants import joint_dataset
+from archfem.roles import part_role
 from archfem.steppers import stepper_for
 
 DT = 0.005

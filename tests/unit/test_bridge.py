@@ -9,9 +9,9 @@ import pytest
 import shapely
 
 from archfem.case import Case
-from archfem.criteria import part_role
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE, Material
+from archfem.roles import part_role
 from archfem.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
 
 MESHES = Path(__file__).parents[2] / "meshes"

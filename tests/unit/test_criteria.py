@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from archfem.counted import counted_mechanism, counted_mechanisms
 from archfem.criteria import (
-    counted_mechanism,
-    counted_mechanisms,
     envelope,
     failed,
     first_time,
     hinged,
     judged,
-    judged_parts,
     longest_duration,
     opened,
     sliding,
@@ -22,6 +20,7 @@ from archfem.criteria import (
 from archfem.materials import STONE_TO_STONE
 from archfem.mechanism import verified_mechanism
 from archfem.resultants import joint_dataset, thrust_line
+from archfem.roles import judged_parts
 from archfem.shapes import column
 from archfem.summary import joint_table
 

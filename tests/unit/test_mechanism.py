@@ -5,13 +5,14 @@ import pytest
 import xarray as xr
 
 from archfem.actions import BodyForce
-from archfem.criteria import counted_mechanism, mechanism_kind, part_role
+from archfem.counted import counted_mechanism, mechanism_kind
 from archfem.equilibrium import RigidBlocks
 from archfem.errors import InvalidInput
 from archfem.kinematics import motion_of
 from archfem.limit import collapse_factor
 from archfem.mechanism import first_verified_mechanism, verified_mechanism
 from archfem.resultants import joint_dataset
+from archfem.roles import part_role
 from archfem.shapes import arch_on_piers, circular_arch, column
 
 WEIGHT = 1e4  # normal force in every joint [N]: only signs and ratios matter

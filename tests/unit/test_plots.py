@@ -8,10 +8,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from archfem.case import Case
-from archfem.criteria import hinged, opened, part_role, sliding
+from archfem.criteria import hinged, opened, sliding
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
+from archfem.roles import part_role
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
 from archfem.view.marks import joint_ends, joint_marks
 from archfem.view.plots import draw_joint_histories, draw_structure

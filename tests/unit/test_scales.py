@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from archfem import scales
-from archfem.criteria import HINGE, Mechanism
+from archfem.counted import Mechanism
+from archfem.criteria import HINGE
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.rigid import rigid
 from archfem.motion import LARGEST_PEAK, Motion

@@ -11,9 +11,9 @@ import shapely
 import archfem as af
 from archfem.case import Case
 from archfem.cli import main
-from archfem.criteria import part_role
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
+from archfem.roles import part_role
 from archfem.shapes import Arch, Backfill, Pier, Sidewall, bridge
 from archfem.survey import Layer, read_outlines, surveyed, write_outlines
 

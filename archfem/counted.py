@@ -1,0 +1,132 @@
+"""Mechanisms by counting failed joints, and the classes of mechanisms."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import xarray as xr
+
+from archfem.criteria import HINGE, failed
+from archfem.roles import judged_parts, part_role
+
+FAILURES = 4
+"""Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
+
+KINDS = ("local", "semi-global", "global")
+"""Classes of mechanisms, smallest first."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Parts of a structure that fail, or move, together.
+
+    Attributes:
+        kind: one of `KINDS`: "local" in one ring or one pier, "semi-global" in one ring and one
+            pier, "global" in more; "none" where no ring and no pier moves.
+        part: the rings and piers concerned, joined by " + ".
+        joints: numbers of the failed joints; of those that open or slip, where motion tells.
+        time: when [s]; None for a static state.
+        blocks: numbers of the blocks that can move; empty where rings and piers cannot, or nobody
+            asked.
+    """
+
+    kind: str
+    part: str
+    joints: tuple[int, ...]
+    time: float | None = None
+    blocks: tuple[int, ...] = ()
+
+
+def mechanism_kind(parts: Collection[str]) -> str:
+    """Class of a mechanism in these judged parts: "none", "local", "semi-global" or "global"."""
+    roles = sorted(role for part in set(parts) if (role := part_role(part)) != "other")
+    if len(roles) < 2:
+        return "local" if parts else "none"
+    return "semi-global" if roles == ["pier", "ring"] else "global"
+
+
+def counted_mechanism(
+    joints: xr.Dataset,
+    limit: float = HINGE,
+    failures: int = FAILURES,
+    kinds: Sequence[str] = KINDS,
+) -> Mechanism | None:
+    """Find the first instant at which enough joints have failed at once.
+
+    The criterion of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
+    ring alone (local), with joints of one pier among them (semi-global), or of more rings and
+    piers (global). A joint that has come apart counts too. The class is that of all joints failed
+    at the instant; ask for `kinds=("local",)` to find four in one ring whatever else fails.
+
+    Args:
+        joints: over joint, or over time and joint; those of `judged` are counted.
+        limit: of |e| for a hinge [-].
+        failures: how many make a mechanism.
+        kinds: classes to look for.
+
+    Returns:
+        The mechanism, or None.
+    """
+    flags = failed(joints, limit)
+    if "time" not in flags.coords:
+        flags = flags.assign_coords(time=np.nan)
+    if "time" not in flags.dims:
+        flags = flags.expand_dims("time")
+    flags = flags.transpose("time", "joint")
+    part, up = flags["part"].values.astype(str), flags.values
+    names = judged_parts(part)
+    counts = np.array([up[:, part == name].sum(axis=1) for name in names]).reshape(-1, len(up)).T
+    for instant in np.flatnonzero(counts.sum(axis=1) >= failures):
+        count = dict(zip(names, counts[instant], strict=True))
+        group = _widest_group(count, failures, kinds)
+        if group:
+            time = float(flags["time"][instant])
+            numbers = flags["joint"].values[up[instant] & np.isin(part, group)]
+            return Mechanism(
+                mechanism_kind(group),
+                " + ".join(group),
+                tuple(int(number) for number in numbers),
+                None if np.isnan(time) else time,
+            )
+    return None
+
+
+def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Mechanism | None]:
+    """Find the first mechanism by each of the definitions in use that count joints.
+
+    "Any four joints" are of rings and piers, anywhere; "four in a ring" of one ring, whatever else
+    fails; "ring and pier" four of one ring and one pier together, at least one of each.
+
+    Args:
+        joints: over joint, or over time and joint.
+        limit: of |e| for a hinge [-].
+    """
+    part = joints["part"].values.astype(str)
+    rings = np.array([part_role(name) == "ring" for name in part])
+    return {
+        "any four joints": counted_mechanism(joints, limit),
+        "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
+        "ring and pier": counted_mechanism(joints, limit, kinds=("semi-global",)),
+    }
+
+
+def _widest_group(
+    count: dict[str, int], failures: int, kinds: Sequence[str]
+) -> tuple[str, ...] | None:
+    """Parts whose failures together are enough, of the widest class asked for, or None."""
+    hit = tuple(name for name in count if count[name])
+    groups = [*combinations(hit, 1), *combinations(hit, 2), hit]
+    enough = [
+        group
+        for group in groups
+        if sum(count[name] for name in group) >= failures and mechanism_kind(group) in kinds
+    ]
+    return max(
+        enough,
+        key=lambda group: (
+            KINDS.index(mechanism_kind(group)),
+            sum(count[name] for name in group),
+        ),
+        default=None,
+    )
