@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from archfem.errors import InvalidInput
-from archfem.quantities import in_unit
 from archfem.structure import Array
+from archfem.units import in_unit
 
 SIZES = (0.02, 20.0)
 """Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong."""

@@ -8,7 +8,7 @@ as there are ω² below σ: that tells of negative stiffness, and of a mode that
 import numpy as np
 from scipy import sparse
 
-from archfem._slepc import PETSc, SLEPc
+from archfem._petsc import PETSc, SLEPc
 from archfem.errors import DidNotConverge
 from archfem.structure import Array
 

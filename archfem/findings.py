@@ -1,7 +1,6 @@
 """What a study finds of its cases: kept in files, set side by side in tables."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -11,9 +10,10 @@ import numpy as np
 import xarray as xr
 
 from archfem.criteria import judged
+from archfem.files import in_one_stroke
 from archfem.history import History
 from archfem.roles import part_role
-from archfem.summary import aligned
+from archfem.tables import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
 
@@ -89,9 +89,8 @@ def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | N
 
 def write(finding: Finding, path: Path) -> None:
     """Write findings in one stroke."""
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
-    os.replace(draft, path)
+    with in_one_stroke(path) as draft:
+        draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
 
 
 def study_table(findings: Mapping[str, Finding]) -> str:

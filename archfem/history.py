@@ -1,6 +1,5 @@
 """What was recorded of a time history, and its file."""
 
-import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +9,7 @@ import xarray as xr
 
 from archfem.counted import Mechanism, counted_mechanism
 from archfem.errors import InvalidInput
+from archfem.files import in_one_stroke
 from archfem.mechanism import (
     VerifiedMechanism,
     first_verified_mechanism,
@@ -94,18 +94,10 @@ class History:
         Args:
             path: the file; folders are made.
         """
-        target = Path(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        draft = target.with_name(f".{target.name}.{os.getpid()}.part")
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
-        try:
+        with in_one_stroke(Path(path)) as draft:
             self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
-            with open(draft, "rb") as written:
-                os.fsync(written.fileno())
-            os.replace(draft, target)
-        finally:
-            draft.unlink(missing_ok=True)
-        return target
+        return Path(path)
 
     @classmethod
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":

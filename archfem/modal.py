@@ -11,7 +11,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
 from archfem.statics import Equilibrium
 from archfem.structure import Array
-from archfem.summary import aligned
+from archfem.tables import aligned
 
 SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""

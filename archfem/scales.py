@@ -17,7 +17,7 @@ from archfem.motion import LARGEST_PEAK, Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import Equilibrium, dead_load
-from archfem.summary import aligned
+from archfem.tables import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
 logger = logging.getLogger("archfem")

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from archfem.errors import InvalidInput
-from archfem.quantities import in_unit
+from archfem.units import in_unit
 
 Table = Mapping[str, Any]
 

@@ -13,7 +13,7 @@ from archfem.history import History
 from archfem.models import Model
 from archfem.stress import at_corners, check_state, principal_values
 from archfem.structure import Array, Structure
-from archfem.summary import aligned
+from archfem.tables import aligned
 from archfem.units import MPa
 
 

@@ -20,6 +20,7 @@ from archfem.history import History
 from archfem.matching import Match
 from archfem.measures import measures
 from archfem.motion import Motion
+from archfem.tables import aligned
 from archfem.units import STANDARD_GRAVITY
 
 SHOWN = 8
@@ -200,18 +201,6 @@ def match_table(matches: Sequence[Match]) -> str:
                 ]
             )
     return aligned(head, rows)
-
-
-def aligned(head: list[str], rows: list[list[str]]) -> str:
-    """Columns of text, the first to the left, the others to the right."""
-    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if k == 0 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [head, *rows]
-    )
 
 
 def _class_and_time(found: Mechanism | None) -> tuple[str, str]:

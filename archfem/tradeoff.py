@@ -13,7 +13,7 @@ from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.structure import Structure
-from archfem.summary import aligned
+from archfem.tables import aligned
 
 RUNGS = ("rigid", "faces", "condensed")
 CELLS = ((2, 2), (4, 4), (8, 8))

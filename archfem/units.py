@@ -1,6 +1,13 @@
-"""Multipliers that turn a number in the named unit into SI: `young=30 * GPa`."""
+"""Units: multipliers into SI, `young=30 * GPa`, and quantities as people write them.
 
-from math import pi
+"1.48 MPa/mm" is 1.48e9 Pa/m.
+"""
+
+from functools import cache
+from math import isfinite, pi
+from typing import Any
+
+from archfem.errors import InvalidInput
 
 mm = 1e-3  # m
 cm = 1e-2  # m
@@ -16,3 +23,51 @@ G = 9.81
 
 STANDARD_GRAVITY = 9.80665
 """The g in which accelerograms are recorded and spectra are given [m/s²]."""
+
+
+@cache
+def _registry() -> Any:
+    import pint  # slow to import, and only case files need it
+
+    return pint.UnitRegistry()
+
+
+def in_unit(value: Any, unit: str, key: str) -> float:
+    """Turn a number, or a number with a unit, into a number in the given unit.
+
+    Args:
+        value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already.
+        unit: the unit wanted, "1" for a pure number.
+        key: what to call the value in an error.
+
+    Raises:
+        InvalidInput: it is no number, not finite, or of another dimension.
+    """
+    if isinstance(value, str):
+        number = _converted(value, unit, key)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value)
+    else:
+        raise InvalidInput(f"{key} = {value!r} is not a number: give one in {unit}")
+    if not isfinite(number):
+        raise InvalidInput(f"{key} = {value!r} is not finite: give a number in {unit}")
+    return number
+
+
+def _converted(text: str, unit: str, key: str) -> float:
+    import pint
+
+    registry = _registry()
+    wanted = "dimensionless" if unit == "1" else unit
+    try:
+        quantity = registry.Quantity(text)
+        return float(quantity.to(wanted).magnitude)
+    except pint.DimensionalityError as error:
+        raise InvalidInput(f"{key} = {text!r} is not in a unit like {wanted}: {error}") from error
+    except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
+        raise InvalidInput(
+            f"{key} = {text!r} is not a quantity ({error}): write a number and a unit, e.g. "
+            f'"1.5 {wanted}"'
+        ) from error
+    except Exception as error:  # pint lets its tokenizer's errors through
+        raise InvalidInput(f"{key} = {text!r} is not a quantity: {error}") from error

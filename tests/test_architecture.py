@@ -11,8 +11,9 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
-    "errors units laws roles _petsc",
-    "criteria materials quadrature quantities schemes signals oscillator records naming _slepc",
+    "errors tables files laws roles _petsc",
+    "units",
+    "criteria materials quadrature schemes signals oscillator records naming",
     "structure synthetic codes settings counted",
     "actions drawings polygons rows sparsity resultants motion soft",
     "assembly snapping",
@@ -55,8 +56,8 @@ ONLY_IN = {
     "dolfinx": {"_fenicsx", "forms"},
     "ufl": {"_fenicsx", "forms"},
     "petsc4py": {"_petsc"},
-    "slepc4py": {"_slepc"},
-    "pint": {"quantities"},
+    "slepc4py": {"_petsc"},
+    "pint": {"units"},
     "ezdxf": {"drawings"},
     "shapely": {"drawings", "polygons", "snapping"},
 }

@@ -1,6 +1,5 @@
 """Films, written in one stroke."""
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.errors import InvalidInput
+from archfem.files import in_one_stroke
 
 Image = NDArray[np.uint8]
 
@@ -24,15 +24,9 @@ def write_film(path: Path, shots: Iterable[Image], fps: float) -> Path:
         shots: pictures (height, width, 3), of even numbers of pixels.
         fps: pictures a second.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-    try:
-        with _writer(draft, fps) as film:
-            for shot in shots:
-                film.append_data(shot)
-        os.replace(draft, path)
-    finally:
-        draft.unlink(missing_ok=True)
+    with in_one_stroke(path) as draft, _writer(draft, fps) as film:
+        for shot in shots:
+            film.append_data(shot)
     return path
 
 

@@ -1,6 +1,5 @@
 """One look for all pictures: colours, sizes, and axes that carry units."""
 
-import os
 from pathlib import Path
 
 import matplotlib
@@ -9,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem.errors import InvalidInput
+from archfem.files import in_one_stroke
 from archfem.structure import Structure
 
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
@@ -81,12 +81,7 @@ def save(figure: Figure, path: str | Path) -> Path:
     kind = target.suffix.removeprefix(".").lower()
     if kind not in kinds:
         raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
-            figure.savefig(draft, format=kind, dpi=300)
-        os.replace(draft, target)
-    finally:
-        draft.unlink(missing_ok=True)
+    fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+    with in_one_stroke(target) as draft, matplotlib.rc_context(fonts):
+        figure.savefig(draft, format=kind, dpi=300)
     return target

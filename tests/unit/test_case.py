@@ -10,8 +10,8 @@ from archfem.case import Case
 from archfem.cli import main
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.history import History
-from archfem.quantities import in_unit
 from archfem.schemes import HHT
+from archfem.units import in_unit
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
