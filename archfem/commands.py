@@ -90,7 +90,8 @@ def study(given: argparse.Namespace) -> None:
     print(table)
     written = [folder / "study.txt"]
     if asked.scales is not None:
-        written.append(save(draw_study(found, asked.reduction), folder / "study.png"))
+        factors = {name: each.factors for name, each in found.items()}
+        written.append(save(draw_study(factors, asked.reduction), folder / "study.png"))
     _tell_written(written)
 
 

@@ -49,6 +49,11 @@ class Finding:
         """Least factor that fails by a definition, of each pair (pairs,) [-]."""
         return np.array([found[definition][0] for found in self.scales.values()])
 
+    @property
+    def factors(self) -> dict[str, np.ndarray]:
+        """`least` of each definition."""
+        return {definition: self.least(definition) for definition in DEFINITIONS}
+
 
 def of_run(run: History) -> dict[str, Any]:
     """What a study keeps of a run: maxima by part, and the first mechanism by each definition."""

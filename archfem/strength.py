@@ -9,7 +9,6 @@ import xarray as xr
 
 from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
-from archfem.history import History
 from archfem.models import Model
 from archfem.stress import at_corners, check_state, principal_values
 from archfem.structure import Array, Structure
@@ -35,7 +34,7 @@ def strength_use(model: Model, q: Array) -> xr.Dataset:
     return _use(model.structure, _peaks(model, q[None])[0])
 
 
-def strength_use_over(model: Model, run: History) -> xr.Dataset:
+def strength_use_over(model: Model, run: xr.Dataset) -> xr.Dataset:
     """Largest compression and tension in each block over a run, and how much strength they use.
 
     Only the instants whose fields were kept are looked at; `utilisation` covers all, from the
@@ -43,7 +42,7 @@ def strength_use_over(model: Model, run: History) -> xr.Dataset:
 
     Args:
         model: that was shaken, with a mesh.
-        run: with fields.
+        run: the `dataset` of a history, with fields.
 
     Returns:
         As by `strength_use`, and when they occur, `compression_time` and `tension_time` [s].
@@ -51,14 +50,14 @@ def strength_use_over(model: Model, run: History) -> xr.Dataset:
     Raises:
         InvalidInput: the blocks are rigid, or the run kept no fields, or those of another model.
     """
-    if "q" not in run.dataset:
+    if "q" not in run:
         raise InvalidInput(
             "the run kept no fields, so stress is not known: run it with "
             "record=Record(fields_every=10), or ask utilisation of the joints alone"
         )
-    fields = run.dataset["q"].values
+    fields = run["q"].values
     check_state(model, fields[0])
-    peaks, times = _peaks(model, fields), run.dataset["frame_time"].values
+    peaks, times = _peaks(model, fields), run["frame_time"].values
     result = _use(model.structure, peaks.max(axis=0))
     for row, name in enumerate(("compression", "tension")):
         instant = times[peaks[:, row].argmax(axis=0)]

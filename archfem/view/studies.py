@@ -4,32 +4,34 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from archfem.findings import Finding
-from archfem.verdicts import DEFINITIONS
 from archfem.view.style import EDGE, FAINT, LINES, SMALL, WIDE, dress
 
 
-def draw_study(findings: Mapping[str, Finding], reduction: float = 1.0) -> Figure:
+def draw_study(
+    factors: Mapping[str, Mapping[str, NDArray[np.float64]]], reduction: float = 1.0
+) -> Figure:
     """Draw the factors on the motions at which mechanisms begin, a row for each case.
 
     A mark is the median over the pairs, its line their range; an arrow goes beyond what was tried.
 
     Args:
-        findings: by name of the case, with scales.
+        factors: by name of the case and definition of a mechanism, the least that fails under each
+            pair (pairs,) [-]; infinite where none does.
         reduction: R, drawn as a line at 1 / R beside that of the whole motions.
     """
-    names = list(findings)
+    names, definitions = list(factors), list(next(iter(factors.values())))
     figure = Figure(figsize=(0.75 * WIDE, 1.1 + 0.42 * len(names)), layout="constrained")
     axes = figure.add_subplot()
     dress(axes, "factor on the motions at the first mechanism [-]")
     axes.set_xscale("log")
-    tried = [np.array([f.least(d) for f in findings.values()]) for d in DEFINITIONS]
+    tried = [np.array([each[d] for each in factors.values()]) for d in definitions]
     finite = np.concatenate([each[np.isfinite(each)] for each in tried])
     end = 1.3 * max(finite.max(initial=1.0), 1.0)
-    for number, (definition, factors) in enumerate(zip(DEFINITIONS, tried, strict=True)):
+    for number, (definition, least) in enumerate(zip(definitions, tried, strict=True)):
         rows = np.arange(len(names)) + 0.16 * (number - 1.5)
-        low, middle, high = np.quantile(factors, [0.0, 0.5, 1.0], axis=1, method="nearest")
+        low, middle, high = np.quantile(least, [0.0, 0.5, 1.0], axis=1, method="nearest")
         axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), color=LINES[number], lw=1.4)
         inside = np.isfinite(middle)
         axes.plot(middle[inside], rows[inside], "o", color=LINES[number], ms=5, label=definition)

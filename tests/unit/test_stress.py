@@ -13,7 +13,6 @@ from scipy.integrate import trapezoid
 from archfem.actions import BodyForce
 from archfem.case import Case
 from archfem.errors import InvalidInput
-from archfem.history import History
 from archfem.materials import BACKFILL, STONE
 from archfem.models.build import build
 from archfem.models.shape import Shape
@@ -215,7 +214,7 @@ def test_a_run_gives_the_largest_of_all_instants(ring_model, dead):
         {"q": (("frame", "coordinate"), factors[:, None] * dead.q)},
         {"frame_time": ("frame", [0.0, 0.1, 0.2])},
     )
-    found = strength_use_over(ring_model, History(dataset))
+    found = strength_use_over(ring_model, dataset)
     still = strength_use(ring_model, dead.q)
     for key in ("compression", "tension", "use"):
         assert found[key].values == pytest.approx(2.5 * still[key].values)
@@ -230,7 +229,7 @@ def test_what_has_no_field_is_refused(ring, ring_model, dead):
         with pytest.raises(InvalidInput, match=r"shape \(3,\), the model 850 coordinates"):
             ask(ring_model, np.zeros(3))
     with pytest.raises(InvalidInput, match=r"no fields.*fields_every.*utilisation"):
-        strength_use_over(ring_model, History(dead.joints))
+        strength_use_over(ring_model, dead.joints)
 
 
 def named(figure, name):
