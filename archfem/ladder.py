@@ -16,9 +16,8 @@ from archfem.actions import BodyForce
 from archfem.compiled.contact import LARGEST
 from archfem.criteria import judged
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.models import Model
+from archfem.models import Model, Prediction
 from archfem.models import build as plain
-from archfem.models.jointed import Jointed, Prediction
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
 from archfem.quadrature import Quadrature
@@ -174,7 +173,6 @@ def choose(
     soil = bool(soft_blocks(structure))
     safety = SAFETY_WITH_SOIL if soil else SAFETY
     probe = best if soil else rigid(structure, rule=Quadrature("exact"))
-    assert isinstance(probe, Jointed)
     damping = damping or _usual_damping(probe)
     window = strongest(motion) if motion is not None else _probe(probe)
     references: dict[float, Array] = {}
@@ -202,9 +200,7 @@ def choose(
             setting.label,
             error,
         )
-    assert isinstance(model, Jointed)
-    model.prediction = Prediction(error, tolerance, setting.dt, tried)
-    return model
+    return model.predicted(Prediction(error, tolerance, setting.dt, tried))
 
 
 def envelope(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
@@ -262,7 +258,7 @@ def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
     return each * int(sum(sides[number] for number in structure.free))
 
 
-def _usual_damping(model: Jointed) -> Rayleigh:
+def _usual_damping(model: Model) -> Rayleigh:
     """Five per cent at the first closed frequency and at three times that."""
     square = eigsh(
         model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
@@ -271,7 +267,7 @@ def _usual_damping(model: Jointed) -> Rayleigh:
     return Rayleigh(0.05, (first, 3.0 * first))
 
 
-def _probe(model: Jointed) -> Motion:
+def _probe(model: Model) -> Motion:
     """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
     weight, low, high = self_weight(model), 0.0, 2.0
     for _ in range(10):

@@ -91,9 +91,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         InvalidInput: dt cannot be meant.
         DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
     """
-    predicted = getattr(model, "prediction", None)
     if dt is None:
-        dt = STEP if predicted is None else predicted.dt
+        dt = model.prediction.dt if model.prediction else STEP
     if not 0.0 < dt <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
     stepper = stepper_for(method, model, motion, damping=damping, scheme=scheme, newton=newton)

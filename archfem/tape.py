@@ -106,9 +106,8 @@ class Tape:
             "signs": SIGNS,
             "versions": versions(),
         }
-        predicted = getattr(self.model, "prediction", None)
-        if predicted is not None:
-            dataset.attrs["predicted_error"] = predicted.error
+        if self.model.prediction:
+            dataset.attrs["predicted_error"] = self.model.prediction.error
         return History(dataset, self.model.structure)
 
 

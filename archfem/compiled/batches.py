@@ -147,7 +147,7 @@ class CompiledStepper:
 
     def _batch(self, state: State, dt: float, times: Array) -> Batch:
         """Take steps up to these times, or up to one whose joints do not settle."""
-        steps, joints = len(times), self.model.joints
+        steps, joints = len(times), self.model.operator
         start = self.method.enter(np.stack([state.q, state.velocity, state.acceleration]))
         series = np.empty((steps + 1, *start.shape))
         series[0] = start
@@ -179,9 +179,9 @@ def compiled_law(model: Jointed) -> tuple[bool, Array, Array, NDArray[np.intp]]:
         Whether facets are exact, and for each point its stiffness (p,) [N/m], that of the whole
         facet where facets are exact, its arm (p,) [m] and its joint (p,).
     """
-    points = model.joints.points
+    points = model.operator.points
     stiffness = points.weight * points.normal_stiffness
-    facets = isinstance(model.joints.law, Facets)
+    facets = isinstance(model.operator.law, Facets)
     if facets:
         stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
     return facets, stiffness, points.arm, points.joint
@@ -189,5 +189,5 @@ def compiled_law(model: Jointed) -> tuple[bool, Array, Array, NDArray[np.intp]]:
 
 def shear_resultants(model: Jointed) -> sparse.csr_matrix:
     """Shear resultant of each joint from coordinates, sparse (n_joints, n)."""
-    joints = model.joints
+    joints = model.operator
     return (joints.sums[0] @ joints.law.shear @ joints.slip).tocsr()

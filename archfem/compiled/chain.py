@@ -50,7 +50,7 @@ WIDEST = 64
 
 def applies(model: Jointed, width: int) -> bool:
     """Whether the blocks follow one another closely enough, their bandwidth being this."""
-    return model.joints.offset is None and width <= WIDEST
+    return model.operator.offset is None and width <= WIDEST
 
 
 def work(model: Jointed, width: int) -> float:
@@ -127,7 +127,7 @@ class ChainMethod(Reordered):
         return self._step[1:]
 
     def _matrices(self, dt: float, share: float, rate: float) -> Matrices:
-        model, joints = self._model, self._model.joints
+        model, joints = self._model, self._model.operator
         always = model.blocks + joints.shear_stiffness()
         parts = [self._ordered(part) for part in (model.mass, self._exact.damping, always)]
         mass, damping, stiffness = parts

@@ -30,12 +30,12 @@ NOTHING = 1e-16
 
 def applies(model: Jointed) -> bool:
     """Whether supports have not moved."""
-    return model.joints.offset is None
+    return model.operator.offset is None
 
 
 def work(model: Jointed) -> float:
     """About how long a step takes with joints that open often, set-up included [µs]."""
-    return 25.0 + POINT * model.joints.opening.shape[0] + (4e-3 + 5.0 / STEPS) * model.mass.nnz
+    return 25.0 + POINT * model.operator.opening.shape[0] + (4e-3 + 5.0 / STEPS) * model.mass.nnz
 
 
 class ComplianceMethod(Reordered):
@@ -94,7 +94,7 @@ class ComplianceMethod(Reordered):
             _rows(mass),
             _rows(damping),
             _rows(closed),
-            _rows(_trimmed(model.joints.opening[:, self._order])),
+            _rows(_trimmed(model.operator.opening[:, self._order])),
             _rows(_trimmed(shear_resultants(model)[:, self._order])),
             self._weight,
             np.ascontiguousarray(model.body[self._order].T),

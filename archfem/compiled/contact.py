@@ -33,12 +33,12 @@ LARGEST = 1200
 def applies(model: Jointed, damping: Rayleigh | None) -> bool:
     """Whether the closed structure falls into modes, few enough to keep all of them."""
     proportional = damping is None or damping.joints != "none"
-    return proportional and model.joints.offset is None and model.size <= LARGEST
+    return proportional and model.operator.offset is None and model.size <= LARGEST
 
 
 def work(model: Jointed) -> float:
     """About how long a step takes with joints that open often, set-up included [µs]."""
-    points, size = model.joints.opening.shape[0], model.size
+    points, size = model.operator.opening.shape[0], model.size
     return 10.0 + POINT * points + 0.5e-3 * points * size + 0.5e-3 * size**3 / STEPS
 
 
@@ -67,7 +67,7 @@ class _Modes:
     @classmethod
     def of(cls, model: Jointed, weight: Array) -> "_Modes":
         squares, shapes = eigh(model.closed().toarray(), model.mass.toarray())
-        joints = model.joints
+        joints = model.operator
         return cls(
             shapes,
             model.mass @ shapes,

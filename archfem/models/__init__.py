@@ -4,13 +4,37 @@ Everything above (structure, mesh, forms) exists to produce a `Model`; everythin
 dynamics, modal analysis) consumes one and never asks how it came about.
 """
 
+from dataclasses import dataclass
 from typing import Protocol, Self
 
 from scipy import sparse
 
 from archfem.actions import Action, Settlement
+from archfem.joints import JointOperator
 from archfem.models.shape import Shape
 from archfem.structure import Array, Structure
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What was predicted of a model when it was chosen.
+
+    Attributes:
+        error: in the largest |e| of the worst joint [-].
+        tolerance: that was asked for [-].
+        dt: time step with which the error is met [s].
+        considered: settings that were tried, the cheapest first, and the error of each.
+    """
+
+    error: float
+    tolerance: float
+    dt: float
+    considered: tuple[tuple[str, float], ...]
+
+    @property
+    def met(self) -> bool:
+        """Whether the error is within the tolerance."""
+        return self.error <= self.tolerance
 
 
 class Model(Protocol):
@@ -28,6 +52,7 @@ class Model(Protocol):
         body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg …].
         shape: how the blocks' points move with q.
         supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        prediction: what was predicted when it was chosen; None where it was asked for by name.
     """
 
     structure: Structure
@@ -38,6 +63,11 @@ class Model(Protocol):
     body: Array
     shape: Shape
     supports: Array
+    prediction: Prediction | None
+
+    @property
+    def operator(self) -> JointOperator | None:
+        """From coordinates to the forces of the joints; None where weak forms give them."""
 
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""
@@ -59,6 +89,9 @@ class Model(Protocol):
 
     def moved(self, supports: Array) -> Self:
         """The same model with its supports moved so far from where they were built."""
+
+    def predicted(self, prediction: Prediction) -> Self:
+        """The same model, with what was predicted of it."""
 
     def load(self, action: Action) -> Array:
         """Generalised forces of an action (n,)."""

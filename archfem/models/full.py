@@ -32,7 +32,7 @@ def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
         mass=mass,
         blocks=forms.stiffness()[free][:, free],
         body=mass @ axes,
-        joints=joint_operator(space, rule),
+        operator=joint_operator(space, rule),
         shape=_shape(space, forms, free),
     )
 

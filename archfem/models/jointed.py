@@ -1,7 +1,7 @@
 """Linear blocks between dry joints: the model behind every rung that has matrices."""
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
@@ -9,31 +9,10 @@ from scipy import sparse
 from archfem.actions import Action, BodyForce, Settlement
 from archfem.joints import JointOperator
 from archfem.kinematics import gaps_of
+from archfem.models import Prediction
 from archfem.models.shape import Shape
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What was predicted of a model when it was chosen.
-
-    Attributes:
-        error: in the largest |e| of the worst joint [-].
-        tolerance: that was asked for [-].
-        dt: time step with which the error is met [s].
-        considered: settings that were tried, the cheapest first, and the error of each.
-    """
-
-    error: float
-    tolerance: float
-    dt: float
-    considered: tuple[tuple[str, float], ...]
-
-    @property
-    def met(self) -> bool:
-        """Whether the error is within the tolerance."""
-        return self.error <= self.tolerance
 
 
 class Jointed:
@@ -51,26 +30,26 @@ class Jointed:
         mass: sparse.csr_matrix,
         blocks: sparse.csr_matrix,
         body: Array,
-        joints: JointOperator,
+        operator: JointOperator,
         shape: Shape,
     ) -> None:
-        pattern = Pattern.of(mass, blocks, joints.couplings())
+        pattern = Pattern.of(mass, blocks, operator.couplings())
         self.structure = structure
         self.fidelity = fidelity
         self.size = mass.shape[0]
         self.mass = pattern.spread(mass)
         self.blocks = pattern.spread(blocks)
         self.body = body
-        self.joints = joints
+        self.operator = operator
         self.shape = shape
         self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
-        self._always = self.blocks.data + pattern.spread(joints.shear_stiffness()).data
-        self._across = joints.normal_stiffness(pattern)
+        self._always = self.blocks.data + pattern.spread(operator.shear_stiffness()).data
+        self._across = operator.normal_stiffness(pattern)
         self.prediction: Prediction | None = None
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
-    def with_joints(self, joints: JointOperator) -> "Jointed":
+    def with_operator(self, operator: JointOperator) -> "Jointed":
         """The same blocks between joints taken in another way."""
         return Jointed(
             self.structure,
@@ -78,7 +57,7 @@ class Jointed:
             mass=self.mass,
             blocks=self.blocks,
             body=self.body,
-            joints=joints,
+            operator=operator,
             shape=self.shape,
         ).moved(self.supports)
 
@@ -90,18 +69,24 @@ class Jointed:
         """The same model with its supports moved: joints open and slip by as much at q = 0."""
         other = copy(self)
         other.supports = supports
-        offset = gaps_of(self.structure, self.joints.points, supports) if supports.any() else None
-        other.joints = replace(self.joints, offset=offset)
+        offset = gaps_of(self.structure, self.operator.points, supports) if supports.any() else None
+        other.operator = replace(self.operator, offset=offset)
         other._last = None
+        return other
+
+    def predicted(self, prediction: Prediction) -> "Jointed":
+        """The same model, with what was predicted of it."""
+        other = copy(self)
+        other.prediction = prediction
         return other
 
     def force(self, q: Array) -> Array:
         """Internal forces of blocks and joints (n,)."""
-        return self.blocks @ q + self.joints.force(q)
+        return self.blocks @ q + self.operator.force(q)
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Derivative of `force`; the same object as before while no point opens or closes."""
-        stiffness = self.joints.stiffness(q)
+        stiffness = self.operator.stiffness(q)
         if self._last is None or not np.array_equal(stiffness, self._last[0]):
             matrix = self._pattern.matrix(self._always + self._across(stiffness))
             self._last = (stiffness, matrix)
@@ -109,16 +94,16 @@ class Jointed:
 
     def closed(self) -> sparse.csr_matrix:
         """Tangent with every joint closed over its whole depth."""
-        whole = self.joints.law.stiffness(np.full(self.joints.opening.shape[0], -1.0))
+        whole = self.operator.law.stiffness(np.full(self.operator.opening.shape[0], -1.0))
         return self._pattern.matrix(self._always + self._across(whole))
 
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints [J]."""
-        return 0.5 * float(q @ (self.blocks @ q)) + self.joints.energy(q)
+        return 0.5 * float(q @ (self.blocks @ q)) + self.operator.energy(q)
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
-        return self.joints.resultants(q)
+        return self.operator.resultants(q)
 
     def load(self, action: Action) -> Array:
         """Generalised forces of an action (n,)."""

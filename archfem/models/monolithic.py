@@ -8,6 +8,7 @@ from scipy import sparse
 from archfem.actions import Settlement
 from archfem.forms import Forms
 from archfem.kinematics import motion_of
+from archfem.models import Prediction
 from archfem.models.full import full
 from archfem.quadrature import Quadrature
 from archfem.space import BrokenSpace
@@ -19,6 +20,7 @@ class Monolithic:
     """A model that asks the compiled UFL forms for everything that depends on displacement."""
 
     fidelity = "monolithic"
+    operator = None
 
     def __init__(self, space: BrokenSpace, rule: Quadrature) -> None:
         linear = full(space, rule)
@@ -37,6 +39,7 @@ class Monolithic:
         self.mass = self._pattern.spread(linear.mass)
         self.blocks = self._pattern.spread(linear.blocks)
         self._closed = linear.closed()
+        self.prediction: Prediction | None = None
 
     def settled(self, settlement: Settlement) -> "Monolithic":
         """The same model with a support that has moved, further than before."""
@@ -51,6 +54,12 @@ class Monolithic:
             nodes = np.flatnonzero(self._owner == number)
             motion = motion_of(self._places[nodes], self.structure.blocks[number].centroid)
             other._everywhere.reshape(-1, 2)[nodes] = motion @ supports[number]
+        return other
+
+    def predicted(self, prediction: Prediction) -> "Monolithic":
+        """The same model, with what was predicted of it."""
+        other = copy(self)
+        other.prediction = prediction
         return other
 
     def _spread(self, q: Array) -> Array:

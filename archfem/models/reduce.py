@@ -37,7 +37,7 @@ def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointe
         mass=product(back, product(model.mass, basis)),
         blocks=product(back, product(model.blocks, basis)),
         body=basis.T @ model.body,
-        joints=model.joints.projected(basis),
+        operator=model.operator.projected(basis),
         shape=replace(
             shape,
             lift=product(shape.lift, basis),
@@ -104,11 +104,11 @@ def _dofs(nodes: Numbers) -> Numbers:
 
 def _faces(model: Jointed) -> list[Numbers]:
     """Nodes on each joint, of both its sides."""
-    rows = abs(model.joints.opening) + abs(model.joints.slip)
-    joint = model.joints.points.joint
+    rows = abs(model.operator.opening) + abs(model.operator.slip)
+    joint = model.operator.points.joint
     return [
         np.unique(rows[np.flatnonzero(joint == number)].indices // 2)
-        for number in range(model.joints.points.count)
+        for number in range(model.operator.points.count)
     ]
 
 
@@ -168,10 +168,10 @@ def _condensed(
 
 def _spanned(model: Jointed, plane: set[int]) -> Jointed:
     """With exact facets, let one facet span each joint between blocks with plane faces."""
-    if not isinstance(model.joints.law, Facets):
+    if not isinstance(model.operator.law, Facets):
         return model
     whole = [set(joint.blocks) <= plane for joint in model.structure.joints]
-    return model.with_joints(model.joints.spanned(whole))
+    return model.with_operator(model.operator.spanned(whole))
 
 
 def modal(model: Jointed, below: float) -> Jointed:
@@ -204,7 +204,7 @@ def _joint_loads(model: Jointed) -> Array:
     They are those of the joint's own law, whatever integrates it: the basis then holds all rigid
     motions of the blocks, without which no mechanism could form.
     """
-    joints, columns = model.joints, []
+    joints, columns = model.operator, []
     for number in range(joints.points.count):
         own = (joints.points.joint == number).astype(float)
         turned = own * (joints.points.arm - 2.0 * np.abs(joints.points.arm).max())

@@ -38,7 +38,7 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
         mass=sparse.diags(diagonal).tocsr(),
         blocks=sparse.csr_matrix((size, size)),
         body=body,
-        joints=rigid_joints(structure, facets, rule),
+        operator=rigid_joints(structure, facets, rule),
         shape=_shape(structure),
     )
 

@@ -202,7 +202,7 @@ class Floor:
     @classmethod
     def of(cls, run: Run) -> "Floor":
         """Take the matrices of the model of a run."""
-        model, points = run.model, run.model.joints.points
+        model, points = run.model, run.model.operator.points
         closed = model.tangent(np.zeros(model.size)).tocsr()
         closed.eliminate_zeros()
         order = reverse_cuthill_mckee(closed, symmetric_mode=True)
@@ -211,7 +211,7 @@ class Floor:
         m, k = (_band(each, width) for each in (mass, stiffness))
         effective = (4.0 / DT**2 + 2.0 / DT * DAMPING.mass) * m
         effective += (1.0 + 2.0 / DT * DAMPING.stiffness) * k
-        opening = model.joints.opening[:, order].tocsr()
+        opening = model.operator.opening[:, order].tocsr()
         opening.sort_indices()
         springs = points.weight * points.normal_stiffness
         times = DT * np.arange(1, run.steps + 1)

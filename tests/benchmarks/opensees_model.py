@@ -51,11 +51,11 @@ def _anticlockwise(places, cell):
 
 def _springs(model) -> None:
     """Put a pair of springs at each joint point, between coinciding nodes or node and ground."""
-    points, count = model.joints.points, len(model.shape.places)
+    points, count = model.operator.points, len(model.shape.places)
     normals = model.structure.normals[points.joint]
     tangents = np.array([joint.tangent for joint in model.structure.joints])[points.joint]
     for point, (normal, tangent) in enumerate(zip(normals, tangents, strict=True)):
-        lower, higher = _ends(model.joints.opening[point], normal)
+        lower, higher = _ends(model.operator.opening[point], normal)
         if lower is None or higher is None:
             count += 1
             ops.node(count, *map(float, model.shape.places[higher if lower is None else lower]))

@@ -204,9 +204,9 @@ def test_cells_of_touching_blocks_meet(make, cell):
     inside = np.setdiff1d(np.arange(len(points)), rim)
     assert np.abs(forces[inside]).max() < 1e-9 * np.abs(forces).max()
     held = [not free.issuperset(joint.blocks) for joint in structure.joints]
-    between = ~np.array(held)[model.joints.points.joint]
-    for gap in (model.joints.opening @ stretched.ravel(), model.joints.slip @ stretched.ravel()):
-        assert np.abs(gap[between]).max() < 1e-12
+    between = ~np.array(held)[model.operator.points.joint]
+    for gaps in (model.operator.opening, model.operator.slip):
+        assert np.abs((gaps @ stretched.ravel())[between]).max() < 1e-12
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])

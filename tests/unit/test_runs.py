@@ -12,6 +12,7 @@ from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import History
 from archfem.mechanism import verified_mechanism
+from archfem.models import Prediction
 from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.runs import CountedMechanism, Record, last_state, time_history
@@ -35,6 +36,16 @@ def motion():
 @pytest.fixture(scope="module")
 def run(model, motion):
     return time_history(model, motion, damping=DAMPING, record=Record(fields_every=50))
+
+
+def test_a_model_knows_what_was_predicted_of_it(model):
+    foreseen = Prediction(error=0.003, tolerance=0.005, dt=0.0025, considered=())
+    chosen = model.predicted(foreseen)
+    assert (chosen.prediction, model.prediction) == (foreseen, None)
+    assert chosen.moved(chosen.supports).prediction == foreseen
+    short = time_history(chosen, Motion.synthetic(duration=0.25, seed=2))
+    assert np.diff(short.time) == pytest.approx(0.0025)
+    assert short.dataset.attrs["predicted_error"] == 0.003
 
 
 def test_what_is_recorded(run, model, motion):

@@ -96,8 +96,8 @@ def test_rigid_is_full_projected_on_rigid_motions():
     mass = basis.T @ (full.mass @ basis)
     assert np.abs(mass - rigid.mass.toarray()).max() < 1e-10 * np.abs(mass).max()
     for rows, own in (
-        (full.joints.opening, rigid.joints.opening),
-        (full.joints.slip, rigid.joints.slip),
+        (full.operator.opening, rigid.operator.opening),
+        (full.operator.slip, rigid.operator.slip),
     ):
         assert np.abs(rows @ basis - own.toarray()).max() < 1e-11  # gmsh places nodes to 1e-12
 

@@ -49,7 +49,7 @@ def test_history_is_that_of_snes(filled, rule, joints, scheme):
     )
     assert fast.dataset.attrs["method"] == "compliance"
     assert fast.dataset.attrs["fallback_steps"] == 0
-    last = model.joints.openings(fast.dataset["last_q"].values)
+    last = model.operator.openings(fast.dataset["last_q"].values)
     assert np.mean(last > 0.0) > 1.0 / 6.0
     for key in ("N", "V", "M"):
         off = np.abs(fast.joints[key] - slow.joints[key]).max()

@@ -95,7 +95,7 @@ def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
         np.ptp(energies(model, Stepper(model, STILL), start, dt, 0.2)) / given
         for dt in (5e-4, 2.5e-4)
     ]
-    opened = ~model.joints.status(dead.q + 0.01 * velocity)
+    opened = ~model.operator.status(dead.q + 0.01 * velocity)
     assert opened.any()
     assert drift[0] < 0.02
     assert drift[1] < 0.6 * drift[0]

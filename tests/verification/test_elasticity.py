@@ -102,7 +102,7 @@ def test_operator_equals_forms(ring, rule, degree, cell):
     everywhere[space.free] = q
     force = forms.force(everywhere)[space.free]
     tangent = forms.tangent(everywhere)[space.free][:, space.free]
-    closed = model.joints.status(q)
+    closed = model.operator.status(q)
     assert 0.3 < closed.mean() < 0.7
     assert np.abs(model.force(q) - force).max() < 1e-12 * np.abs(force).max()
     assert abs(model.tangent(q) - tangent).max() < 1e-12 * abs(tangent).max()

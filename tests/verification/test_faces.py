@@ -41,7 +41,7 @@ def test_a_stone_under_soil_keeps_its_four_corners(models):
 
 
 def test_joints_of_two_stones_are_spanned_those_with_soil_are_not(arch, models):
-    points = np.bincount(models["faces"].joints.points.joint)
+    points = np.bincount(models["faces"].operator.points.joint)
     for joint, count in zip(arch.joints, points, strict=True):
         names = {arch.blocks[number].name for number in joint.blocks}
         assert count == (8 if "backfill" in names else 2)

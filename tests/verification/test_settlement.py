@@ -118,7 +118,7 @@ def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges():
 def test_the_gap_of_a_support_is_its_motion_across_the_joint():
     base = column(breadth=1.0, heights=[1.0])
     model = build(base, fidelity="rigid")
-    gaps = gaps_of(base, model.joints.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]]))
+    gaps = gaps_of(base, model.operator.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(gaps, [[0.02] * 9 if k == 0 else [0.0] * 9 for k in range(2)])
 
 
