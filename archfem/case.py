@@ -16,7 +16,6 @@ from archfem import ground
 from archfem.codes import DesignSpectrum
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
-from archfem.naming import block_number, joint_number
 from archfem.plans import planned
 from archfem.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
 from archfem.settings import Table, change, checked, merged, refuse_unknown, remove
@@ -140,7 +139,7 @@ class Case:
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
         if "free_body" in self.output:
-            block_number([block.name for block in self.structure.blocks], self.output["free_body"])
+            self.structure.block_number(self.output["free_body"])
 
     @property
     def damping(self) -> Rayleigh | EffectiveRayleigh | None:
@@ -161,8 +160,7 @@ class Case:
     @property
     def joints(self) -> tuple[int, ...]:
         """Numbers of the joints to draw over time, which the file may name; none if not said."""
-        names = [joint.name for joint in self.structure.joints]
-        return tuple(joint_number(names, joint) for joint in self.output.get("joints", ()))
+        return tuple(map(self.structure.joint_number, self.output.get("joints", ())))
 
     @property
     def scheme(self) -> Scheme:

@@ -3,7 +3,6 @@
 The drawing is an elevation: x to the right, y upwards.
 """
 
-import difflib
 import json
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from archfem.errors import InvalidInput
+from archfem.naming import did_you_mean
 from archfem.structure import Array
 from archfem.units import in_unit
 
@@ -111,9 +111,8 @@ def _feature(feature: dict[str, Any], name: str, factor: float) -> Outline:
 def _check_properties(told: dict[str, Any], name: str) -> None:
     """Refuse properties that are misspelt or of the wrong kind."""
     for key in set(told) - set(PROPERTIES):
-        near = difflib.get_close_matches(key.lower(), PROPERTIES, 1, 0.8)
-        if near:
-            raise InvalidInput(f"'{name}' has a property '{key}': did you mean '{near[0]}'?")
+        if hint := did_you_mean(key.lower(), PROPERTIES, 0.8):
+            raise InvalidInput(f"'{name}' has a property '{key}': {hint}")
     if told.get("fixed") not in (None, True, False):
         raise InvalidInput(f"'{name}': fixed = {told['fixed']!r} is not true or false")
 

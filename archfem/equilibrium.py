@@ -73,17 +73,7 @@ class RigidBlocks:
     @cached_property
     def length(self) -> float:
         """Unit of length in the programme: the mean depth of a joint [m]."""
-        return float(self.depths.mean())
-
-    @cached_property
-    def depths(self) -> Array:
-        """Depth h of each joint (n_joints,) [m]."""
-        return np.array([joint.depth for joint in self.structure.joints])
-
-    @cached_property
-    def friction(self) -> Array:
-        """Coefficient μ of each joint (n_joints,) [-]."""
-        return np.array([joint.contact.friction for joint in self.structure.joints])
+        return float(self.structure.depths.mean())
 
     @cached_property
     def coordinates(self) -> Array:
@@ -122,7 +112,7 @@ class RigidBlocks:
     @cached_property
     def balance(self) -> sparse.csr_matrix:
         """Balance of each free block, in the programme's units (3 n_free, 3 n_joints)."""
-        sign = np.repeat([-1.0, -1.0, 1.0], len(self.depths))
+        sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
         return sparse.diags(self.coordinates) @ self.kinematics.T @ sparse.diags(sign)
 
     def scaled(self, load: Array) -> Array:
@@ -145,7 +135,7 @@ class RigidBlocks:
     def resultants(self, forces: Array) -> Array:
         """N, V, M from the programme's forces (3 n_joints,): (n_joints, 3) [N, N, N m]."""
         intrados, extrados, shear = self.force * forces.reshape(3, -1)
-        moment = (extrados - intrados) * self.depths / 2.0
+        moment = (extrados - intrados) * self.structure.depths / 2.0
         return np.stack([intrados + extrados, shear, moment], axis=1)
 
 
@@ -270,7 +260,7 @@ class Programme:
 
     def _solve_within(self, limits: Limits) -> Optimum | None:
         """Solve with linear limits only."""
-        joints, extra = len(self.blocks.depths), len(self.prices)
+        joints, extra = len(self.blocks.structure.depths), len(self.prices)
         size = 3 * joints
         cost = np.concatenate([np.zeros(size) if self.cost is None else self.cost, self.prices])
         balance = self.blocks.balance

@@ -7,7 +7,6 @@ import xarray as xr
 
 from archfem.errors import InvalidInput
 from archfem.models.shape import Shape
-from archfem.naming import block_number
 from archfem.resultants import thrust_line
 from archfem.structure import Array, Block, Structure
 
@@ -70,11 +69,10 @@ def forces_on(
             chords, which makes them lighter. By default that of the true outline.
 
     Raises:
-        InvalidInput: the block is fixed, or `joints` has several instants or is of another
-            structure.
-        InvalidStructure: there is no such block.
+        InvalidInput: there is no such block, or it is fixed, or `joints` has several instants or
+            is of another structure.
     """
-    number = block_number([each.name for each in structure.blocks], block)
+    number = structure.block_number(block)
     own = structure.blocks[number]
     if own.fixed:
         raise InvalidInput(
@@ -86,20 +84,20 @@ def forces_on(
             f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
             f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
         )
-    around = [k for k, joint in enumerate(structure.joints) if number in joint.blocks]
-    sense = np.array([1.0 if structure.joints[k].higher == number else -1.0 for k in around])
-    tangents = np.array([structure.joints[k].tangent for k in around])
+    around = np.flatnonzero((structure.pairs == number).any(axis=1))
+    sense = np.where(structure.pairs[around, 1] == number, 1.0, -1.0)
     normal, shear = (sense * joints[key].values[around] for key in ("N", "V"))
-    pushes = normal[:, None] * structure.normals[around] - shear[:, None] * tangents
-    middles = np.array([structure.joints[k].middle for k in around])
+    pushes = normal[:, None] * structure.normals[around]
+    pushes -= shear[:, None] * structure.tangents[around]
     crossings = thrust_line(structure, joints).values[around]
+    crossings = np.where(np.isnan(crossings), structure.middles[around], crossings)
     area, centroid = _area(own, number, shape)
     weight = area * structure.width * own.material.unit_weight
     return FreeBody(
         own,
         (*(structure.joints[k].name for k in around), "weight"),
-        tuple(around),
-        np.concatenate([np.where(np.isnan(crossings), middles, crossings), centroid[None]]),
+        tuple(map(int, around)),
+        np.concatenate([crossings, centroid[None]]),
         np.concatenate([pushes, [[0.0, -weight]]]),
     )
 

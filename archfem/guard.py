@@ -40,7 +40,7 @@ class Guard:
         self.worst = 0.0
         self.largest_displacement = 0.0
         self._balance = Balance(*start.energy[0, :2])
-        self._depth = min(joint.depth for joint in model.structure.joints)
+        self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
         self._told: set[str] = set()

@@ -15,7 +15,7 @@ from archfem.mechanism import (
     first_verified_mechanism,
     verified_mechanism,
 )
-from archfem.naming import one_joint
+from archfem.resultants import one_joint
 from archfem.structure import Structure
 
 SIGNS = (

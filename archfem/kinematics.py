@@ -42,7 +42,7 @@ def rigid_joints(structure: Structure, cells: int, rule: Quadrature) -> JointOpe
     Returns:
         Operator on 3 coordinates a free block [m, m, rad].
     """
-    rules = [rule.on_joint(facets_of(joint.depth, cells)) for joint in structure.joints]
+    rules = [rule.on_joint(facets_of(depth, cells)) for depth in structure.depths]
     points = JointPoints.on(structure, rules)
     size = 3 * len(structure.free)
     places, normals, tangents = _frames(structure, points)
@@ -64,17 +64,16 @@ def gaps_of(structure: Structure, points: JointPoints, motion: Array) -> Array:
     places, normals, tangents = _frames(structure, points)
     jump = np.zeros_like(places)
     centroids = np.array([block.centroid for block in structure.blocks])
-    for side, sign in (("higher", 1.0), ("lower", -1.0)):
-        block = np.array([getattr(joint, side) for joint in structure.joints])[points.joint]
+    for side, sign in enumerate((-1.0, 1.0)):
+        block = structure.pairs[points.joint, side]
         jump += sign * np.einsum("pij,pj->pi", motion_of(places, centroids[block]), motion[block])
     return np.stack([np.sum(normals * jump, axis=1), np.sum(tangents * jump, axis=1)])
 
 
 def _frames(structure: Structure, points: JointPoints) -> tuple[Array, Array, Array]:
     """Places of points on the joints, and the joints' normals and tangents there, each (p, 2)."""
-    tangents = np.array([joint.tangent for joint in structure.joints])[points.joint]
-    middles = np.array([joint.middle for joint in structure.joints])[points.joint]
-    places = middles + points.arm[:, None] * tangents
+    tangents = structure.tangents[points.joint]
+    places = structure.middles[points.joint] + points.arm[:, None] * tangents
     return places, structure.normals[points.joint], tangents
 
 
@@ -84,8 +83,8 @@ def _jump(structure: Structure, points: JointPoints, places: Array, size: int) -
     start[list(structure.free)] = 3 * np.arange(len(structure.free))
     centroids = np.array([block.centroid for block in structure.blocks])
     jump = [sparse.csr_matrix((len(places), size)) for _ in range(2)]
-    for side, sign in (("higher", 1.0), ("lower", -1.0)):
-        block = np.array([getattr(joint, side) for joint in structure.joints])[points.joint]
+    for side, sign in enumerate((-1.0, 1.0)):
+        block = structure.pairs[points.joint, side]
         rows = np.flatnonzero(start[block] >= 0)
         motion = sign * motion_of(places[rows], centroids[block[rows]])
         columns = start[block[rows], None] + np.arange(3)

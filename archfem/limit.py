@@ -216,12 +216,13 @@ def _self_weight(structure: Structure, friction: str | None, strength: float | N
     _checked(friction, strength)
     _check_stiff(structure)
     blocks = RigidBlocks(structure)
-    limits = no_limits(len(blocks.depths))
+    count = len(structure.joints)
+    limits = no_limits(count)
     if friction is not None:
-        limits = friction_limits(blocks.friction, np.zeros_like(blocks.depths))
+        limits = friction_limits(structure.friction, np.zeros(count))
     crushing = None
     if strength is not None:
-        crushing = strength * structure.width * blocks.depths / blocks.force
+        crushing = strength * structure.width * structure.depths / blocks.force
     return Programme(blocks, blocks.scaled(rigid_load(structure, [SELF_WEIGHT])), limits, crushing)
 
 
@@ -267,7 +268,7 @@ def _result(
         motion = motion / asked.blocks.reach(motion)
     least = MOVING * asked.blocks.reach(motion)
     intrados, extrados, slip = asked.blocks.gaps(motion)
-    apart = np.minimum(intrados, extrados) - asked.blocks.friction * abs(slip) > least
+    apart = np.minimum(intrados, extrados) - structure.friction * abs(slip) > least
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
         (int(j), "intrados" if intrados[j] < extrados[j] else "extrados")

@@ -203,8 +203,7 @@ def _check(mesh: Mesh) -> None:
             )
         ends = x[nodes_of(facet)][:, :2]
         covered[number] += np.linalg.norm(ends[1] - ends[0])
-    depth = np.array([joint.depth for joint in structure.joints])
-    wrong = np.flatnonzero(np.abs(covered - depth) > 4.0 * TOUCHING * structure.size)
+    wrong = np.flatnonzero(np.abs(covered - structure.depths) > 4.0 * TOUCHING * structure.size)
     if len(wrong):
         joint = structure.joints[wrong[0]]
         raise MeshError(

@@ -217,7 +217,7 @@ class SupportPath:
         blocks = RigidBlocks(self.model.structure)
         intrados, extrados, slip = blocks.gaps(self.motion)
         normal, shear, moment = np.moveaxis(self.resultants, -1, 0)
-        middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.depths
+        middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.structure.depths
         return normal @ middle + moment @ turn - shear @ slip
 
     def advance(self, border: Array, distance: float) -> bool:

@@ -7,6 +7,7 @@ where the higher block is pushed toward the extrados by its slip.
 import numpy as np
 import xarray as xr
 
+from archfem.naming import number_of
 from archfem.structure import Array, Structure
 
 UNITS = {
@@ -36,7 +37,7 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
     """
     dims = ("joint",) if time is None else ("time", "joint")
     normal, shear, moment = np.moveaxis(resultants, -1, 0)
-    depth = np.array([joint.depth for joint in structure.joints])
+    depth = structure.depths
     closed = normal > 0.0
     safe = np.where(closed, normal, 1.0)
     values = {
@@ -55,11 +56,25 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
         "name": ("joint", [joint.name for joint in structure.joints]),
         "part": ("joint", [joint.part for joint in structure.joints]),
         "depth": ("joint", depth, {"units": "m"}),
-        "friction_limit": ("joint", [joint.contact.friction for joint in structure.joints]),
+        "friction_limit": ("joint", structure.friction),
     }
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates)
+
+
+def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
+    """What is known of one joint, over time where the joints are.
+
+    Args:
+        joints: as made by `joint_dataset`, all of them.
+        joint: name or number.
+
+    Raises:
+        InvalidInput: there is no such joint.
+    """
+    names = [str(name) for name in joints["name"].values]
+    return joints.isel(joint=number_of("joint", names, joint))
 
 
 def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
@@ -72,13 +87,10 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     Returns:
         (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
     """
-    middle = xr.DataArray(
-        np.array([joint.middle for joint in structure.joints]),
-        {"axis": ["x", "y"]},
-        ("joint", "axis"),
+    middle, along = (
+        xr.DataArray(each, {"axis": ["x", "y"]}, ("joint", "axis"))
+        for each in (structure.middles, structure.tangents * structure.depths[:, None])
     )
-    depth = np.array([joint.tangent * joint.depth for joint in structure.joints])
-    reach = xr.DataArray(depth, {"axis": ["x", "y"]}, ("joint", "axis"))
-    line = middle + joints["eccentricity"] * reach
+    line = middle + joints["eccentricity"] * along
     line.attrs = {"units": "m", "long_name": "thrust line"}
     return line.transpose(..., "joint", "axis")

@@ -4,12 +4,12 @@ What a key may hold is written as a unit for a number, a Python type or several,
 unit or type for a list.
 """
 
-import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from archfem.errors import InvalidInput
+from archfem.naming import did_you_mean
 from archfem.units import in_unit
 
 Table = Mapping[str, Any]
@@ -42,8 +42,7 @@ def refuse_unknown(given: Table, keys: Iterable[str], section: str = "") -> None
     """
     for key in given:
         if key not in keys:
-            near = difflib.get_close_matches(key, list(keys), 1)
-            hint = f"did you mean '{near[0]}'?" if near else f"the keys are {sorted(keys)}"
+            hint = did_you_mean(key, keys) or f"the keys are {sorted(keys)}"
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 

@@ -44,7 +44,7 @@ def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
     References:
         Gilbert, Casapulla and Ahmed, Computers & Structures 84 (2006) 873-887.
     """
-    friction = programme.blocks.friction
+    friction = programme.blocks.structure.friction
     mean, old = _thrust(start), start
     for step in range(STEPS):
         share = max(FIRST * FALL**step, LEAST)

@@ -89,10 +89,9 @@ def joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
         entries.append(_interpolation(rules[-1][0], arms, nodes))
     points = JointPoints.on(structure, rules)
     jumps = _jumps(entries, len(space.places))
-    tangents = np.array([joint.tangent for joint in structure.joints])[points.joint]
     opening, slip = (
         _component(jumps, directions)[:, space.free].tocsr()
-        for directions in (structure.normals[points.joint], tangents)
+        for directions in (structure.normals[points.joint], structure.tangents[points.joint])
     )
     return JointOperator(law_of(rule, points), opening, slip)
 

@@ -10,9 +10,8 @@ import xarray as xr
 from archfem.actions import BodyForce
 from archfem.errors import DidNotConverge
 from archfem.models import Model
-from archfem.naming import one_joint
 from archfem.newton import Newton, Solved, Solver, magnitude
-from archfem.resultants import joint_dataset
+from archfem.resultants import joint_dataset, one_joint
 from archfem.structure import Array
 
 SMALLEST_STEP = 1.0 / 64.0

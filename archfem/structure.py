@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.errors import InvalidStructure
+from archfem.geometry import area_of_polygon, area_of_sector, side_of_line
 from archfem.materials import Contact, Material
+from archfem.naming import number_of
 from archfem.units import G
 
 Array = NDArray[np.float64]
@@ -73,12 +75,16 @@ class Block:
             return self.points
         return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
 
+    def side_of(self, line: Array, near: float) -> int:
+        """On which side of a line it lies: 1 left, -1 right, 0 where no straight edge covers it."""
+        return side_of_line(self.points, line, near, arcs=() if self.centre is None else (0, 2))
+
     @cached_property
     def _measures(self) -> tuple[float, Array, float]:
         """Area, centroid, polar second moment of area about the centroid."""
         if self.centre is None:
-            return _polygon(self.points)
-        return _sector(self.points, np.array(self.centre))
+            return area_of_polygon(self.points)
+        return area_of_sector(self.points, np.array(self.centre))
 
     @property
     def area(self) -> float:
@@ -94,30 +100,6 @@ class Block:
     def polar_moment(self) -> float:
         """Polar second moment of area about the centroid [m⁴]."""
         return self._measures[2]
-
-
-def _polygon(points: Array) -> tuple[float, Array, float]:
-    """Area, centroid and polar moment of a polygon, from the triangles to its first vertex."""
-    a, b = points[1:-1] - points[0], points[2:] - points[0]
-    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    area = 0.5 * float(np.sum(twice))
-    if area <= 0.0:
-        return area, points[0], 0.0
-    arm = (twice @ (a + b)) / (6.0 * area)
-    about_first = float(np.sum(twice * np.sum(a * a + a * b + b * b, axis=1))) / 12.0
-    return area, points[0] + arm, about_first - area * float(arm @ arm)
-
-
-def _sector(points: Array, centre: Array) -> tuple[float, Array, float]:
-    """Area, centroid and polar moment of an annular sector."""
-    arm = points - centre
-    radii = np.sort(np.linalg.norm(arm[[0, 2]], axis=1))
-    bisector = arm.sum(axis=0) / np.linalg.norm(arm.sum(axis=0))
-    angle = abs(np.arctan2(arm[0, 0] * arm[1, 1] - arm[0, 1] * arm[1, 0], arm[0] @ arm[1]))
-    area = 0.5 * float(radii[1] ** 2 - radii[0] ** 2) * angle
-    reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
-    about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
-    return area, centre + reach * bisector, about_centre - area * reach**2
 
 
 @dataclass(frozen=True)
@@ -218,6 +200,36 @@ class Structure:
         """Unit normals of the joints, from the lower to the higher block (n_joints, 2)."""
         return np.array([self._normal(joint) for joint in self.joints]).reshape(-1, 2)
 
+    @cached_property
+    def tangents(self) -> Array:
+        """Unit vectors of the joints, from intrados to extrados (n_joints, 2)."""
+        return np.array([joint.tangent for joint in self.joints])
+
+    @cached_property
+    def ends(self) -> Array:
+        """Ends of the joints, intrados first (n_joints, 2, 2) [m]."""
+        return np.array([joint.ends for joint in self.joints])
+
+    @cached_property
+    def middles(self) -> Array:
+        """Mid-points of the joints (n_joints, 2) [m]."""
+        return np.array([joint.middle for joint in self.joints])
+
+    @cached_property
+    def depths(self) -> Array:
+        """Depths h of the joints (n_joints,) [m]."""
+        return np.array([joint.depth for joint in self.joints])
+
+    @cached_property
+    def friction(self) -> Array:
+        """Coefficients μ of the joints (n_joints,) [-]."""
+        return np.array([joint.contact.friction for joint in self.joints])
+
+    @cached_property
+    def pairs(self) -> NDArray[np.intp]:
+        """Numbers of the two blocks at each joint, the lower first (n_joints, 2)."""
+        return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)
+
     def _normal(self, joint: Joint) -> Array:
         """Outward normal of the lower block's edge, which must also be one of the higher's."""
         if not 0 <= joint.lower < joint.higher < len(self.blocks):
@@ -230,9 +242,9 @@ class Structure:
             raise InvalidStructure(
                 f"joint '{joint.name}' is {joint.depth:.3g} m long: its two ends are one point"
             )
-        sides = [_side(self.blocks[number], joint, near) for number in (joint.lower, joint.higher)]
+        sides = [self.blocks[number].side_of(joint.ends, near) for number in sorted(joint.blocks)]
         if sides[0] * sides[1] >= 0:
-            names = [self.blocks[number].name for number in (joint.lower, joint.higher)]
+            names = [self.blocks[number].name for number in sorted(joint.blocks)]
             raise InvalidStructure(
                 f"joint '{joint.name}' lists blocks {names}, which share no face along "
                 f"{joint.intrados}-{joint.extrados} within {near:.1e} m: check which blocks it "
@@ -268,33 +280,23 @@ class Structure:
         return block.material.unit_weight / self.gravity
 
     def joint_number(self, joint: int | str) -> int:
-        """Number of a joint given by number or name."""
-        names = [each.name for each in self.joints]
-        if isinstance(joint, str) and joint in names:
-            return names.index(joint)
-        if isinstance(joint, int) and 0 <= joint < len(names):
-            return joint
-        raise InvalidStructure(f"there is no joint {joint!r}: the joints are {names}")
+        """Number of a joint.
 
+        Args:
+            joint: number or name.
 
-def _side(block: Block, joint: Joint, near: float) -> int:
-    """On which side of a joint a block lies: -1 or 1 where a straight face covers it, else 0.
+        Raises:
+            InvalidInput: there is no such joint; the nearest name is suggested.
+        """
+        return number_of("joint", [each.name for each in self.joints], joint)
 
-    An anticlockwise outline has its inside to the left, so a face that runs with the joint, from
-    intrados to extrados, belongs to a block on its left (1), one against it to a block on its
-    right (-1).
-    """
-    relative = block.points - joint.ends[0]
-    along = relative @ joint.tangent
-    off = relative @ np.array([-joint.tangent[1], joint.tangent[0]])
-    low, high = np.minimum(along, np.roll(along, -1)), np.maximum(along, np.roll(along, -1))
-    on_line = (np.abs(off) <= near) & (np.abs(np.roll(off, -1)) <= near) & (high - low > near)
-    if block.centre is not None:
-        on_line[[0, 2]] = False  # these sides are arcs
-    covered = np.sum(
-        np.where(on_line, np.minimum(high, joint.depth) - np.maximum(low, 0.0), 0.0).clip(0.0)
-    )
-    if abs(covered - joint.depth) > 4.0 * near:
-        return 0
-    edge = int(np.flatnonzero(on_line & (low < joint.depth - near) & (high > near))[0])
-    return 1 if np.roll(along, -1)[edge] > along[edge] else -1
+    def block_number(self, block: int | str) -> int:
+        """Number of a block.
+
+        Args:
+            block: number or name.
+
+        Raises:
+            InvalidInput: there is no such block; the nearest name is suggested.
+        """
+        return number_of("block", [each.name for each in self.blocks], block)

@@ -11,9 +11,9 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
-    "errors tables files laws roles _petsc",
-    "units",
-    "criteria materials quadrature schemes signals oscillator records naming",
+    "errors tables files geometry laws roles _petsc",
+    "units naming",
+    "criteria materials quadrature schemes signals oscillator records",
     "structure synthetic codes settings counted",
     "actions drawings polygons rows sparsity resultants motion soft",
     "assembly snapping",

@@ -71,7 +71,7 @@ def joint_marks(
         limit: of |e| for a hinge [-].
     """
     shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
-    ends = np.array([joint.ends for joint in structure.joints]) + shift
+    ends = structure.ends + shift
     share = 0.5 + joints["eccentricity"].values[:, None]
     carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
     shown = shown_joints(structure)

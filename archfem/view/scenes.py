@@ -118,7 +118,6 @@ def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int])
     times = run.dataset["frame_time"].values[frames]
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
     been = _been(run.joints)
-    still = np.array([joint.ends for joint in structure.joints])
     page = Page(setting, size, run)
     shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
     bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
@@ -127,7 +126,7 @@ def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int])
             joints = run.joints.isel(time=int(step))
             shift = _shift(setting, carriers, q)
             marks = joint_marks(structure, joints, shift=shift)
-            past = (still + shift)[been[step]]
+            past = (structure.ends + shift)[been[step]]
             moving = setting.outlines if time >= setting.since else ()
             yield page.compose(stage.photograph(q, marks, past, moving), joints)
 

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from archfem.models import Model
 from archfem.models.shape import Shape
-from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 from archfem.view.film import Image
-from archfem.view.marks import SWING, Marks, support_outlines
+from archfem.view.marks import SWING, Marks, shown_joints, support_outlines
 from archfem.view.shades import Scale, scale_for, shade
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
@@ -257,9 +256,8 @@ class Stage:
 
 def _disc(structure: Structure) -> float:
     """Radius of a hinge [m]."""
-    parts = judged_parts(joint.part for joint in structure.joints)
-    depth = min(joint.depth for joint in structure.joints if joint.part in parts)
-    return min(DISC * structure.size, SNUG * depth)
+    depths = structure.depths[shown_joints(structure)]
+    return min(DISC * structure.size, SNUG * float(depths.min()))
 
 
 def _go_headless() -> None:

@@ -1,4 +1,4 @@
-"""Joints found by name: in lists, and in case files before anything is run."""
+"""Joints and blocks found by name: in lists, and in case files before anything is run."""
 
 from pathlib import Path
 
@@ -6,15 +6,15 @@ import pytest
 
 from archfem.case import Case
 from archfem.errors import InvalidInput
-from archfem.naming import joint_number
+from archfem.naming import number_of
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
 
 
 def test_by_name_and_by_number():
-    assert joint_number(NAMES, "main arch, joint 5") == 2
-    assert joint_number(NAMES, 2) == 2
+    assert number_of("joint", NAMES, "main arch, joint 5") == 2
+    assert number_of("joint", NAMES, 2) == 2
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_by_name_and_by_number():
 )
 def test_near_misses(joint, says):
     with pytest.raises(InvalidInput, match=says):
-        joint_number(NAMES, joint)
+        number_of("joint", NAMES, joint)
 
 
 def test_a_case_names_joints_or_numbers_them():

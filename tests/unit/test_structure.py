@@ -99,7 +99,7 @@ def test_other_refusals(stack):
         replace(stack, blocks=(*stack.blocks[:2], replace(stack.blocks[2], name="block 1")))
     with pytest.raises(InvalidStructure, match="no block is free"):
         Structure((replace(stack.blocks[0]),), ())
-    with pytest.raises(InvalidStructure, match="no joint 'key'"):
+    with pytest.raises(InvalidInput, match="no joint 'key'"):
         stack.joint_number("key")
     bad = Joint((0, 1), (0.0, 0.0), (0.0, 0.0), STONE_TO_STONE, "point")
     with pytest.raises(InvalidStructure, match="one point"):
@@ -122,3 +122,20 @@ def test_other_refusals(stack):
 def test_wrong_units_are_refused(make, says):
     with pytest.raises(InvalidInput, match=says):
         make()
+
+
+def test_arrays_of_joints_are_those_of_each_joint(stack):
+    for number, joint in enumerate(stack.joints):
+        assert stack.ends[number].tolist() == joint.ends.tolist()
+        assert stack.middles[number].tolist() == joint.middle.tolist()
+        assert stack.tangents[number].tolist() == joint.tangent.tolist()
+        assert stack.depths[number] == joint.depth
+        assert stack.friction[number] == joint.contact.friction
+        assert tuple(stack.pairs[number]) == (joint.lower, joint.higher)
+
+
+def test_blocks_and_joints_by_name_or_number(stack):
+    assert stack.block_number("block 2") == stack.block_number(2) == 2
+    assert stack.joint_number(stack.joints[1].name) == stack.joint_number(1) == 1
+    with pytest.raises(InvalidInput, match="no block 'blok 2': did you mean 'block 2'"):
+        stack.block_number("blok 2")

@@ -1,0 +1,77 @@
+"""Outlines in the plane: area, centroid and polar moment, and on which side of a line they lie."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def area_of_polygon(points: Array) -> tuple[float, Array, float]:
+    """Area, centroid and polar moment of a polygon, from the triangles to its first vertex.
+
+    Args:
+        points: its vertices, anticlockwise (n, 2) [m].
+
+    Returns:
+        Area [m²], centroid (2,) [m], and polar second moment of area about it [m⁴]; where the area
+        is not positive, the first vertex and zero.
+    """
+    a, b = points[1:-1] - points[0], points[2:] - points[0]
+    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = 0.5 * float(np.sum(twice))
+    if area <= 0.0:
+        return area, points[0], 0.0
+    arm = (twice @ (a + b)) / (6.0 * area)
+    about_first = float(np.sum(twice * np.sum(a * a + a * b + b * b, axis=1))) / 12.0
+    return area, points[0] + arm, about_first - area * float(arm @ arm)
+
+
+def area_of_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
+    """Area, centroid and polar moment of an annular sector.
+
+    Args:
+        points: its four vertices, the first and third sides arcs (4, 2) [m].
+        centre: of the arcs (2,) [m].
+
+    Returns:
+        Area [m²], centroid (2,) [m], and polar second moment of area about it [m⁴].
+    """
+    arm = points - centre
+    radii = np.sort(np.linalg.norm(arm[[0, 2]], axis=1))
+    bisector = arm.sum(axis=0) / np.linalg.norm(arm.sum(axis=0))
+    angle = abs(np.arctan2(arm[0, 0] * arm[1, 1] - arm[0, 1] * arm[1, 0], arm[0] @ arm[1]))
+    area = 0.5 * float(radii[1] ** 2 - radii[0] ** 2) * angle
+    reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
+    about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
+    return area, centre + reach * bisector, about_centre - area * reach**2
+
+
+def side_of_line(points: Array, line: Array, near: float, arcs: Sequence[int] = ()) -> int:
+    """On which side of a line an outline lies that covers it with straight edges.
+
+    An anticlockwise outline has its inside to the left, so an edge that runs with the line belongs
+    to an outline on its left, one against it to an outline on its right.
+
+    Args:
+        points: vertices, anticlockwise (n, 2) [m].
+        line: its start and end (2, 2) [m].
+        near: distance of points that count as one [m].
+        arcs: numbers of the sides that are not straight.
+
+    Returns:
+        1 for left, -1 for right, 0 where the edges do not cover the line.
+    """
+    length = float(np.linalg.norm(line[1] - line[0]))
+    tangent = (line[1] - line[0]) / length
+    along = (points - line[0]) @ tangent
+    off = (points - line[0]) @ np.array([-tangent[1], tangent[0]])
+    low, high = np.minimum(along, np.roll(along, -1)), np.maximum(along, np.roll(along, -1))
+    on_line = (np.abs(off) <= near) & (np.abs(np.roll(off, -1)) <= near) & (high - low > near)
+    on_line[list(arcs)] = False
+    covered = np.where(on_line, np.minimum(high, length) - np.maximum(low, 0.0), 0.0).clip(0.0)
+    if abs(np.sum(covered) - length) > 4.0 * near:
+        return 0
+    edge = int(np.flatnonzero(on_line & (low < length - near) & (high > near))[0])
+    return 1 if np.roll(along, -1)[edge] > along[edge] else -1
