@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from archfem.direction import Direction, directions_of
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import Contact
 from archfem.roles import part_role
-from archfem.rows import Row, rows_of
 from archfem.structure import TOUCHING, Array, Block, Joint, Structure
 from archfem.units import G
 
@@ -58,19 +58,19 @@ def assembled(
     known = {frozenset(joint.blocks) for joint in joints}
     counted = {joint.part for joint in joints}
     touches = touching(blocks)
-    rows = rows_of(blocks, touches)
+    ways = directions_of(blocks, touches)
     of = contact if callable(contact) else lambda *_: contact
-    across: dict[str, list[Joint]] = {part: [] for part in rows}
+    across: dict[str, list[Joint]] = {part: [] for part in ways}
     others = []
     for a, b, ends in touches:
         if {a, b} not in known:
-            part = _part(blocks[a], blocks[b], ends, rows)
+            part = _part(blocks[a], blocks[b], ends, ways)
             made = _joint((a, b), ends, of(blocks[a], blocks[b]), part)
-            if part in rows and part not in counted and rows[part].separates(ends):
+            if part in ways and part not in counted and ways[part].separates(ends):
                 across[part].append(made)
             else:
                 others.append(made)
-    lined = [each for part in rows for each in _counted(across[part], part, rows[part], blocks)]
+    lined = [each for part in ways for each in _counted(across[part], part, ways[part], blocks)]
     made_all = (*joints, *lined, *_named(others, blocks))
     return Structure(tuple(blocks), made_all, width, gravity, name)
 
@@ -161,7 +161,7 @@ def _joined(lines: list[Array], near: float) -> list[Array]:
 
 
 def _continues(line: Array, other: Array, near: float) -> bool:
-    """Whether a line goes on where another ends, in the same direction."""
+    """Whether a line goes on where another ends, in the same way."""
     arm, step = other[1] - other[0], line[1] - line[0]
     bend = abs(arm[0] * step[1] - arm[1] * step[0]) / np.linalg.norm(arm)
     return bool(_distance((line[0], other[1])) <= 2.0 * near and bend <= 2.0 * near)
@@ -178,14 +178,14 @@ def _turned(line: Array) -> Array:
     return line if forward else line[::-1]
 
 
-def _part(a: Block, b: Block, line: Array, rows: Mapping[str, Row]) -> str:
+def _part(a: Block, b: Block, line: Array, ways: Mapping[str, Direction]) -> str:
     """Part of a joint between two blocks."""
     if a.fixed != b.fixed:
         return b.part if a.fixed else a.part
     rank = {"other": 0, "ring": 1, "pier": 2}
     for block, other in ((a, b), (b, a)):
-        row, role = rows.get(block.part), part_role(block.part)
-        if row is not None and rank[part_role(other.part)] != rank[role] and row.separates(line):
+        way, role = ways.get(block.part), part_role(block.part)
+        if way is not None and rank[part_role(other.part)] != rank[role] and way.separates(line):
             below = other.centroid[1] < line[:, 1].mean()
             if role == "ring" or (part_role(other.part) == "other" and below):
                 return block.part
@@ -198,9 +198,11 @@ def _joint(pair: tuple[int, int], ends: Array, contact: Contact, part: str) -> J
     return Joint(pair, (x0, y0), (x1, y1), contact, "", part)
 
 
-def _counted(joints: Sequence[Joint], part: str, row: Row, blocks: Sequence[Block]) -> list[Joint]:
+def _counted(
+    joints: Sequence[Joint], part: str, way: Direction, blocks: Sequence[Block]
+) -> list[Joint]:
     """Joints across a row in their order along it, from inside outwards, and with their names."""
-    ordered = sorted(joints, key=lambda joint: row.along(joint.middle))
+    ordered = sorted(joints, key=lambda joint: way.along(joint.middle))
     words = [f"joint {k}" for k in range(len(ordered))]
     if part_role(part) == "pier":
         ordered.sort(key=lambda joint: not _is_foot(joint, blocks))
@@ -210,7 +212,7 @@ def _counted(joints: Sequence[Joint], part: str, row: Row, blocks: Sequence[Bloc
     found = []
     for joint, word in zip(ordered, words, strict=False):
         inner, outer = joint.intrados, joint.extrados
-        if joint.tangent @ row.outward(joint.middle) < 0.0:
+        if joint.tangent @ way.outward(joint.middle) < 0.0:
             inner, outer = outer, inner
         name = f"{part}, {word}" if part else word
         found.append(replace(joint, intrados=inner, extrados=outer, name=name))

@@ -23,7 +23,7 @@ from archfem.motion import Motion
 from archfem.quadrature import Quadrature
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
-from archfem.soft import soft_blocks
+from archfem.softness import soft_blocks
 from archfem.statics import equilibrium, self_weight
 from archfem.structure import Array, Structure
 

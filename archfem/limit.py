@@ -10,18 +10,12 @@ import xarray as xr
 from scipy import sparse
 
 from archfem.actions import BodyForce, PointLoad, Settlement
-from archfem.equilibrium import (
-    Optimum,
-    Programme,
-    RigidBlocks,
-    friction_limits,
-    no_limits,
-    rigid_load,
-)
 from archfem.errors import InvalidInput
+from archfem.programme import Optimum, Programme, friction_limits, no_limits
 from archfem.resultants import joint_dataset
-from archfem.skeleton import yielding_blocks
+from archfem.rigid_blocks import RigidBlocks, rigid_load
 from archfem.sliding import without_dilatancy
+from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
 
 LOG = logging.getLogger("archfem")

@@ -10,10 +10,10 @@ from scipy.optimize import linprog
 
 from archfem.counted import Mechanism, counted_mechanism, mechanism_kind
 from archfem.criteria import HINGE, hinged, opened, sliding
-from archfem.equilibrium import RigidBlocks
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.loops import Loops
+from archfem.rigid_blocks import RigidBlocks
 from archfem.roles import judged_parts
+from archfem.screen import Screen
 from archfem.skeleton import Skeleton, skeleton_of
 from archfem.structure import Array, Structure
 
@@ -140,9 +140,9 @@ class Verifier:
         return judged_parts(left.blocks[number].part for number in left.free)
 
     @cached_property
-    def loops(self) -> Loops:
+    def screen(self) -> Screen:
         """Tells at once of most states that they permit no motion of the judged parts."""
-        return Loops(self.blocks, self.parts)
+        return Screen(self.blocks, self.parts)
 
     def verified(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism:
         """Look for a motion at one instant, as `verified_mechanism` does."""
@@ -172,7 +172,7 @@ class Verifier:
 
     def moving(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism | None:
         """The same, or None at once where rings and piers cannot move."""
-        if not self.loops.permit(self.freedoms(joints, limit)):
+        if not self.screen.permit(self.freedoms(joints, limit)):
             return None
         found = self.verified(joints, limit)
         return None if found.kind == "none" else found

@@ -10,11 +10,11 @@ from scipy.sparse.linalg import splu
 
 from archfem.actions import BodyForce, PointLoad, Settlement
 from archfem.criteria import hinged
-from archfem.equilibrium import RigidBlocks
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
 from archfem.newton import Solver, magnitude
 from archfem.resultants import joint_dataset
+from archfem.rigid_blocks import RigidBlocks
 from archfem.statics import Equilibrium, self_weight
 from archfem.structure import Array
 

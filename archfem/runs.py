@@ -16,10 +16,10 @@ from archfem.history import History
 from archfem.models import Model
 from archfem.motion import Motion
 from archfem.newton import Newton
+from archfem.recorder import Recorder
 from archfem.schemes import Rayleigh, Scheme
 from archfem.statics import Equilibrium, dead_load
 from archfem.steppers import AnyStepper, stepper_for
-from archfem.tape import Tape
 
 logger = logging.getLogger("archfem")
 
@@ -99,17 +99,17 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not isinstance(start, State):
         start = stepper.at_rest((start or dead_load(model, newton)).q)
     first = _first(stepper, start, dt)
-    tape = _tape(stepper, first, dt, record or Record())
+    recorder = _recorder(stepper, first, dt, record or Record())
     number, state, outcome = 0, start, "reached the end of the motion"
     try:
-        tape.add(0, first)
+        recorder.add(0, first)
         # Steps are too small for threads, which only get in each other's way.
         with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
             for batch in stepper.batches(start, dt, motion.duration):
                 reason, size = _reason(until, model, batch)
                 batch = batch.cut(size)
                 state = batch.state(size - 1)
-                tape.add(number + 1, batch)
+                recorder.add(number + 1, batch)
                 number += size
                 bar.update(size)
                 if reason:
@@ -119,9 +119,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         outcome = f"interrupted at {state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
     except DidNotConverge as error:
-        error.history = tape.history(motion, state, f"failed at {state.time:.4g} s: {error}")
+        error.history = recorder.history(motion, state, f"failed at {state.time:.4g} s: {error}")
         raise
-    return tape.history(motion, state, outcome)
+    return recorder.history(motion, state, outcome)
 
 
 def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
@@ -137,10 +137,10 @@ def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
     )
 
 
-def _tape(stepper: AnyStepper, first: Batch, dt: float, record: Record) -> Tape:
-    """An empty tape, and a guard over it."""
+def _recorder(stepper: AnyStepper, first: Batch, dt: float, record: Record) -> Recorder:
+    """An empty recorder with a guard over it."""
     guard = Guard(stepper.model, first)
-    return Tape(stepper.model, stepper.name, dt, record.every, record.fields_every, guard)
+    return Recorder(stepper.model, stepper.name, dt, record.every, record.fields_every, guard)
 
 
 def _bar(start: State, motion: Motion, dt: float) -> tqdm:

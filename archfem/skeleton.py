@@ -4,13 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from archfem.roles import part_role
-from archfem.soft import softness
+from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
-
-YIELDING = 1.0
-"""Stiffness of a block, E / L, over that of its joints, k_n, below which it gives way itself before
-its joints open: about 0.005 for backfill, 40 for a voussoir."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +29,6 @@ class Skeleton:
         whole = np.zeros((self.size, 3))
         whole[list(self.blocks)] = motion
         return whole
-
-
-def yielding_blocks(structure: Structure) -> tuple[int, ...]:
-    """Blocks, neither of rings nor of piers, that deform rather than let their joints open.
-
-    A fill fits itself to what it lies on. Taken as one rigid body it would hold every ring below.
-    """
-    return tuple(
-        number
-        for number in structure.free
-        if part_role(structure.blocks[number].part) == "other"
-        and softness(structure, number).ratio < YIELDING
-    )
 
 
 def skeleton_of(structure: Structure) -> Skeleton:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from archfem.equilibrium import Optimum, Programme, friction_limits
 from archfem.errors import DidNotConverge
+from archfem.programme import Optimum, Programme, friction_limits
 from archfem.structure import Array
 
 RATE = 1e-5

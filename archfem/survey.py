@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from archfem.assembly import assembled, by_materials, touching
+from archfem.direction import Direction, directions_of
 from archfem.drawings import Outline, outlines_in
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import (
@@ -19,7 +20,6 @@ from archfem.materials import (
     Contact,
     Material,
 )
-from archfem.rows import Row, rows_of
 from archfem.snapping import NEARLY, snapped
 from archfem.structure import Array, Block, Structure
 from archfem.units import G
@@ -201,11 +201,11 @@ def _cornered(blocks: list[Block], snap: float) -> tuple[Block, ...]:
                 f"only at ({line[0, 0]:.3f}, {line[0, 1]:.3f}): raise snap = {snap:.3g} m above "
                 "that, or correct the drawing"
             )
-    rows = rows_of(blocks, touches)
-    return tuple(replace(each, corners=_corners(each, rows.get(each.part))) for each in blocks)
+    ways = directions_of(blocks, touches)
+    return tuple(replace(each, corners=_corners(each, ways.get(each.part))) for each in blocks)
 
 
-def _corners(block: Block, row: Row | None) -> tuple[int, int, int, int] | None:
+def _corners(block: Block, way: Direction | None) -> tuple[int, int, int, int] | None:
     """Four clear corners, the first and third side along the row or else the longer, or None."""
     steps = np.roll(block.points, -1, axis=0) - block.points
     before = np.roll(steps, 1, axis=0)
@@ -217,10 +217,10 @@ def _corners(block: Block, row: Row | None) -> tuple[int, int, int, int] | None:
         return None
     corners = block.points[found]
     sides = np.roll(corners, -1, axis=0) - corners
-    if row is None:
+    if way is None:
         measure = np.linalg.norm(sides, axis=1)
     else:
-        measure = -np.abs(sides @ row.outward(block.centroid)) / np.linalg.norm(sides, axis=1)
+        measure = -np.abs(sides @ way.outward(block.centroid)) / np.linalg.norm(sides, axis=1)
     first = int(measure[1] + measure[3] > measure[0] + measure[2])
     a, b, c, d = (int(n) for n in np.roll(found, -first))
     return a, b, c, d

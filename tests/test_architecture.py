@@ -15,14 +15,14 @@ LAYERS = [
     "units naming",
     "criteria materials quadrature schemes signals oscillator records",
     "structure synthetic codes settings counted",
-    "actions drawings polygons rows sparsity resultants motion soft",
+    "actions drawings polygons direction sparsity resultants motion softness rigid_motion",
     "assembly snapping",
     "shapes survey",
     "plans",
     "joints skeleton",
-    "kinematics spectra",
-    "equilibrium measures",
-    "loops",
+    "rigid_joints spectra",
+    "rigid_blocks measures",
+    "screen programme",
     "matching mechanism sliding",
     "limit suite events",
     "capacity ground",
@@ -38,7 +38,7 @@ LAYERS = [
     "compiled guard summary",
     "strength modal steppers",
     "modal_damping findings",
-    "tape",
+    "recorder",
     "runs push",
     "ladder scales",
     "tradeoff case",
@@ -124,9 +124,9 @@ import sys
 for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "ufl"):
     sys.modules[name] = None
 import archfem as af
-from archfem import kinematics, limit, mechanism, resultants, criteria
+from archfem import criteria, limit, mechanism, resultants, rigid_joints
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
-assert kinematics.rigid_joints(ring, 4, kinematics.Quadrature()).opening.shape == (162, 51)
+assert rigid_joints.rigid_joints(ring, 4, rigid_joints.Quadrature()).opening.shape == (162, 51)
 assert af.Motion.synthetic(duration=2.0, seed=1).pga > 0
 """
     subprocess.run([sys.executable, "-c", script], check=True)

@@ -8,7 +8,7 @@ from archfem.models import Model
 from archfem.models.reduce import modal, reduced
 from archfem.models.rigid import rigid
 from archfem.quadrature import Quadrature
-from archfem.soft import soft_blocks, softness
+from archfem.softness import soft_blocks, softness
 from archfem.structure import Structure
 
 logger = logging.getLogger("archfem")

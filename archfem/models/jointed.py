@@ -8,9 +8,9 @@ from scipy import sparse
 
 from archfem.actions import Action, BodyForce, Settlement
 from archfem.joints import JointOperator
-from archfem.kinematics import gaps_of
 from archfem.models import Prediction
 from archfem.models.shape import Shape
+from archfem.rigid_joints import gaps_of
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
 

@@ -7,10 +7,10 @@ from scipy import sparse
 
 from archfem.actions import Settlement
 from archfem.forms import Forms
-from archfem.kinematics import motion_of
 from archfem.models import Prediction
 from archfem.models.full import full
 from archfem.quadrature import Quadrature
+from archfem.rigid_motion import motion_of
 from archfem.space import BrokenSpace
 from archfem.sparsity import Pattern
 from archfem.structure import Array

@@ -17,8 +17,8 @@ from scipy.sparse.linalg import eigsh, splu
 
 from archfem.errors import InvalidInput
 from archfem.joints import Facets
-from archfem.kinematics import motion_of
 from archfem.models.jointed import Jointed
+from archfem.rigid_motion import motion_of
 from archfem.sparsity import product
 from archfem.structure import Array, Structure
 

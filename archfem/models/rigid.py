@@ -5,10 +5,11 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
-from archfem.kinematics import motion_of, rigid_joints
 from archfem.models.jointed import Jointed
 from archfem.models.shape import Shape
 from archfem.quadrature import Quadrature
+from archfem.rigid_joints import rigid_joints
+from archfem.rigid_motion import motion_of
 from archfem.structure import Structure
 
 

@@ -9,9 +9,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from archfem.kinematics import motion_of
 from archfem.limit import Collapse, Outcome
 from archfem.resultants import thrust_line
+from archfem.rigid_motion import motion_of
 from archfem.structure import Array, Structure
 from archfem.view.marks import displaced, swung
 from archfem.view.plots import draw_structure

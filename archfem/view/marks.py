@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.criteria import HINGE, hinged, opened, sliding
-from archfem.equilibrium import RigidBlocks
-from archfem.kinematics import motion_of
 from archfem.models import Model
 from archfem.resultants import thrust_line
+from archfem.rigid_blocks import RigidBlocks
+from archfem.rigid_motion import motion_of
 from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 

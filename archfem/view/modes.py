@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from archfem.errors import InvalidInput
 from archfem.modal import Modes
 from archfem.models.shape import Shape
-from archfem.skeleton import yielding_blocks
+from archfem.softness import yielding_blocks
 from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import support_outlines

@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
 from archfem.history import History
-from archfem.skeleton import yielding_blocks
+from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
 from archfem.view.envelopes import draw_faces
 from archfem.view.marks import Marks, joint_marks

@@ -16,7 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.shape import Shape
 from archfem.resultants import joint_dataset
-from archfem.skeleton import yielding_blocks
+from archfem.softness import yielding_blocks
 from archfem.stress import at_corners, cell_stress, principal_values
 from archfem.structure import Array, Structure
 from archfem.units import MPa, kPa

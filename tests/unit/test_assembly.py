@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from archfem.assembly import assembled, by_materials, touching
+from archfem.direction import directions_of
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
-from archfem.rows import rows_of
 from archfem.shapes import Arch, arch_on_piers, bridge, circular_arch, column
 from archfem.structure import Block
 
@@ -116,8 +116,8 @@ def test_a_flat_arch_points_upwards():
 
 
 def test_the_centre_of_a_ring_is_found(ring):
-    rows = rows_of(ring.blocks, touching(ring.blocks))
-    assert rows["arch"].centre == pytest.approx([0.0, 0.0], abs=1e-9)
+    directions = directions_of(ring.blocks, touching(ring.blocks))
+    assert directions["arch"].centre == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_one_course_on_two_stones_has_two_joints():

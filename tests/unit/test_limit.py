@@ -9,9 +9,9 @@ import pytest
 
 from archfem.actions import BodyForce, PointLoad, Settlement
 from archfem.capacity import minimum_thickness, ring_capacity
-from archfem.kinematics import motion_of
 from archfem.limit import Outcome, collapse_factor, stands
 from archfem.materials import STONE, STONE_TO_STONE
+from archfem.rigid_motion import motion_of
 from archfem.shapes import arch_on_piers, circular_arch, column
 from archfem.units import MPa
 

@@ -6,12 +6,12 @@ import xarray as xr
 
 from archfem.actions import BodyForce
 from archfem.counted import counted_mechanism, mechanism_kind
-from archfem.equilibrium import RigidBlocks
 from archfem.errors import InvalidInput
-from archfem.kinematics import motion_of
 from archfem.limit import collapse_factor
 from archfem.mechanism import first_verified_mechanism, verified_mechanism
 from archfem.resultants import joint_dataset
+from archfem.rigid_blocks import RigidBlocks
+from archfem.rigid_motion import motion_of
 from archfem.roles import part_role
 from archfem.shapes import arch_on_piers, circular_arch, column
 

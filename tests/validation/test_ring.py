@@ -79,7 +79,7 @@ def test_every_block_is_in_balance(fidelity):
 
 def test_rigid_is_full_projected_on_rigid_motions():
     """Same joint quadrature: BᵀMB and G B of the full model are the rigid model's own."""
-    from archfem.kinematics import motion_of
+    from archfem.rigid_motion import motion_of
 
     ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
     full, rigid = build(ring, cells=(3, 3)), build(ring, cells=(3, 3), fidelity="rigid")

@@ -5,10 +5,11 @@ import pytest
 
 from archfem.actions import Settlement
 from archfem.errors import InvalidInput
-from archfem.kinematics import gaps_of, motion_of
 from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.newton import Newton
+from archfem.rigid_joints import gaps_of
+from archfem.rigid_motion import motion_of
 from archfem.runs import time_history
 from archfem.shapes import circular_arch, column
 from archfem.statics import dead_load

@@ -21,7 +21,7 @@ _EFFORT = {
 
 
 @dataclass
-class Tape:
+class Recorder:
     """What has been recorded so far.
 
     Attributes:
@@ -32,7 +32,7 @@ class Tape:
         fields_every: coordinates are kept at every n-th step; None keeps none.
         guard: watches over what is recorded.
         halved: steps that had to be halved.
-        fallback: steps that the contact stepper left to SNES.
+        fallback: steps that a compiled stepper left to SNES.
     """
 
     model: Model

@@ -1,4 +1,4 @@
-"""Rows of stones: which way a ring or a pier runs, so that its joints can be told and counted.
+"""Which way a ring or a pier runs, so that its joints can be told and counted.
 
 A surveyed ring says nothing of its centre. It is found from the stones: the circle that fits the
 mid-points of the joints between them best (Kåsa, IEEE Transactions on Instrumentation and
@@ -15,18 +15,18 @@ from archfem.roles import part_role
 from archfem.structure import Array, Block
 
 STRAIGHT = 0.005
-"""Spread of a row across its length, relative to that along it, up to which it has no centre: a
-circle embracing 2.5° has as much."""
+"""Spread of a ring's stones across its length, relative to that along it, up to which it has no
+centre: a circle embracing 2.5° has as much."""
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
-    """A ring or a pier as a row of stones.
+class Direction:
+    """Which way a ring or a pier runs.
 
     Attributes:
-        middle: of the row (2,) [m].
+        middle: of its stones (2,) [m].
         centre: of the circle that it follows (2,) [m]; None where it is straight.
-        upright: for a straight row, whether it stands rather than lies.
+        upright: for a straight one, whether it stands rather than lies.
     """
 
     middle: Array
@@ -34,19 +34,19 @@ class Row:
     upright: bool
 
     def outward(self, place: Array) -> Array:
-        """Unit vector (2,) from the inner to the outer face; to the right in an upright row."""
+        """Unit vector (2,) from the inner to the outer face; to the right of one that stands."""
         if self.centre is None:
             return np.array([1.0, 0.0] if self.upright else [0.0, 1.0])
         arm = place - self.centre
         return arm / np.linalg.norm(arm)
 
     def separates(self, line: Array) -> bool:
-        """Whether a line (2, 2) lies across the row, as the joints between its stones do."""
+        """Whether a line (2, 2) lies across, as the joints between its stones do."""
         step = line[1] - line[0]
         return bool(2.0 * (step @ self.outward(line.mean(axis=0))) ** 2 > step @ step)
 
     def along(self, place: Array) -> float:
-        """Where a place lies along the row: to the right, upwards, or clockwise about the centre.
+        """Where a place lies along: to the right, upwards, or clockwise about the centre.
 
         Angles count from the gap that the ring leaves open, so from the left springing.
         """
@@ -57,8 +57,10 @@ class Row:
         return float(clockwise if gap[1] <= 0.0 else -clockwise)
 
 
-def rows_of(blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]) -> dict[str, Row]:
-    """Find the rows that rings and piers are, by the names of their parts; without a name none is.
+def directions_of(
+    blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]
+) -> dict[str, Direction]:
+    """Find which way rings and piers run, by the names of their parts; only named ones are found.
 
     Args:
         blocks: of a structure.
@@ -76,17 +78,17 @@ def rows_of(blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]) ->
     for part, found in stones.items():
         middles = beds.get(part, [])
         stones[part] = middles if len(middles) > 2 else [*middles, *found]
-    return {part: _row(np.array(found), part_role(part)) for part, found in stones.items()}
+    return {part: _through(np.array(found), part_role(part)) for part, found in stones.items()}
 
 
-def _row(places: Array, role: str) -> Row:
-    """The row that runs through places (n, 2)."""
+def _through(places: Array, role: str) -> Direction:
+    """The direction of what runs through places (n, 2)."""
     middle = places.mean(axis=0)
     arms = places - middle
     _, spread, axes = np.linalg.svd(np.append(arms, np.zeros((2, 2)), axis=0))
     upright = bool(abs(axes[0, 1]) > abs(axes[0, 0]))
     if role == "pier" or spread[1] <= STRAIGHT * spread[0]:
-        return Row(middle, None, role == "pier" or upright)
+        return Direction(middle, None, role == "pier" or upright)
     design = np.column_stack([2.0 * arms, np.ones(len(arms))])
     found = np.linalg.lstsq(design, np.sum(arms**2, axis=1), rcond=None)[0]
-    return Row(middle, middle + found[:2], upright)
+    return Direction(middle, middle + found[:2], upright)

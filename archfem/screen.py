@@ -1,4 +1,4 @@
-"""Closed loops of blocks: a quick look at whether failed joints can move at all.
+"""A screen of failed joints: a quick look at whether they can move at all.
 
 The gaps g of the joints, openings and slips, fit together where every closed loop of blocks
 closes: Rᵀ g = 0, with R a basis of the self-stresses, Gᵀ R = 0. A motion that the failed joints
@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
-from archfem.equilibrium import RigidBlocks
+from archfem.rigid_blocks import RigidBlocks
 from archfem.structure import Array
 
 SHUT = 1e-5
@@ -31,7 +31,7 @@ ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Loops:
+class Screen:
     """Self-stresses of rigid blocks, and the joints that must move for some parts to move.
 
     Attributes:

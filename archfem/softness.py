@@ -1,8 +1,9 @@
-"""Which blocks are too soft for the lower rungs: their own modes lie in the seismic band."""
+"""How soft blocks are: too soft for the lower rungs, or softer than the joints around them."""
 
 from dataclasses import dataclass
 from math import sqrt
 
+from archfem.roles import part_role
 from archfem.structure import Block, Structure
 
 SEISMIC = 25.0
@@ -13,6 +14,10 @@ CLEAR = 10.0
 
 The inertia that condensation neglects is (f / f_inner)² of what matters: one per cent then.
 """
+
+YIELDING = 1.0
+"""Stiffness of a block, E / L, over that of its joints, k_n, below which it gives way itself before
+its joints open: about 0.005 for backfill, 40 for a voussoir."""
 
 
 @dataclass(frozen=True)
@@ -47,4 +52,17 @@ def soft_blocks(structure: Structure) -> tuple[int, ...]:
     """Blocks whose inner modes reach down to the seismic band: they need all their nodes."""
     return tuple(
         number for number in structure.free if softness(structure, number).inner < CLEAR * SEISMIC
+    )
+
+
+def yielding_blocks(structure: Structure) -> tuple[int, ...]:
+    """Blocks, neither of rings nor of piers, that deform rather than let their joints open.
+
+    A fill fits itself to what it lies on. Taken as one rigid body it would hold every ring below.
+    """
+    return tuple(
+        number
+        for number in structure.free
+        if part_role(structure.blocks[number].part) == "other"
+        and softness(structure, number).ratio < YIELDING
     )
