@@ -21,7 +21,7 @@ import pandas as pd
 
 import archfem as af
 from archfem.statics import self_weight
-from archfem.view.plots import draw_structure
+from archfem.view.structure import draw_structure
 
 # %% [markdown]
 # ## The structure

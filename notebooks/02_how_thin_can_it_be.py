@@ -23,7 +23,7 @@ from archfem.capacity import minimum_thickness, ring_capacity
 from archfem.limit import collapse_factor
 from archfem.shapes import circular_arch
 from archfem.view.capacity import capacity_figure, collapse_figure
-from archfem.view.plots import draw_structure
+from archfem.view.structure import draw_structure
 
 # %% [markdown]
 # ## The structure

@@ -23,8 +23,8 @@ import pandas as pd
 import archfem as af
 from archfem.push import Stop
 from archfem.view.capacity import collapse_figure
-from archfem.view.plots import draw_structure
 from archfem.view.pushover import draw_pushover
+from archfem.view.structure import draw_structure
 
 # %% [markdown]
 # ## The structure

@@ -24,8 +24,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.plots import draw_structure
 from archfem.view.pushover import draw_pushover
+from archfem.view.structure import draw_structure
 from archfem.view.style import LINES, dress
 
 # %% [markdown]

@@ -29,11 +29,12 @@ from archfem.analysis import at_rest, damping_of
 from archfem.criteria import judged
 from archfem.freebody import forces_on
 from archfem.strength import strength_use, use_table
-from archfem.view.compare import draw_instants, draw_joint
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
 from archfem.view.freebody import draw_free_body
+from archfem.view.joints import draw_joint
 from archfem.view.modes import draw_modes
 from archfem.view.stress import draw_stress
+from archfem.view.structure import draw_instants
 
 quick = "ARCHFEM_QUICK" in os.environ  # coarse, and one short motion: for tests
 meshes = Path(af.__file__).parents[1] / "meshes"

@@ -14,8 +14,8 @@ from archfem.resultants import thrust_line
 from archfem.rigid_motion import motion_of
 from archfem.structure import Array, Structure
 from archfem.view.marks import displaced, swung
-from archfem.view.plots import draw_structure
 from archfem.view.shades import LIGHT_TO_DARK
+from archfem.view.structure import draw_structure
 from archfem.view.style import (
     COLUMN,
     EDGE,

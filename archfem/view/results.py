@@ -17,9 +17,10 @@ from archfem.strength import strength_use, use_table
 from archfem.suite import Suite
 from archfem.view.envelopes import draw_envelope
 from archfem.view.freebody import draw_free_body
+from archfem.view.joints import draw_joint_histories
 from archfem.view.motions import accelerogram, spectra, suite_spectra
-from archfem.view.plots import draw_joint_histories, draw_structure
 from archfem.view.stress import draw_stress
+from archfem.view.structure import draw_structure
 from archfem.view.style import LINES, save
 
 

@@ -21,7 +21,7 @@ from archfem.stress import at_corners, cell_stress, principal_values
 from archfem.structure import Array, Structure
 from archfem.units import MPa, kPa
 from archfem.view.marks import joint_marks
-from archfem.view.plots import draw_blocks, draw_thrust
+from archfem.view.structure import draw_blocks, draw_thrust
 from archfem.view.style import EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
 
 SHADES = LinearSegmentedColormap.from_list(

@@ -14,8 +14,9 @@ from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
 from archfem.roles import part_role
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
+from archfem.view.joints import draw_joint_histories
 from archfem.view.marks import joint_ends, joint_marks
-from archfem.view.plots import draw_joint_histories, draw_structure
+from archfem.view.structure import draw_structure
 from archfem.view.style import save
 
 WEIGHT = 1e4  # normal force in every joint [N]: only signs and ratios matter

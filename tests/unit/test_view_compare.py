@@ -9,7 +9,8 @@ from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.shapes import circular_arch
-from archfem.view.compare import draw_instants, draw_joint
+from archfem.view.joints import draw_joint
+from archfem.view.structure import draw_instants
 
 
 @pytest.fixture(scope="module")

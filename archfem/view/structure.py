@@ -1,7 +1,6 @@
-"""Pictures on paper: a structure at an instant, histories of joints."""
+"""Structures on paper: one at an instant, or several side by side."""
 
-from collections.abc import Sequence
-from textwrap import wrap
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -13,16 +12,12 @@ from matplotlib.patheffects import withStroke
 
 from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
-from archfem.history import History
 from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
-from archfem.view.envelopes import draw_faces
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
-    COLUMN,
     EDGE,
     INK,
-    LINES,
     NORMAL,
     SLIP,
     SMALL,
@@ -36,12 +31,8 @@ from archfem.view.style import (
 )
 from archfem.view.style import HINGE as RED
 
-LETTERS = 20
-"""That fit beside a panel."""
-
-LOOSE = 2.0
-"""Mobilised friction at which its axis ends, relative to the largest coefficient: a joint about
-to open has any value."""
+SNUG = 0.78
+"""Height of a picture among others, relative to one by itself."""
 
 
 def draw_structure(
@@ -79,34 +70,31 @@ def draw_structure(
     return cast(Figure, axes.figure)
 
 
-def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = HINGE) -> Figure:
-    """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
-
-    Lines are interrupted while a joint is open.
+def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> Figure:
+    """Draw several structures, one below the other, with thrust lines and failed joints.
 
     Args:
-        run: what happened.
-        joints: numbers of the joints.
-        limit: of |e| for a hinge [-].
-
-    Raises:
-        InvalidInput: there is no such joint.
+        states: what to call each, the structure, and its joints at one instant or None.
     """
-    _check_numbers(run, joints)
-    rows = 1 + len(joints)
-    figure = Figure(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
-    panels = figure.subplots(rows, 2, sharex=True)
-    for axes in panels[0]:
-        _ground(axes, run)
-    if len(panels[0, 1].lines) > 1:
-        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96)}
-        panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, **above)
-    for (left, right), number in zip(panels[1:], joints, strict=True):
-        _eccentricity(left, run.joints.sel(joint=number), limit)
-        _friction(right, run.joints.sel(joint=number))
-    for axes in panels[-1]:
-        axes.set_xlabel("time [s]", fontsize=SMALL)
-    figure.align_ylabels(panels)
+    wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
+    figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
+    panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    marks: dict[str, Any] = {}
+    for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
+        draw_structure(structure, joints, axes=axes)
+        if joints is not None and "time" in joints.coords:
+            label = f"{label}, t = {float(joints['time']):.3f} s"
+        axes.set_title(label, fontsize=NORMAL, color=INK)
+        axes.label_outer()
+        handles, words = axes.get_legend_handles_labels()
+        marks |= dict(zip(words, handles, strict=True))
+        if axes.get_legend() is not None:
+            axes.get_legend().remove()
+    if marks:
+        figure.legend(
+            handles=list(marks.values()), labels=list(marks), loc="outside lower center", ncols=4,
+            frameon=False, fontsize=SMALL,
+        )  # fmt: skip
     return figure
 
 
@@ -116,16 +104,6 @@ def _check_instant(structure: Structure, joints: xr.Dataset) -> None:
         raise InvalidInput(
             f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
             f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
-        )
-
-
-def _check_numbers(run: History, joints: Sequence[int]) -> None:
-    """There must be such joints."""
-    known = run.joints["joint"].values
-    unknown = [number for number in joints if number not in known]
-    if unknown or not len(joints):
-        raise InvalidInput(
-            f"joints {unknown or 'none'} cannot be drawn: give numbers from 0 to {len(known) - 1}"
         )
 
 
@@ -187,32 +165,3 @@ def _marks(axes: Axes, marks: Marks) -> None:
 def _broken(pieces: Array) -> Array:
     """Pieces of a line (n, 2, 2), one after another, with a break after each (3 n, 2)."""
     return np.insert(pieces, 2, np.nan, axis=1).reshape(-1, 2)
-
-
-def _ground(axes: Axes, run: History) -> None:
-    """Draw the acceleration of the ground."""
-    dress(axes, "", "ground [m/s²]")
-    ground = run.dataset["ground"].values
-    axes.plot(run.time, ground[:, 0], color=INK, lw=0.6, label="horizontal")
-    if ground[:, 1].any():
-        axes.plot(run.time, ground[:, 1], color=LINES[4], lw=0.5, alpha=0.9, label="vertical")
-    axes.set_xlim(run.time[0], run.time[-1])
-
-
-def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
-    """Draw where the thrust crosses a joint, against its faces."""
-    name = "\n".join(wrap(str(joint["name"].values), LETTERS))
-    dress(axes, "", f"{name}\nM / (N h) [-]")
-    draw_faces(axes, limit)
-    axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
-    axes.set_ylim(-0.56, 0.56)
-
-
-def _friction(axes: Axes, joint: xr.Dataset) -> None:
-    """Draw mobilised friction against its limit."""
-    dress(axes, "", "|V| / N [-]")
-    limit = float(joint["friction_limit"])
-    axes.axhspan(limit, LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
-    axes.axhline(limit, color=SLIP, lw=0.9, ls="--")
-    axes.plot(joint["time"], joint["friction"], color=LINES[0], lw=0.6)
-    axes.set_ylim(0.0, LOOSE * limit)
