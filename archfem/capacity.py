@@ -1,14 +1,11 @@
-"""Families of structures: the least thickness that stands, and what rings withstand."""
+"""The least thickness at which a family of structures stands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-import xarray as xr
 
-from archfem.actions import BodyForce
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.limit import collapse_factor, stands
-from archfem.shapes import circular_arch
+from archfem.limit import stands
 from archfem.structure import Structure
 
 THINNEST = 1e-4
@@ -80,34 +77,3 @@ def _size(build: Callable[[float], Structure]) -> float:
         except InvalidStructure as error:
             refusal = error
     raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")
-
-
-def ring_capacity(
-    embraces: Sequence[float], ratios: Sequence[float], *, voussoirs: int = 60
-) -> xr.DataArray:
-    """Compute the horizontal acceleration that turns rings into mechanisms, without sliding.
-
-    Args:
-        embraces: angles that the rings subtend [degrees].
-        ratios: thickness / radius [-].
-        voussoirs: number of stones in each ring.
-
-    Returns:
-        Multiples of g over (embrace, ratio); undefined (NaN) where a ring does not stand.
-    """
-    factors = np.empty((len(embraces), len(ratios)))
-    for row, embrace in enumerate(embraces):
-        for column, ratio in enumerate(ratios):
-            ring = circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=voussoirs)
-            found = collapse_factor(ring, live=BodyForce(1.0), friction=None)
-            factors[row, column] = found.factor
-    return xr.DataArray(
-        factors,
-        {
-            "embrace": ("embrace", np.array(embraces, dtype=float), {"units": "degree"}),
-            "ratio": ("ratio", np.array(ratios, dtype=float), {"units": "1"}),
-        },
-        ("embrace", "ratio"),
-        name="factor",
-        attrs={"units": "g", "long_name": "horizontal acceleration at collapse"},
-    )

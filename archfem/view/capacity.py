@@ -36,21 +36,6 @@ LEVELS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]
 NEVER = 1e3
 """Height of the map where no acceleration overturns a ring [g]."""
 
-HORIZONTAL = {
-    (120.0, 0.10): 0.580,
-    (120.0, 0.15): 0.913,
-    (120.0, 0.20): 1.264,
-    (180.0, 0.15): 0.144,
-    (180.0, 0.20): 0.284,
-    (157.5, 0.15): 0.37,
-}
-"""Known horizontal accelerations at collapse [g] over (embrace [degrees], t/R); the last one is
-Oppenheim's, Earthquake Eng. Struct. Dyn. 21 (1992) 1005-1017, for 7 voussoirs."""
-
-THINNEST = {120.0: 0.02285, 180.0: 0.1075}
-"""Known least t/R under self-weight over embrace [degrees]; Milankovitch, Z. Math. Phys. 55 (1907)
-1-27, for the semicircle."""
-
 
 def collapse_figure(structure: Structure, found: Collapse) -> Figure:
     """Draw the thrust line in the structure as it stands, over the mechanism that it becomes.
@@ -75,12 +60,16 @@ def collapse_figure(structure: Structure, found: Collapse) -> Figure:
 def capacity_figure(
     capacity: xr.DataArray,
     thinnest: Mapping[float, float],
+    known: Mapping[tuple[float, float], float],
 ) -> Figure:
     """Draw what rings withstand over embrace and thickness, with known values on it.
 
     Args:
-        capacity: as made by `ring_capacity` [g].
+        capacity: horizontal acceleration at collapse over embrace [degrees] and ratio, t/R [g];
+            undefined (NaN) where a ring does not stand.
         thinnest: least t/R under self-weight over embrace [degrees], the edge of the map.
+        known: accelerations over (embrace [degrees], t/R) that are known from elsewhere [g]; zero
+            at the least t/R.
     """
     figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
     axes = figure.add_subplot()
@@ -91,7 +80,7 @@ def capacity_figure(
     edge = np.array(sorted(thinnest.items()))
     axes.fill_between(edge[:, 0], 0.0, edge[:, 1], color="white", zorder=2)
     axes.plot(*edge.T, color=INK, lw=1.6, zorder=3, label="thinnest that stands")
-    _mark_known(axes)
+    _mark_known(axes, known)
     dress(axes, "embrace [°]", "thickness / radius, t/R [-]")
     axes.set_xlim(embraces[0], embraces[-1])
     axes.set_ylim(0.0, ratios[-1])
@@ -151,18 +140,18 @@ def _caption(found: Collapse) -> str:
     return sentence[0].upper() + sentence[1:]
 
 
-def _mark_known(axes: Axes) -> None:
+def _mark_known(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
     """Put known values on the map of capacity."""
-    thin, strong = np.array(list(THINNEST.items())), np.array(list(HORIZONTAL))
-    axes.plot(
-        *thin.T, "D", mfc="white", mec=INK, ms=6, zorder=5, clip_on=False, label="known thinnest"
-    )
-    axes.plot(
-        *strong.T, "o", mfc=HINGE, mec="white", ms=7, zorder=5, clip_on=False, label="known factor"
-    )
-    texts = {point: f"{factor:.3f}".rstrip("0") for point, factor in HORIZONTAL.items()}
-    texts |= {point: f"{point[1]:.4g}" for point in THINNEST.items()}
-    for point, text in texts.items():
+    thin = [point for point, factor in known.items() if factor == 0.0]
+    strong = [point for point, factor in known.items() if factor > 0.0]
+    for points, label, mark in (
+        (thin, "known thinnest", {"marker": "D", "mfc": "white", "mec": INK, "ms": 6}),
+        (strong, "known factor", {"marker": "o", "mfc": HINGE, "mec": "white", "ms": 7}),
+    ):
+        if points:
+            axes.plot(*np.array(points).T, ls="", zorder=5, clip_on=False, label=label, **mark)
+    for point, factor in known.items():
+        text = f"{factor:.3f}".rstrip("0") if factor else f"{point[1]:.4g}"
         note = axes.annotate(
             text, point, (-8, 3), textcoords="offset points", fontsize=SMALL, ha="right", zorder=6
         )

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from archfem.actions import BodyForce, PointLoad
-from archfem.capacity import ring_capacity
 from archfem.limit import collapse_factor
 from archfem.shapes import circular_arch
 from archfem.view.capacity import capacity_figure, collapse_figure
@@ -48,10 +48,13 @@ def test_an_arch_that_falls_has_no_thrust_line():
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):
-    ratios, embraces = [0.05, 0.15, 0.25], [120.0, 150.0, 180.0]
-    figure = capacity_figure(
-        ring_capacity(embraces, ratios, voussoirs=8), {120.0: 0.023, 150.0: 0.054, 180.0: 0.107}
+    capacity = xr.DataArray(
+        [[0.26, 0.92, 1.6], [0.0, 0.45, 0.9], [np.nan, 0.15, 0.42]],
+        {"embrace": [120.0, 150.0, 180.0], "ratio": [0.05, 0.15, 0.25]},
+        ("embrace", "ratio"),
     )
+    known = {(180.0, 0.1075): 0.0, (120.0, 0.02285): 0.0, (120.0, 0.1): 0.58, (120.0, 0.2): 1.264}
+    figure = capacity_figure(capacity, {120.0: 0.023, 150.0: 0.054, 180.0: 0.107}, known)
     axes = figure.axes[0]
     assert {text.get_text() for text in axes.texts} >= {"0.1075", "0.02285", "0.58", "1.264"}
     assert axes.get_ylim() == (0.0, 0.25)
