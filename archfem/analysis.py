@@ -7,11 +7,12 @@ import numpy as np
 
 from archfem.case import Case
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.events import CountedMechanism
 from archfem.history import History
 from archfem.ladder import build, finest
 from archfem.modal_damping import effective_range
 from archfem.motion import Motion
-from archfem.runs import CountedMechanism, Record, time_history
+from archfem.runs import Record, time_history
 from archfem.schemes import EffectiveRayleigh, Rayleigh
 from archfem.statics import Equilibrium, dead_load
 

@@ -7,7 +7,7 @@ import xarray as xr
 
 from archfem.errors import InvalidInput
 from archfem.models.shape import Shape
-from archfem.resultants import thrust_line
+from archfem.resultants import check_instant, thrust_line
 from archfem.structure import Array, Block, Structure
 
 
@@ -79,11 +79,7 @@ def forces_on(
             f"block '{own.name}' is fixed, and what holds it is not known: cut a block free that "
             "can move"
         )
-    if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(structure.joints):
-        raise InvalidInput(
-            f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
-            f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
-        )
+    check_instant(structure, joints)
     around = np.flatnonzero((structure.pairs == number).any(axis=1))
     sense = np.where(structure.pairs[around, 1] == number, 1.0, -1.0)
     normal, shear = (sense * joints[key].values[around] for key in ("N", "V"))

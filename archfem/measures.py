@@ -1,6 +1,6 @@
 """Intensity measures of a motion."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import integrate
@@ -57,8 +57,3 @@ def measures(motion: Motion, component: str = "horizontal") -> Measures:
         significant_duration=end - start,
         duration=(len(samples) - 1) * motion.dt,
     )
-
-
-def summary(motion: Motion) -> dict[str, dict[str, float]]:
-    """Return the measures of every component by name, for tables and files."""
-    return {component: asdict(measures(motion, component)) for component in motion.components}

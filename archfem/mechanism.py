@@ -10,7 +10,8 @@ from scipy.optimize import linprog
 
 from archfem.counted import Mechanism, counted_mechanism, mechanism_kind
 from archfem.criteria import HINGE, hinged, opened, sliding
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge
+from archfem.resultants import check_instant
 from archfem.rigid_blocks import RigidBlocks
 from archfem.roles import judged_parts
 from archfem.screen import Screen
@@ -146,11 +147,7 @@ class Verifier:
 
     def verified(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism:
         """Look for a motion at one instant, as `verified_mechanism` does."""
-        if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(self.structure.joints):
-            raise InvalidInput(
-                f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
-                f"{len(self.structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
-            )
+        check_instant(self.structure, joints)
         scaled = _largest_motion(self.blocks, self.freedoms(joints, limit))
         gaps = (self.blocks.kinematics @ (self.blocks.coordinates * scaled)).reshape(3, -1)
         working = np.flatnonzero(np.abs(gaps).max(axis=0) > MOVING)

@@ -21,7 +21,7 @@ from archfem.statics import Equilibrium
 
 logger = logging.getLogger("archfem")
 
-FIRST = 0.05
+FIRST_SHARE = 0.05
 """Share of the mass along x that the modes up to the first effective one have together."""
 
 FEW, MOST = 32, 1024
@@ -87,8 +87,10 @@ def effective_range(
         InvalidInput: the share is not one, or a single mode has it.
         DidNotConverge: the structure is a mechanism in that state, or modes were not found.
     """
-    if not FIRST < share < 1.0:
-        raise InvalidInput(f"share {share} of the mass is not between {FIRST} and 1: 90 % is 0.9")
+    if not FIRST_SHARE < share < 1.0:
+        raise InvalidInput(
+            f"share {share} of the mass is not between {FIRST_SHARE} and 1: 90 % is 0.9"
+        )
     count = 0
     while count < min(MOST, model.size):
         count = min(max(FEW, 2 * count), MOST, model.size)
@@ -102,7 +104,7 @@ def effective_range(
             "of them is taken for the last effective one",
             *(count, found.frequencies[-1], 100.0 * reached[-1], 100.0 * share),
         )
-    first = int(np.searchsorted(reached, FIRST)) + 1
+    first = int(np.searchsorted(reached, FIRST_SHARE)) + 1
     last = min(int(np.searchsorted(reached, share)) + 1, count)
     if first >= last:
         raise InvalidInput(

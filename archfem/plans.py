@@ -61,7 +61,7 @@ OUTLINES = {
     **COMMON,
 }
 LAYER = {"part": str, "material": str, "fixed": bool, "ignore": bool}
-TOUCHING = {"stone/backfill": "soil to stone"}
+USUAL_CONTACTS = {"stone/backfill": "soil to stone"}
 """How blocks of two materials touch, unless the case says otherwise."""
 SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
     "circular_arch": (circular_arch, RING),
@@ -165,7 +165,7 @@ def _outlines(values: dict[str, Any], settings: Table, folder: Path) -> dict[str
             name: Layer(**checked(own, LAYER, f"structure.layers.{name}"))
             for name, own in drawn["layers"].items()
         }
-    pairs = TOUCHING | drawn.get("contacts", {})
+    pairs = USUAL_CONTACTS | drawn.get("contacts", {})
     named = checked(pairs, dict.fromkeys(pairs, str), "structure.contacts")
     drawn["contacts"] = {pair: _contact(settings, name) for pair, name in named.items()}
     names = {*MATERIALS, *settings.get("materials", {})}

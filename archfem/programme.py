@@ -14,7 +14,7 @@ from archfem.structure import Array
 FEASIBLE = 1e-9
 """Residual of balance and limits that the linear programme accepts, in mean block weights."""
 
-CUT = 1e-7
+EXCESS = 1e-7
 """Largest violation of the crushing limit accepted, as a fraction of the crushing force σ w h."""
 
 CUTS = 60  # rounds of crushing cuts; as tangents of a parabola they need about six
@@ -130,7 +130,7 @@ class Programme:
             thrust = found.forces.reshape(3, -1)[:2].sum(axis=0)
             least = found.forces.reshape(3, -1)[:2].min(axis=0)
             excess = thrust**2 / (2.0 * self.crushing) - least
-            broken = np.flatnonzero(excess > CUT * self.crushing)
+            broken = np.flatnonzero(excess > EXCESS * self.crushing)
             if not len(broken):
                 return found
             limits = limits.with_(crushing_cuts(broken, thrust[broken], self.crushing))

@@ -7,6 +7,7 @@ where the higher block is pushed toward the extrados by its slip.
 import numpy as np
 import xarray as xr
 
+from archfem.errors import InvalidInput
 from archfem.naming import number_of
 from archfem.structure import Array, Structure
 
@@ -61,6 +62,23 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates)
+
+
+def check_instant(structure: Structure, joints: xr.Dataset) -> None:
+    """Refuse joints that are not of one instant of this structure.
+
+    Args:
+        structure: whose joints they should be.
+        joints: as made by `joint_dataset`.
+
+    Raises:
+        InvalidInput: they have several instants, or are of another structure.
+    """
+    if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(structure.joints):
+        raise InvalidInput(
+            f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
+            f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
+        )
 
 
 def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:

@@ -9,7 +9,6 @@ from tqdm import tqdm
 
 from archfem.dynamics import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.events import CountedMechanism as CountedMechanism
 from archfem.events import Event
 from archfem.guard import Guard
 from archfem.history import History

@@ -30,8 +30,8 @@ RUNS = 40
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One run.
+class ScaledRun:
+    """One run of a search.
 
     Attributes:
         scale: factor on the motion [-].
@@ -77,7 +77,7 @@ class Bracket:
 
     lower: float
     upper: float
-    trial: Trial | None
+    trial: ScaledRun | None
     above: tuple[float, ...]
 
     @property
@@ -97,10 +97,10 @@ class MechanismScales:
     """
 
     asked: tuple[str, ...]
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[ScaledRun, ...] = ()
     interrupted: bool = False
 
-    def with_(self, trial: Trial) -> "MechanismScales":
+    def with_(self, trial: ScaledRun) -> "MechanismScales":
         """These and one run more."""
         trials = sorted([*self.trials, trial], key=lambda each: each.scale)
         return MechanismScales(self.asked, tuple(trials))
@@ -193,7 +193,7 @@ def mechanism_scales(
     most = LARGEST_PEAK / peak if peak > 0.0 else inf  # no motion may be stronger
     least, largest = between
 
-    def trial(scale: float) -> Trial:
+    def trial(scale: float) -> ScaledRun:
         try:
             run = time_history(
                 model,
@@ -207,7 +207,7 @@ def mechanism_scales(
             if error.history is None:
                 raise
             run = error.history
-        return Trial(scale, first_mechanisms(run, limit), run.outcome)
+        return ScaledRun(scale, first_mechanisms(run, limit), run.outcome)
 
     asked = (*possible_counts(model.structure), "verified")
     return _searched(
@@ -217,7 +217,7 @@ def mechanism_scales(
 
 def _searched(
     found: MechanismScales,
-    trial: Callable[[float], Trial],
+    trial: Callable[[float], ScaledRun],
     precision: float,
     between: tuple[float, float],
 ) -> MechanismScales:

@@ -11,9 +11,9 @@ from archfem.structure import Array
 RATE = 1e-5
 """Relative change of the objective, and excess of |V| over μ N, at which the iteration ends."""
 
-STEPS = 200
+ROUNDS = 200
 
-FIRST, FALL, LEAST = 0.3, 0.6, 1e-3
+START, FALL, END = 0.3, 0.6, 1e-3
 """Dilatancy as a share of μ: in the first step, its fall from step to step, the least."""
 
 FRESH, STEADY = 0.6, 30
@@ -46,8 +46,8 @@ def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
     """
     friction = programme.blocks.structure.friction
     mean, old = _thrust(start), start
-    for step in range(STEPS):
-        share = max(FIRST * FALL**step, LEAST)
+    for step in range(ROUNDS):
+        share = max(START * FALL**step, END)
         limits = friction_limits(share * friction, (1.0 - share) * friction * mean)
         new = replace(programme, limits=limits).solve()
         if new is None:
@@ -56,12 +56,12 @@ def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
                 "forbid sliding with friction=None, or keep 'coulomb'"
             )
         settled = abs(new.value - old.value) <= RATE * abs(new.value)
-        if share == LEAST and settled and _excess(new, friction) <= RATE:
+        if share == END and settled and _excess(new, friction) <= RATE:
             return new
         fresh = FRESH * min(1.0, STEADY / (step + 1))
         mean, old = fresh * _thrust(new) + (1.0 - fresh) * mean, new
     raise DidNotConverge(
-        f"sliding without dilatancy did not settle in {STEPS} steps: its last objective is "
+        f"sliding without dilatancy did not settle in {ROUNDS} steps: its last objective is "
         f"{old.value:.5g}, with |V| up to {_excess(old, friction):.2g} of the greatest N over μ N"
     )
 

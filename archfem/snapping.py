@@ -23,7 +23,7 @@ NEARLY = 5.0
 """Gaps up to so many times the tolerance are taken for faults of the survey."""
 
 Edge = tuple[int, int]
-Loops = list[list[int]]
+Boundaries = list[list[int]]
 
 
 def snapped(
@@ -51,21 +51,21 @@ def snapped(
     given = np.concatenate(turned)
     places, number = _merged(turned, snap)
     parts = np.split(number, np.cumsum([len(points) for points in turned])[:-1])
-    loops = [[int(n) for n, _ in groupby(part)] for part in parts]
-    loops = [loop[:-1] if loop[0] == loop[-1] else loop for loop in loops]
-    ties = _ties(loops, places, snap)
-    ties |= _bends(loops, places, ties, snap)
+    boundaries = [[int(n) for n, _ in groupby(part)] for part in parts]
+    boundaries = [loop[:-1] if loop[0] == loop[-1] else loop for loop in boundaries]
+    ties = _ties(boundaries, places, snap)
+    ties |= _bends(boundaries, places, ties, snap)
     places = _settled(places, ties)
     moved = np.linalg.norm(places[number] - given, axis=1)
     owners = [name for name, points in zip(names, turned, strict=True) for _ in points]
     _check_moved(moved, given, owners, snap)
-    found = [places[loop] for loop in loops]
-    for name, points, loop in zip(names, found, loops, strict=True):
+    found = [places[loop] for loop in boundaries]
+    for name, points, loop in zip(names, found, boundaries, strict=True):
         if len(loop) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
         check_simple(points, name)
     check_apart(found, names, NEARLY * snap)
-    _check_gaps(places, loops, names, snap)
+    _check_gaps(places, boundaries, names, snap)
     return found, float(moved.max())
 
 
@@ -75,9 +75,9 @@ def _area(points: Array) -> float:
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
-def _edges(loops: Loops) -> Iterator[tuple[int, int, int]]:
+def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
     """Number of a loop, and the two points of each edge of it."""
-    for number, loop in enumerate(loops):
+    for number, loop in enumerate(boundaries):
         for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
             yield number, a, b
 
@@ -111,25 +111,27 @@ def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
     return places, number
 
 
-def _ties(loops: Loops, places: Array, snap: float) -> dict[int, Edge]:
+def _ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, Edge]:
     """Places near the edge of an outline they do not belong to, and the nearest such edge."""
     best: dict[int, tuple[float, Edge]] = {}
-    for number, a, b in _edges(loops):
+    for number, a, b in _edges(boundaries):
         along, off, length = _beside(places, a, b)
         inside = (np.abs(off) <= snap) & (along > 0.0) & (along < length)
-        for place in set(np.flatnonzero(inside).tolist()) - set(loops[number]):
+        for place in set(np.flatnonzero(inside).tolist()) - set(boundaries[number]):
             found = (float(abs(off[place])), (a, b))
             best[place] = min(best.get(place, found), found)
     return {place: edge for place, (_, edge) in best.items()}
 
 
-def _bends(loops: Loops, places: Array, ties: dict[int, Edge], snap: float) -> dict[int, Edge]:
+def _bends(
+    boundaries: Boundaries, places: Array, ties: dict[int, Edge], snap: float
+) -> dict[int, Edge]:
     """Places in the middle of a joint that is straight but for the tolerance, and its ends."""
     on: dict[frozenset[int], list[int]] = {}
     for place, edge in ties.items():
         on.setdefault(frozenset(edge), []).append(place)
-    whole: Loops = [[] for _ in loops]
-    for number, a, b in _edges(loops):
+    whole: Boundaries = [[] for _ in boundaries]
+    for number, a, b in _edges(boundaries):
         along = _beside(places, a, b)[0]
         whole[number] += [a, *sorted(on.get(frozenset((a, b)), []), key=lambda n: along[n])]
     across = {(a, b): number for number, a, b in _edges(whole)}
@@ -174,20 +176,20 @@ def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float)
         )
 
 
-def _check_gaps(places: Array, loops: Loops, names: Sequence[str], snap: float) -> None:
+def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], snap: float) -> None:
     """Refuse blocks that nearly touch."""
     import shapely
 
     near = TOUCHING * float(np.linalg.norm(np.ptp(places, axis=0)))
-    polygons = [shapely.Polygon(places[loop]) for loop in loops]
+    polygons = [shapely.Polygon(places[loop]) for loop in boundaries]
     tree = shapely.STRtree(polygons)
-    first = {place: number for number, loop in reversed([*enumerate(loops)]) for place in loop}
+    first = {place: number for number, loop in reversed([*enumerate(boundaries)]) for place in loop}
     found = []
-    for number, a, b in _edges(loops):
+    for number, a, b in _edges(boundaries):
         along, off, length = _beside(places, a, b)
         beside = (off < -near) & (off >= -NEARLY * snap)
         beside &= (along > -near) & (along < length + near)
-        for place in set(np.flatnonzero(beside).tolist()) - set(loops[number]):
+        for place in set(np.flatnonzero(beside).tolist()) - set(boundaries[number]):
             foot = places[a] + along[place] / length * (places[b] - places[a])
             middle = shapely.Point(0.5 * (foot + places[place]))
             if not len(tree.query(middle, predicate="within")):

@@ -4,19 +4,16 @@
 """
 
 from functools import cache
-from math import isfinite, pi
+from math import isfinite
 from typing import Any
 
 from archfem.errors import InvalidInput
 
 mm = 1e-3  # m
-cm = 1e-2  # m
 kN = 1e3  # N
-MN = 1e6  # N
 kPa = 1e3  # Pa
 MPa = 1e6  # Pa
 GPa = 1e9  # Pa
-deg = pi / 180.0  # rad
 
 G = 9.81
 """Acceleration of gravity wherever none is given [m/s²]."""

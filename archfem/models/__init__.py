@@ -1,7 +1,7 @@
 """The waist of the hourglass: what every model of a structure answers.
 
 Everything above (structure, mesh, forms) exists to produce a `Model`; everything below (statics,
-dynamics, modal analysis) consumes one and never asks how it came about.
+dynamics, modal analysis) consumes one by what is declared here, on whatever rung it stands.
 """
 
 from dataclasses import dataclass

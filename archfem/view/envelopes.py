@@ -16,7 +16,7 @@ from archfem.roles import judged_parts, part_role
 from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
 from archfem.view.style import HINGE as RED
 
-ROW, LEAST = 80, 6
+ROW, ROOM = 80, 6
 """Joints that fit side by side in a wide picture, and those for which a panel has room at least."""
 
 LABEL = "eccentricity e = M / (N h) [-]"
@@ -171,9 +171,9 @@ def _page(sizes: Mapping[str, int]) -> dict[str, Axes]:
     """Empty panels on one page, as wide as their parts have joints, in as many rows as needed."""
     rows: list[dict[str, int]] = [{}]
     for part, size in sizes.items():
-        if rows[-1] and sum(rows[-1].values()) + max(size, LEAST) > ROW:
+        if rows[-1] and sum(rows[-1].values()) + max(size, ROOM) > ROW:
             rows.append({})
-        rows[-1][part] = max(size, LEAST)
+        rows[-1][part] = max(size, ROOM)
     inches = (COLUMN, 3.4) if len(sizes) == 1 else (WIDE, 0.6 + 2.8 * len(rows))
     page, found = Figure(figsize=inches, layout="constrained"), {}
     longest = max(sum(row.values()) for row in rows)

@@ -28,7 +28,7 @@ STILL = 1e-4
 LENGTH, APART = 0.55, 0.14
 """Length of the arrows of a slip, and their distance from the joint, relative to its depth."""
 
-LEAST = 0.03
+SHORTEST = 0.03
 """Depth that arrows are made for at least, relative to the size of the structure."""
 
 
@@ -110,7 +110,7 @@ def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Arr
     """Two arrows that say how a joint slips (2, 7, 2) [m]."""
     joint, normal = structure.joints[number], structure.normals[number]
     sense = np.sign(shear) * joint.tangent
-    depth = max(joint.depth, LEAST * structure.size)
+    depth = max(joint.depth, SHORTEST * structure.size)
     outline = ARROW * LENGTH * depth
     arrow = outline[:, :1] * sense + outline[:, 1:] * normal
     away = APART * depth * normal

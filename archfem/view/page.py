@@ -19,7 +19,7 @@ from archfem.view.shades import Scale
 from archfem.view.stage import Setting
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
-WIDE, DENSE, COARSE = 12.8, 100.0, 60.0
+WIDE, COARSE = 12.8, 60.0
 """Width of a page [inch], and the least of its dots per inch: a smaller page is narrower."""
 
 HEAD, SIDE, FOOT, STRIP, EDGE_ROOM = 0.55, 1.25, 0.45, 1.75, 0.25

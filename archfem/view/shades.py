@@ -14,7 +14,7 @@ from archfem.view.style import STONE
 COLOURS = ("displacement", "stress")
 """What blocks can be coloured by."""
 
-CUT = 0.5
+BEYOND = 0.5
 """Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
 take all of it."""
 
@@ -87,6 +87,6 @@ def scale_for(shape: Shape, fields: Array, colour: str) -> Scale:
     if colour == "displacement":
         highest = float(found.max()) or 1.0
         return Scale(colour, "displacement [mm]", LIGHT_TO_DARK, 0.0, highest, "neither")
-    lowest = min(float(np.percentile(found, CUT)), -1e-6)
+    lowest = min(float(np.percentile(found, BEYOND)), -1e-6)
     label, shades = "least principal stress [MPa]", LIGHT_TO_DARK.reversed()
     return Scale(colour, label, shades, lowest, 0.0, "min")

@@ -23,10 +23,10 @@ from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 Numbers = NDArray[np.intp]
 
 DISC = 0.0125
-"""Radius of a hinge in a picture, relative to the size of the structure; and at most"""
+"""Radius of a hinge in a picture, relative to the size of the structure."""
 
 SNUG = 0.3
-"""relative to the depth of the shallowest joint that is judged."""
+"""The same at most, relative to the depth of the shallowest joint that is drawn."""
 
 FULL = 1100.0
 """Width of a photograph at which lines are as wide as given [pixels]."""

@@ -21,6 +21,7 @@ from archfem.stress import at_corners, cell_stress, principal_values
 from archfem.structure import Array, Structure
 from archfem.units import MPa, kPa
 from archfem.view.marks import joint_marks
+from archfem.view.shades import BEYOND
 from archfem.view.structure import draw_blocks, draw_thrust
 from archfem.view.style import EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
 
@@ -28,9 +29,6 @@ SHADES = LinearSegmentedColormap.from_list(
     "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
 )
 """From none to the largest compression; warm, so that the thrust line stands out."""
-
-CUT = 99.5
-"""Percentage of corners within the scale: else a few on which stones turn would take all of it."""
 
 APART = 0.21
 """Distance between two crosses on paper, and length of the longest arms [inch]."""
@@ -108,7 +106,7 @@ def _shade(axes: Axes, shape: Shape, compression: Array, chosen: Numbers) -> Non
     cells = [c for c, own in zip(shape.cells, shape.owner, strict=True) if own in chosen]
     corners = np.array([[*cell, cell[-1]][:4] for cell in cells])
     shown = compression[np.unique(corners)].clip(0.0)
-    highest = max(float(np.percentile(shown, CUT)), 1.0)
+    highest = max(float(np.percentile(shown, 100.0 - BEYOND)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
     places, triangles = _cut(shape.places[corners])
     painted = axes.tripcolor(

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.criteria import HINGE
-from archfem.errors import InvalidInput
+from archfem.resultants import check_instant
 from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
 from archfem.view.marks import Marks, joint_marks
@@ -62,7 +62,7 @@ def draw_structure(
     axes.set_aspect("equal")
     draw_blocks(axes, structure)
     if joints is not None:
-        _check_instant(structure, joints)
+        check_instant(structure, joints)
         _marks(axes, joint_marks(structure, joints, limit=limit))
         legend(axes)
     axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
@@ -96,15 +96,6 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
             frameon=False, fontsize=SMALL,
         )  # fmt: skip
     return figure
-
-
-def _check_instant(structure: Structure, joints: xr.Dataset) -> None:
-    """Joints must be of one instant, and of this structure."""
-    if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(structure.joints):
-        raise InvalidInput(
-            f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
-            f"{len(structure.joints)} joints of this structure, e.g. joints.isel(time=-1)"
-        )
 
 
 def _title(structure: Structure, joints: xr.Dataset | None) -> str:

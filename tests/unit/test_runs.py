@@ -10,12 +10,13 @@ import xarray as xr
 
 from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.events import CountedMechanism
 from archfem.history import History
 from archfem.mechanism import verified_mechanism
 from archfem.models import Prediction
 from archfem.models.build import build
 from archfem.motion import Motion
-from archfem.runs import CountedMechanism, Record, last_state, time_history
+from archfem.runs import Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.statics import dead_load
 from archfem.summary import pair_table, verdict

@@ -13,7 +13,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.rigid import rigid
 from archfem.motion import LARGEST_PEAK, Motion
 from archfem.runs import time_history
-from archfem.scales import MechanismScales, Trial, mechanism_scales
+from archfem.scales import MechanismScales, ScaledRun, mechanism_scales
 from archfem.schemes import Rayleigh
 from archfem.shapes import arch_on_piers, column
 from archfem.statics import dead_load
@@ -157,7 +157,7 @@ def test_ctrl_c_keeps_what_is_known(on_piers, monkeypatch):
 
 def test_hand_made_trials():
     hit = Mechanism("local", "arch", (1, 2, 3, 4), 1.5)
-    trials = [Trial(scale, {"verified": hit if scale in (2.0, 4.0) else None}, "reached")
+    trials = [ScaledRun(scale, {"verified": hit if scale in (2.0, 4.0) else None}, "reached")
               for scale in (1.0, 2.0, 3.0, 4.0)]  # fmt: skip
     found = MechanismScales(("verified",), tuple(trials))["verified"]
     assert (found.lower, found.upper, found.above) == (1.0, 2.0, (3.0,))

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from archfem.errors import InvalidInput
-from archfem.measures import measures, summary
+from archfem.measures import measures
 from archfem.motion import Motion
 from archfem.spectra import response_spectrum, scaled_to_spectrum
 from archfem.units import STANDARD_GRAVITY
@@ -143,9 +143,3 @@ def test_housner_intensity_sums_the_pseudo_velocity():
     expected = np.sum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(periods))
     # 97 periods in place of 800.
     assert measures(motion).housner == pytest.approx(expected, rel=3e-3)
-
-
-def test_summary_names_every_component():
-    table = summary(Motion.synthetic(seed=2, duration=5.0, pga=2.0))
-    assert table["horizontal"]["pga"] == pytest.approx(2.0)
-    assert table["vertical"]["pga"] == pytest.approx(4.0 / 3.0)
