@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem.roles import part_role
 from archfem.structure import Array, Block
 
 STRAIGHT = 0.005
@@ -61,13 +60,14 @@ def rows_of(blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]) ->
     """Find the rows that rings and piers are, by the names of their parts; without a name none is.
 
     Args:
-        blocks: of a structure.
+        blocks: of a structure, with their roles.
         lines: on which two of them touch, and the numbers of the two.
     """
     stones: dict[str, list[Array]] = {}
     beds: dict[str, list[Array]] = {}
+    roles = {block.part: block.role for block in blocks}
     for block in blocks:
-        if block.part and not block.fixed and part_role(block.part) != "other":
+        if block.part and not block.fixed and block.role != "other":
             stones.setdefault(block.part, []).append(block.centroid)
     for a, b, line in lines:
         part = blocks[a].part
@@ -76,7 +76,7 @@ def rows_of(blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]) ->
     for part, found in stones.items():
         middles = beds.get(part, [])
         stones[part] = middles if len(middles) > 2 else [*middles, *found]
-    return {part: _row(np.array(found), part_role(part)) for part, found in stones.items()}
+    return {part: _row(np.array(found), roles[part]) for part, found in stones.items()}
 
 
 def _row(places: Array, role: str) -> Row:

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from archfem.roles import part_role
 from archfem.soft import softness
 from archfem.structure import Array, Structure
 
@@ -44,8 +43,7 @@ def yielding_blocks(structure: Structure) -> tuple[int, ...]:
     return tuple(
         number
         for number in structure.free
-        if part_role(structure.blocks[number].part) == "other"
-        and softness(structure, number).ratio < YIELDING
+        if structure.blocks[number].role == "other" and softness(structure, number).ratio < YIELDING
     )
 
 

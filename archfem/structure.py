@@ -6,8 +6,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.areas import polygon_measures, sector_measures
 from archfem.errors import InvalidStructure
 from archfem.materials import Contact, Material
+from archfem.roles import judged_parts, with_roles
 from archfem.units import G
 
 Array = NDArray[np.float64]
@@ -32,6 +34,9 @@ class Block:
         part: the part of the structure it belongs to, e.g. "arch" or "north pier".
         centre: where given, the first and third sides of the four-sided outline are arcs about
             this point, and the other two are radial: an annular sector.
+        role: of its part: "ring" or "pier", which are judged, or "other", which follows what
+            carries it. Where nothing of a part tells it, the structure fills it in by the words of
+            the part's name, and warns where they leave it open; without a name a part is a ring.
     """
 
     outline: tuple[Point, ...]
@@ -41,6 +46,7 @@ class Block:
     corners: tuple[int, int, int, int] | None = None
     part: str = ""
     centre: Point | None = None
+    role: str = ""
 
     def __post_init__(self) -> None:
         """Refuse outlines that do not bound an area anticlockwise."""
@@ -77,8 +83,8 @@ class Block:
     def _measures(self) -> tuple[float, Array, float]:
         """Area, centroid, polar second moment of area about the centroid."""
         if self.centre is None:
-            return _polygon(self.points)
-        return _sector(self.points, np.array(self.centre))
+            return polygon_measures(self.points)
+        return sector_measures(self.points, np.array(self.centre))
 
     @property
     def area(self) -> float:
@@ -96,30 +102,6 @@ class Block:
         return self._measures[2]
 
 
-def _polygon(points: Array) -> tuple[float, Array, float]:
-    """Area, centroid and polar moment of a polygon, from the triangles to its first vertex."""
-    a, b = points[1:-1] - points[0], points[2:] - points[0]
-    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    area = 0.5 * float(np.sum(twice))
-    if area <= 0.0:
-        return area, points[0], 0.0
-    arm = (twice @ (a + b)) / (6.0 * area)
-    about_first = float(np.sum(twice * np.sum(a * a + a * b + b * b, axis=1))) / 12.0
-    return area, points[0] + arm, about_first - area * float(arm @ arm)
-
-
-def _sector(points: Array, centre: Array) -> tuple[float, Array, float]:
-    """Area, centroid and polar moment of an annular sector."""
-    arm = points - centre
-    radii = np.sort(np.linalg.norm(arm[[0, 2]], axis=1))
-    bisector = arm.sum(axis=0) / np.linalg.norm(arm.sum(axis=0))
-    angle = abs(np.arctan2(arm[0, 0] * arm[1, 1] - arm[0, 1] * arm[1, 0], arm[0] @ arm[1]))
-    area = 0.5 * float(radii[1] ** 2 - radii[0] ** 2) * angle
-    reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
-    about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
-    return area, centre + reach * bisector, about_centre - area * reach**2
-
-
 @dataclass(frozen=True)
 class Joint:
     """A straight dry joint between two blocks.
@@ -131,6 +113,7 @@ class Joint:
         contact: stiffness and friction.
         name: how a person finds it.
         part: the part of the structure it belongs to; mechanisms are counted by part.
+        role: of that part, as for a block.
     """
 
     blocks: tuple[int, int]
@@ -139,6 +122,7 @@ class Joint:
     contact: Contact
     name: str
     part: str = ""
+    role: str = ""
 
     @property
     def lower(self) -> int:
@@ -176,7 +160,8 @@ class Structure:
     """Blocks in contact along dry joints.
 
     Attributes:
-        blocks: the bodies; fixed ones are abutments.
+        blocks: the bodies; fixed ones are abutments. Their roles, and those of the joints, are
+            filled in where they are not told.
         joints: where they touch.
         width: out-of-plane width w [m].
         gravity: acceleration of gravity, along -y [m/s²].
@@ -190,7 +175,9 @@ class Structure:
     name: str = "structure"
 
     def __post_init__(self) -> None:
-        """Refuse what does not hang together."""
+        """Fill in roles, and refuse what does not hang together."""
+        object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
+        object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
         if not 0.0 < self.width < 1e4:
             raise InvalidStructure(
                 f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
@@ -256,6 +243,12 @@ class Structure:
     def free(self) -> tuple[int, ...]:
         """Numbers of the blocks that move."""
         return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """Whether each joint is judged, as `judged_parts` says of its part (n_joints,)."""
+        parts = judged_parts({joint.part: joint.role for joint in self.joints})
+        return np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
     @cached_property
     def weight(self) -> float:

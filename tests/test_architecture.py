@@ -11,7 +11,8 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
-    "errors units laws roles _petsc",
+    "errors units laws areas _petsc",
+    "roles",
     "criteria materials quadrature quantities schemes signals oscillator records naming _slepc",
     "structure synthetic codes settings counted",
     "actions drawings polygons rows sparsity resultants motion soft",

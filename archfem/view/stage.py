@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from archfem.models import Model
 from archfem.models.shape import Shape
-from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines
@@ -257,8 +256,7 @@ class Stage:
 
 def _disc(structure: Structure) -> float:
     """Radius of a hinge [m]."""
-    parts = judged_parts(joint.part for joint in structure.joints)
-    depth = min(joint.depth for joint in structure.joints if joint.part in parts)
+    depth = min(structure.joints[k].depth for k in np.flatnonzero(structure.judged))
     return min(DISC * structure.size, SNUG * depth)
 
 

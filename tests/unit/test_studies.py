@@ -122,6 +122,7 @@ def finding(**given):
         "case": "text",
         "frequency": 9.0,
         "mass": 0.7,
+        "roles": {"arch": "ring"},
         "dead": {"arch": 0.2},
         "runs": {"a": run, "b": run},
         "scales": {"a": brackets, "b": brackets},
