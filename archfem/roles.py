@@ -113,12 +113,15 @@ def part_role(part: str) -> str:
     named = [role for role in ROLES if singular & WORDS[role]]
     role = named[0] if named else "other"
     if len(named) != 1:
-        why = f"speaks of {' and '.join(named)}" if named else "has no word for what it is"
+        why = f"speaks of {' and '.join(named)}" if named else "has no word that says what it is"
         logger.warning(
-            "part '%s' is taken for %s, though its name %s: set it by Block(role=\"ring\"), or in "
-            'a survey by a property role = "ring" of its outlines or by [structure.layers."%s"] '
-            "role = \"ring\"; roles are 'ring', 'pier' and 'other'",
-            *(part, TAKEN[role], why, part),
+            "part '%s' is taken for %s: its name %s. Set its role to ring, pier or other: "
+            'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or in '
+            '[structure.layers."%s"]',
+            part,
+            TAKEN[role],
+            why,
+            part,
         )
     return role
 

@@ -256,7 +256,8 @@ class Stage:
 
 def _disc(structure: Structure) -> float:
     """Radius of a hinge [m]."""
-    depth = min(structure.joints[k].depth for k in np.flatnonzero(structure.judged))
+    flagged = zip(structure.joints, structure.judged, strict=True)
+    depth = min(joint.depth for joint, judged in flagged if judged)
     return min(DISC * structure.size, SNUG * depth)
 
 
