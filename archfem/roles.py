@@ -116,12 +116,11 @@ def part_role(part: str) -> str:
         why = f"speaks of {' and '.join(named)}" if named else "has no word that says what it is"
         logger.warning(
             "part '%s' is taken for %s: its name %s. Set its role to ring, pier or other: "
-            'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or in '
-            '[structure.layers."%s"]',
+            'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or of '
+            "their layer in [structure.layers]",
             part,
             TAKEN[role],
             why,
-            part,
         )
     return role
 

@@ -163,7 +163,7 @@ def test_an_unknown_name_is_warned_of_once_and_told_how_to_set_it(told):
         assert f"part '{name}' is taken for neither ring nor pier" in said
         assert "its name has no word that says what it is" in said
         assert 'Block(role="ring")' in said
-        assert f'[structure.layers."{name}"]' in said
+        assert "[structure.layers]" in said
     assert set(roles_of(joint_dataset(made, quake(made)[0])).values()) == {"other"}
     assert verdicts(untold(viaduct(*NAMES["arches"]))) == verdicts(viaduct(*NAMES["arches"]))
     assert len(told()) == 3
