@@ -8,7 +8,7 @@ import numpy as np
 from archfem.direction import Direction, directions_of
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import Contact
-from archfem.roles import part_role
+from archfem.roles import with_roles
 from archfem.structure import TOUCHING, Array, Block, Joint, Structure
 from archfem.units import G
 
@@ -41,10 +41,11 @@ def assembled(
 
     A joint belongs to the part of its blocks. Between two parts it belongs to that of the block
     that moves; then to the ring it lies across, as a springing does, or the pier it carries; then
-    to one that is neither ring nor pier; then to the ring.
+    to one that is neither ring nor pier; then to the ring. It has the role of that part.
 
     Args:
-        blocks: in the order they will be numbered.
+        blocks: in the order they will be numbered. Roles that they do not tell go by the names of
+            their parts.
         contact: of the joints found, or a function of the two blocks.
         joints: that are given already; their pairs of blocks are left alone, and their parts are
             not counted.
@@ -53,8 +54,9 @@ def assembled(
         name: of the structure.
 
     Raises:
-        InvalidStructure: blocks do not hang together.
+        InvalidStructure: blocks do not hang together, or roles contradict one another.
     """
+    blocks = with_roles(blocks, joints)
     known = {frozenset(joint.blocks) for joint in joints}
     counted = {joint.part for joint in joints}
     touches = touching(blocks)
@@ -64,15 +66,16 @@ def assembled(
     others = []
     for a, b, ends in touches:
         if {a, b} not in known:
-            part = _part(blocks[a], blocks[b], ends, ways)
-            made = _joint((a, b), ends, of(blocks[a], blocks[b]), part)
+            owner = _owner(blocks[a], blocks[b], ends, ways)
+            part = owner.part
+            made = _joint((a, b), ends, of(blocks[a], blocks[b]), owner)
             if part in ways and part not in counted and ways[part].separates(ends):
                 across[part].append(made)
             else:
                 others.append(made)
     lined = [each for part in ways for each in _counted(across[part], part, ways[part], blocks)]
     made_all = (*joints, *lined, *_named(others, blocks))
-    return Structure(tuple(blocks), made_all, width, gravity, name)
+    return Structure(blocks, made_all, width, gravity, name)
 
 
 def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
@@ -178,24 +181,24 @@ def _turned(line: Array) -> Array:
     return line if forward else line[::-1]
 
 
-def _part(a: Block, b: Block, line: Array, ways: Mapping[str, Direction]) -> str:
-    """Part of a joint between two blocks."""
+def _owner(a: Block, b: Block, line: Array, ways: Mapping[str, Direction]) -> Block:
+    """The one of two blocks to whose part the joint between them belongs."""
     if a.fixed != b.fixed:
-        return b.part if a.fixed else a.part
+        return b if a.fixed else a
     rank = {"other": 0, "ring": 1, "pier": 2}
     for block, other in ((a, b), (b, a)):
-        way, role = ways.get(block.part), part_role(block.part)
-        if way is not None and rank[part_role(other.part)] != rank[role] and way.separates(line):
+        way = ways.get(block.part)
+        if way is not None and other.role != block.role and way.separates(line):
             below = other.centroid[1] < line[:, 1].mean()
-            if role == "ring" or (part_role(other.part) == "other" and below):
-                return block.part
-    return min((b.part, a.part), key=lambda part: rank[part_role(part)])
+            if block.role == "ring" or (other.role == "other" and below):
+                return block
+    return min((b, a), key=lambda block: rank[block.role])
 
 
-def _joint(pair: tuple[int, int], ends: Array, contact: Contact, part: str) -> Joint:
-    """A joint still without a name."""
+def _joint(pair: tuple[int, int], ends: Array, contact: Contact, owner: Block) -> Joint:
+    """A joint of its owner's part, still without a name."""
     (x0, y0), (x1, y1) = ends.tolist()
-    return Joint(pair, (x0, y0), (x1, y1), contact, "", part)
+    return Joint(pair, (x0, y0), (x1, y1), contact, "", owner.part, owner.role)
 
 
 def _counted(
@@ -204,7 +207,7 @@ def _counted(
     """Joints across a row in their order along it, from inside outwards, and with their names."""
     ordered = sorted(joints, key=lambda joint: way.along(joint.middle))
     words = [f"joint {k}" for k in range(len(ordered))]
-    if part_role(part) == "pier":
+    if ordered and ordered[0].role == "pier":
         ordered.sort(key=lambda joint: not _is_foot(joint, blocks))
         feet = sum(_is_foot(joint, blocks) for joint in ordered)
         words = [f"base {k + 1}" for k in range(feet)] if feet > 1 else ["base"]

@@ -1,14 +1,14 @@
 """Mechanisms by counting failed joints, and the classes of mechanisms."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import HINGE, failed
-from archfem.roles import judged_parts, part_role
+from archfem.criteria import HINGE, failed, roles_of
+from archfem.roles import judged_parts
 
 FAILURES = 4
 """Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
@@ -38,12 +38,16 @@ class Mechanism:
     blocks: tuple[int, ...] = ()
 
 
-def mechanism_kind(parts: Collection[str]) -> str:
-    """Class of a mechanism in these judged parts: "none", "local", "semi-global" or "global"."""
-    roles = sorted(role for part in set(parts) if (role := part_role(part)) != "other")
-    if len(roles) < 2:
-        return "local" if parts else "none"
-    return "semi-global" if roles == ["pier", "ring"] else "global"
+def mechanism_kind(roles: Collection[str]) -> str:
+    """Class of a mechanism: "none", "local", "semi-global" or "global".
+
+    Args:
+        roles: of the judged parts that fail or move, one for each.
+    """
+    carrying = sorted(role for role in roles if role != "other")
+    if len(carrying) < 2:
+        return "local" if roles else "none"
+    return "semi-global" if carrying == ["pier", "ring"] else "global"
 
 
 def counted_mechanism(
@@ -75,16 +79,17 @@ def counted_mechanism(
         flags = flags.expand_dims("time")
     flags = flags.transpose("time", "joint")
     part, up = flags["part"].values.astype(str), flags.values
-    names = judged_parts(part)
+    roles = roles_of(joints)
+    names = judged_parts(roles)
     counts = np.array([up[:, part == name].sum(axis=1) for name in names]).reshape(-1, len(up)).T
     for instant in np.flatnonzero(counts.sum(axis=1) >= failures):
         count = dict(zip(names, counts[instant], strict=True))
-        group = _widest_group(count, failures, kinds)
+        group = _widest_group(count, roles, failures, kinds)
         if group:
             time = float(flags["time"][instant])
             numbers = flags["joint"].values[up[instant] & np.isin(part, group)]
             return Mechanism(
-                mechanism_kind(group),
+                mechanism_kind([roles[name] for name in group]),
                 " + ".join(group),
                 tuple(int(number) for number in numbers),
                 None if np.isnan(time) else time,
@@ -102,8 +107,7 @@ def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Me
         joints: over joint, or over time and joint.
         limit: of |e| for a hinge [-].
     """
-    part = joints["part"].values.astype(str)
-    rings = np.array([part_role(name) == "ring" for name in part])
+    rings = joints["role"].values.astype(str) == "ring"
     return {
         "any four joints": counted_mechanism(joints, limit),
         "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
@@ -112,20 +116,24 @@ def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Me
 
 
 def _widest_group(
-    count: dict[str, int], failures: int, kinds: Sequence[str]
+    count: dict[str, int], roles: Mapping[str, str], failures: int, kinds: Sequence[str]
 ) -> tuple[str, ...] | None:
     """Parts whose failures together are enough, of the widest class asked for, or None."""
+
+    def kind(group: Sequence[str]) -> str:
+        return mechanism_kind([roles[name] for name in group])
+
     hit = tuple(name for name in count if count[name])
     groups = [*combinations(hit, 1), *combinations(hit, 2), hit]
     enough = [
         group
         for group in groups
-        if sum(count[name] for name in group) >= failures and mechanism_kind(group) in kinds
+        if sum(count[name] for name in group) >= failures and kind(group) in kinds
     ]
     return max(
         enough,
         key=lambda group: (
-            KINDS.index(mechanism_kind(group)),
+            KINDS.index(kind(group)),
             sum(count[name] for name in group),
         ),
         default=None,

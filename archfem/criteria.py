@@ -74,7 +74,17 @@ def envelope(joints: xr.Dataset) -> xr.Dataset:
     )
 
 
+def roles_of(joints: xr.Dataset) -> dict[str, str]:
+    """Role of each part, by its name, in the order of the joints.
+
+    Args:
+        joints: as made by `joint_dataset`, with `part` and `role`.
+    """
+    parts, roles = (joints[key].values.astype(str).tolist() for key in ("part", "role"))
+    return dict(zip(parts, roles, strict=True))
+
+
 def judged(joints: xr.Dataset) -> xr.Dataset:
     """Those joints that are judged, as `judged_parts` says; they keep their numbers."""
     part = joints["part"].values.astype(str)
-    return joints.isel(joint=np.isin(part, judged_parts(part)))
+    return joints.isel(joint=np.isin(part, judged_parts(roles_of(joints))))

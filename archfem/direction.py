@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem.roles import part_role
 from archfem.structure import Array, Block
 
 STRAIGHT = 0.005
@@ -63,13 +62,14 @@ def directions_of(
     """Find which way rings and piers run, by the names of their parts; only named ones are found.
 
     Args:
-        blocks: of a structure.
+        blocks: of a structure, with their roles.
         lines: on which two of them touch, and the numbers of the two.
     """
     stones: dict[str, list[Array]] = {}
     beds: dict[str, list[Array]] = {}
+    roles = {block.part: block.role for block in blocks}
     for block in blocks:
-        if block.part and not block.fixed and part_role(block.part) != "other":
+        if block.part and not block.fixed and block.role != "other":
             stones.setdefault(block.part, []).append(block.centroid)
     for a, b, line in lines:
         part = blocks[a].part
@@ -78,7 +78,7 @@ def directions_of(
     for part, found in stones.items():
         middles = beds.get(part, [])
         stones[part] = middles if len(middles) > 2 else [*middles, *found]
-    return {part: _through(np.array(found), part_role(part)) for part, found in stones.items()}
+    return {part: _through(np.array(found), roles[part]) for part, found in stones.items()}
 
 
 def _through(places: Array, role: str) -> Direction:

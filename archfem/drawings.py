@@ -19,7 +19,7 @@ from archfem.units import in_unit
 SIZES = (0.02, 20.0)
 """Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong."""
 
-PROPERTIES = ("name", "part", "material", "fixed")
+PROPERTIES = ("name", "part", "role", "material", "fixed")
 """What is read of a GeoJSON feature; others are left alone."""
 
 CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
@@ -36,6 +36,7 @@ class Outline:
         layer: that it is drawn on; in GeoJSON its part.
         material: name of its material, or None.
         fixed: or None.
+        role: of its part, or None.
     """
 
     points: Array
@@ -43,6 +44,7 @@ class Outline:
     layer: str
     material: str | None = None
     fixed: bool | None = None
+    role: str | None = None
 
 
 def outlines_in(
@@ -105,7 +107,7 @@ def _feature(feature: dict[str, Any], name: str, factor: float) -> Outline:
         raise InvalidInput(f"'{name}' has a hole: cut it into blocks without holes")
     points = _plane(rings[0], f"'{name}'", factor)
     part = str(told.get("part") or "")
-    return Outline(points, name, part, told.get("material"), told.get("fixed"))
+    return Outline(points, name, part, told.get("material"), told.get("fixed"), told.get("role"))
 
 
 def _check_properties(told: dict[str, Any], name: str) -> None:

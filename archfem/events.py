@@ -11,7 +11,6 @@ from archfem.counted import FAILURES, KINDS, counted_mechanism, counted_mechanis
 from archfem.criteria import HINGE, USED_UP
 from archfem.mechanism import Verifier
 from archfem.resultants import joint_dataset
-from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 
 Event = Callable[[Structure, Array], str | None]
@@ -134,9 +133,8 @@ class _Watch:
 
     def __init__(self, structure: Structure) -> None:
         joints = structure.joints
-        parts = judged_parts(joint.part for joint in joints)
         self.verifier = Verifier(structure)
-        self.judged = np.array([k for k, joint in enumerate(joints) if joint.part in parts])
+        self.judged = np.flatnonzero(structure.judged)
         self.skeleton = np.array(self.verifier.skeleton.joints)
         self.idle: set[bytes] = set()
         self._structure = structure

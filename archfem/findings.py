@@ -12,7 +12,6 @@ import xarray as xr
 from archfem.criteria import judged
 from archfem.files import in_one_stroke
 from archfem.history import History
-from archfem.roles import part_role
 from archfem.tables import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
@@ -25,7 +24,8 @@ class Finding:
         case: the case as text, by which a finding is known again.
         frequency: of the first mode about the dead load [Hz].
         mass: its share of the mass along x [-].
-        dead: largest |e| of each ring and pier under dead load [-].
+        roles: of the rings and piers, by part.
+        dead: largest |e| of each of them under dead load [-].
         runs: by pair, what `of_run` gives.
         scales: by pair and definition, the least factor found to fail and the largest below it
             found not to; infinite where none failed.
@@ -35,6 +35,7 @@ class Finding:
     case: str
     frequency: float
     mass: float
+    roles: dict[str, str]
     dead: dict[str, float]
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
     scales: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
@@ -143,7 +144,10 @@ def _broken(findings: Mapping[str, Finding]) -> list[str]:
 def _largest(finding: Finding, role: str) -> str:
     """Median over the pairs of the largest |e| in all rings, or in all piers."""
     each = [
-        max((e for part, e in run["eccentricity"].items() if part_role(part) == role), default=None)
+        max(
+            (e for part, e in run["eccentricity"].items() if finding.roles[part] == role),
+            default=None,
+        )
         for run in finding.runs.values()
     ]
     known = [e for e in each if e is not None]

@@ -105,10 +105,12 @@ class History:
 
         Args:
             path: the file.
-            structure: what was shaken, for `verified` and the blocks of `mechanism`.
+            structure: what was shaken, for `verified` and the blocks of `mechanism`. It also says
+                what roles its parts have.
 
         Raises:
-            InvalidInput: there is no such file, or it is something else, or of another structure.
+            InvalidInput: there is no such file, or it is something else, or of another structure;
+                or nothing tells the roles of the parts.
         """
         if not Path(path).is_file():
             raise InvalidInput(f"there is no history file {path}")
@@ -125,5 +127,13 @@ class History:
             raise InvalidInput(
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        if structure is not None:
+            roles = [joint.role for joint in structure.joints]
+            dataset = dataset.assign_coords(role=("joint", roles))
+        elif "role" not in dataset.coords:
+            raise InvalidInput(
+                f"{path} does not tell which parts are rings and piers, as files of earlier "
+                "versions do not: give the structure that was shaken too"
             )
         return cls(dataset, structure)

@@ -138,7 +138,7 @@ class Verifier:
     def parts(self) -> tuple[str, ...]:
         """Parts whose motion is judged."""
         left = self.skeleton.structure
-        return judged_parts(left.blocks[number].part for number in left.free)
+        return judged_parts({left.blocks[n].part: left.blocks[n].role for n in left.free})
 
     @cached_property
     def screen(self) -> Screen:
@@ -155,11 +155,10 @@ class Verifier:
         size = np.abs(motion * [1.0, 1.0, self.blocks.length]).max(axis=1)
         moving = np.flatnonzero(size > MOVING)
         blocks = self.skeleton.structure.blocks
-        moved_parts = dict.fromkeys(blocks[k].part for k in moving)
-        parts = [part for part in moved_parts if part in self.parts]
+        roles = {blocks[k].part: blocks[k].role for k in moving if blocks[k].part in self.parts}
         moved = Mechanism(
-            mechanism_kind(parts),
-            " + ".join(parts),
+            mechanism_kind(roles.values()),
+            " + ".join(roles),
             tuple(self.skeleton.joints[k] for k in working),
             float(joints["time"]) if "time" in joints.coords else None,
             tuple(self.skeleton.blocks[k] for k in moving),

@@ -60,7 +60,7 @@ OUTLINES = {
     "contacts": dict,
     **COMMON,
 }
-LAYER = {"part": str, "material": str, "fixed": bool, "ignore": bool}
+LAYER = {"part": str, "role": str, "material": str, "fixed": bool, "ignore": bool}
 USUAL_CONTACTS = {"stone/backfill": "soil to stone"}
 """How blocks of two materials touch, unless the case says otherwise."""
 SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {

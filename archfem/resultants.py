@@ -34,7 +34,7 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
 
     Returns:
         Variables N, V, M, eccentricity and friction over joint, or over time and joint, with
-        the joints' names, parts, depths and friction limits as coordinates.
+        the joints' names, parts, roles, depths and friction limits as coordinates.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     normal, shear, moment = np.moveaxis(resultants, -1, 0)
@@ -56,6 +56,7 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
         "part": ("joint", [joint.part for joint in structure.joints]),
+        "role": ("joint", [joint.role for joint in structure.joints]),
         "depth": ("joint", depth, {"units": "m"}),
         "friction_limit": ("joint", structure.friction),
     }

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from archfem.roles import part_role
 from archfem.structure import Block, Structure
 
 SEISMIC = 25.0
@@ -63,6 +62,5 @@ def yielding_blocks(structure: Structure) -> tuple[int, ...]:
     return tuple(
         number
         for number in structure.free
-        if part_role(structure.blocks[number].part) == "other"
-        and softness(structure, number).ratio < YIELDING
+        if structure.blocks[number].role == "other" and softness(structure, number).ratio < YIELDING
     )

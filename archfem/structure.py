@@ -10,6 +10,7 @@ from archfem.errors import InvalidStructure
 from archfem.geometry import area_of_polygon, area_of_sector, side_of_line
 from archfem.materials import Contact, Material
 from archfem.naming import number_of
+from archfem.roles import judged_parts, with_roles
 from archfem.units import G
 
 Array = NDArray[np.float64]
@@ -34,6 +35,9 @@ class Block:
         part: the part of the structure it belongs to, e.g. "arch" or "north pier".
         centre: where given, the first and third sides of the four-sided outline are arcs about
             this point, and the other two are radial: an annular sector.
+        role: of its part: "ring" or "pier", which are judged, or "other", which follows what
+            carries it. Where nothing of a part tells it, the structure fills it in by the words of
+            the part's name, and warns where they leave it open; without a name a part is a ring.
     """
 
     outline: tuple[Point, ...]
@@ -43,6 +47,7 @@ class Block:
     corners: tuple[int, int, int, int] | None = None
     part: str = ""
     centre: Point | None = None
+    role: str = ""
 
     def __post_init__(self) -> None:
         """Refuse outlines that do not bound an area anticlockwise."""
@@ -113,6 +118,7 @@ class Joint:
         contact: stiffness and friction.
         name: how a person finds it.
         part: the part of the structure it belongs to; mechanisms are counted by part.
+        role: of that part, as for a block.
     """
 
     blocks: tuple[int, int]
@@ -121,6 +127,7 @@ class Joint:
     contact: Contact
     name: str
     part: str = ""
+    role: str = ""
 
     @property
     def lower(self) -> int:
@@ -158,7 +165,8 @@ class Structure:
     """Blocks in contact along dry joints.
 
     Attributes:
-        blocks: the bodies; fixed ones are abutments.
+        blocks: the bodies; fixed ones are abutments. Their roles, and those of the joints, are
+            filled in where they are not told.
         joints: where they touch.
         width: out-of-plane width w [m].
         gravity: acceleration of gravity, along -y [m/s²].
@@ -172,7 +180,9 @@ class Structure:
     name: str = "structure"
 
     def __post_init__(self) -> None:
-        """Refuse what does not hang together."""
+        """Fill in roles, and refuse what does not hang together."""
+        object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
+        object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
         if not 0.0 < self.width < 1e4:
             raise InvalidStructure(
                 f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
@@ -268,6 +278,12 @@ class Structure:
     def free(self) -> tuple[int, ...]:
         """Numbers of the blocks that move."""
         return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """Whether each joint is judged, as `judged_parts` says of its part (n_joints,)."""
+        parts = judged_parts({joint.part: joint.role for joint in self.joints})
+        return np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
     @cached_property
     def weight(self) -> float:

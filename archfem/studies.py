@@ -10,7 +10,7 @@ from typing import Any
 
 from archfem.analysis import at_rest, damping_of, shaken
 from archfem.case import Case
-from archfem.criteria import judged
+from archfem.criteria import judged, roles_of
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.findings import Finding, by_part, kept, of_run, write
 from archfem.modal import modes
@@ -151,9 +151,13 @@ def _found(
 def _at_rest(case: Case, dead: Equilibrium) -> Finding:
     """What there is to say before the ground moves."""
     first = modes(dead.model, 1, about=dead)
-    largest = by_part(abs(judged(dead.joints)["eccentricity"]).fillna(0.5))
+    joints = judged(dead.joints)
     return Finding(
-        case.text(), float(first.frequencies[0]), float(first.mass_ratios[0, 0]), largest
+        case.text(),
+        float(first.frequencies[0]),
+        float(first.mass_ratios[0, 0]),
+        roles_of(joints),
+        by_part(abs(joints["eccentricity"]).fillna(0.5)),
     )
 
 

@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from archfem.materials import (
     Contact,
     Material,
 )
+from archfem.roles import with_roles
 from archfem.snapping import NEARLY, snapped
 from archfem.structure import Array, Block, Structure
 from archfem.units import G
@@ -38,14 +39,15 @@ class Layer:
     """What the outlines on one layer of a drawing are (GeoJSON: of one part).
 
     Attributes:
-        part: of the structure, which decides its role (see `part_role`); by default the layer's
-            own name.
+        part: of the structure; by default the layer's own name.
+        role: of the part, "ring", "pier" or "other"; by default as its name says (`part_role`).
         material: its name; by default that of the whole survey.
         fixed: whether they are abutments or foundations.
         ignore: whether they are none at all.
     """
 
     part: str | None = None
+    role: str | None = None
     material: str | None = None
     fixed: bool = False
     ignore: bool = False
@@ -83,13 +85,14 @@ def read_outlines(
         unit: of its coordinates; by default what a DXF file says, metres in GeoJSON.
         snap: vertices and edges nearer than this are made to touch [m].
         layers: what is on the layers of the drawing. Where they are given, all must be. What a
-            GeoJSON feature says itself of material and fixed comes first.
+            GeoJSON feature says itself of role, material and fixed comes first.
         material: of blocks of which neither feature nor layer says one.
         materials: by name.
 
     Raises:
         InvalidInput: the file is none, or says what is not known.
-        InvalidStructure: the outlines overlap, leave gaps or do not bound blocks.
+        InvalidStructure: the outlines overlap, leave gaps or do not bound blocks; or roles are
+            not known or contradict one another.
     """
     known = layers or {}
     ignored = [name for name, layer in known.items() if layer.ignore]
@@ -103,7 +106,7 @@ def read_outlines(
             _block(outline, own, known.get(outline.layer, Layer()), material, materials)
             for outline, own in zip(outlines, points, strict=True)
         ]
-        survey = Survey(_cornered(blocks, snap), moved)
+        survey = Survey(_cornered(with_roles(blocks), snap), moved)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
     logger.info("%s: vertices moved by up to %.3g mm", path, 1e3 * moved)
@@ -187,10 +190,11 @@ def _block(
         outline.name,
         layer.fixed if outline.fixed is None else bool(outline.fixed),
         part=outline.layer if layer.part is None else layer.part,
+        role=outline.role or layer.role or "",
     )
 
 
-def _cornered(blocks: list[Block], snap: float) -> tuple[Block, ...]:
+def _cornered(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
     """Blocks with corners where they are four-sided; none may only just touch."""
     touches = touching(blocks)
     for a, b, line in touches:
@@ -237,6 +241,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         told = {
             "name": block.name,
             "part": block.part,
+            "role": block.role,
             "material": block.material.name,
             "fixed": block.fixed,
         }

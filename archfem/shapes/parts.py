@@ -6,13 +6,12 @@ the centre lines of all rings meet their springing joints.
 
 from dataclasses import dataclass, field, replace
 from math import atan2, radians, sin
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
-from archfem.roles import part_role
 from archfem.structure import Point
 
 
@@ -26,8 +25,10 @@ class Arch:
         rise: of the centre line above the springings [m].
         thickness: of the ring [m].
         voussoirs: number of stones.
-        name: of the part, with the word "arch" or "ring" in it.
+        name: of the part.
     """
+
+    role: ClassVar[str] = "ring"
 
     span: float
     thickness: float
@@ -38,7 +39,6 @@ class Arch:
 
     def __post_init__(self) -> None:
         """Refuse what is no ring."""
-        _check_role(self.name, "ring")
         if (self.embrace is None) == (self.rise is None):
             raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
         _check_positive(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
@@ -76,8 +76,10 @@ class Pier:
         gap: between the springings of the neighbouring centre lines [m].
         height: from foundation to springing level [m].
         course: height of a course, about; courses of a pier are equally high [m].
-        name: of the part, with the word "pier" in it.
+        name: of the part.
     """
+
+    role: ClassVar[str] = "pier"
 
     gap: float
     height: float
@@ -85,8 +87,7 @@ class Pier:
     name: str = "pier"
 
     def __post_init__(self) -> None:
-        """Refuse what is no pier."""
-        _check_role(self.name, "pier")
+        """Refuse impossible lengths."""
         _check_positive(self, "gap", "height", "course")
 
 
@@ -103,6 +104,8 @@ class Sidewall:
         state: "free" courses; "retained" by a fixed wall at their outer end; or "fixed".
         name: of the part.
     """
+
+    role: ClassVar[str] = "other"
 
     length: float
     height: float
@@ -203,13 +206,3 @@ def _check_not_negative(part: Any, *keys: str) -> None:
         value = getattr(part, key)
         if not 0.0 <= value < 1e3:
             raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")
-
-
-def _check_role(name: str, role: str) -> None:
-    """Refuse a name by which the part would not be counted in mechanisms."""
-    if part_role(name) != role:
-        words = "'arch' or 'ring'" if role == "ring" else "'pier' or 'column'"
-        raise InvalidStructure(
-            f"'{name}' is to be a {role}: mechanisms are counted by the names of parts, so put "
-            f"{words} into it"
-        )

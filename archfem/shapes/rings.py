@@ -77,7 +77,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     left = _abutment(faces[0], -1.0, thickness / 2.0, material, "left abutment")
     right = _abutment(faces[-1], 1.0, thickness / 2.0, material, "right abutment")
     joints = [
-        Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch")
+        Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
         for k in range(voussoirs + 1)
     ]
     return Structure((left, *stones, right), tuple(joints), width, gravity, "circular arch")
@@ -122,11 +122,12 @@ def column(
             fixed=k == 0,
             corners=(0, 1, 2, 3),
             part="column",
+            role="pier",
         )
         for k, (low, top) in enumerate(pairwise(levels))
     ]
     joints = [
-        Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column")
+        Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
@@ -185,12 +186,12 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     blocks = (*left, *stones, *reversed(right))
     inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
     outer = -radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
-    beds = [((inner[0], y), (outer[0], y), "left pier") for y in levels[1:-1]]
-    beds += [(each.intrados, each.extrados, "arch") for each in ring.joints]
-    beds += [((inner[1], y), (outer[1], y), "right pier") for y in reversed(levels[1:-1])]
+    beds = [((inner[0], y), (outer[0], y), "left pier", "pier") for y in levels[1:-1]]
+    beds += [(each.intrados, each.extrados, "arch", "ring") for each in ring.joints]
+    beds += [((inner[1], y), (outer[1], y), "right pier", "pier") for y in reversed(levels[1:-1])]
     joints = tuple(
-        Joint((k, k + 1), intrados, extrados, contact, f"joint {k}", part)
-        for k, (intrados, extrados, part) in enumerate(beds)
+        Joint((k, k + 1), intrados, extrados, contact, f"joint {k}", part, role)
+        for k, (intrados, extrados, part, role) in enumerate(beds)
     )
     return Structure(blocks, joints, width, gravity, "arch on piers")
 
@@ -208,6 +209,7 @@ def _pier(
             fixed=k == 0,
             corners=(0, 1, 2, 3),
             part=part,
+            role="pier",
         )
         for k, (low, top) in enumerate(pairwise(levels))
     ]
@@ -248,7 +250,7 @@ def _stone(
     n = len(faces)
     corners = (0, n - 1, n, 2 * n - 1)
     outline = (*intrados, *extrados)
-    return Block(outline, material, name, corners=corners, part="arch", centre=centre)
+    return Block(outline, material, name, corners=corners, part="arch", centre=centre, role="ring")
 
 
 def _abutment(
@@ -261,4 +263,4 @@ def _abutment(
     near, far = (face[0], face[1]), (tuple(inner + shift), tuple(outer + shift))
     start, end = (near, far) if side > 0 else (far, near)
     outline = tuple((float(x), float(y)) for x, y in (start[0], end[0], end[1], start[1]))
-    return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name)
+    return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")

@@ -1,6 +1,7 @@
 """Stonework of a bridge, block by block: rings, piers and sidewalls, and the paving."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import cos
 
@@ -18,6 +19,9 @@ DEEP = 0.2
 
 Face = tuple[Point, Point]
 """A springing joint: its intrados and its extrados."""
+
+Courses = Pier | Sidewall
+"""A part built up in courses."""
 
 
 def ledge(face: Face, inward: float, walls: Sequence[Sidewall]) -> list[Point]:
@@ -62,7 +66,7 @@ class Site:
                 after = self._end(right, -1.0, sidewalls[1:], "right abutment")
             stones = [support, *range(first, last + 1), after]
             for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
-                self._join(pair, _face(joint), f"{arch.name}, joint {k}", arch.name)
+                self._join(pair, _face(joint), f"joint {k}", arch)
             support = after
         return springings, [_extrados(ring) for ring in rings]
 
@@ -73,6 +77,7 @@ class Site:
         material: Material | None = None,
         *,
         part: str | None = None,
+        role: str = "other",
         fixed: bool = False,
         structured: bool = False,
     ) -> int:
@@ -84,7 +89,15 @@ class Site:
             points = [points[0], *reversed(points[1:])]
         corners = (0, 1, 2, 3) if structured else None
         self.blocks.append(
-            Block(tuple(points), material or self.material, name, fixed, corners, part or name)
+            Block(
+                tuple(points),
+                material or self.material,
+                name,
+                fixed,
+                corners,
+                part or name,
+                role=role,
+            )
         )
         return len(self.blocks) - 1
 
@@ -110,8 +123,24 @@ class Site:
             check_simple(outline, name)
         check_apart(outlines, names)
 
-    def _join(self, pair: tuple[int, int], ends: Face, name: str, part: str) -> None:
-        self.joints.append(Joint(pair, *ends, self.contact, name, part))
+    def _join(self, pair: tuple[int, int], ends: Face, words: str, part: Arch | Courses) -> None:
+        name = f"{part.name}, {words}"
+        self.joints.append(Joint(pair, *ends, self.contact, name, part.name, part.role))
+
+    def _stone(
+        self,
+        outline: Sequence[Point],
+        words: str,
+        part: Courses,
+        *,
+        fixed: bool = False,
+        structured: bool = False,
+    ) -> int:
+        """Add a block of a pier or a sidewall; its number."""
+        name = f"{part.name}, {words}"
+        return self.add(
+            outline, name, part=part.name, role=part.role, fixed=fixed, structured=structured
+        )
 
     def _ring(self, arch: Arch, left: float) -> Structure:
         """A ring with its left springing at x = left, its names and its place."""
@@ -136,54 +165,56 @@ class Site:
                 f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
                 f"and a course of {step:.3g} m: give a wider gap or higher courses"
             )
-        below = self._courses((x0, x1), (-pier.height, -step), pier.course, pier.name)
+        below = self._courses((x0, x1), (-pier.height, -step), pier)
         outline = [(x0, -step), (x1, -step), right[0], right[1], left[1], left[0]]
-        top = self.add(outline, f"{pier.name}, skewback", part=pier.name)
-        self._bed((below, top), (x0, x1), -step, pier.name)
+        top = self._stone(outline, "skewback", pier)
+        self._bed((below, top), (x0, x1), -step, pier)
         return top
 
     def _courses(
-        self, sides: tuple[float, float], levels: tuple[float, float], course: float, name: str
+        self, sides: tuple[float, float], levels: tuple[float, float], part: Courses
     ) -> int:
         """A foundation and courses between two levels; the number of the uppermost."""
         low = levels[0]
         under = [(sides[0], low - DEEP), (sides[1], low - DEEP), (sides[1], low), (sides[0], low)]
-        below = self.add(under, f"{name}, foundation", part=name, fixed=True)
-        return self._stack(below, sides, levels, course, name)
+        below = self._stone(under, "foundation", part, fixed=True)
+        return self._stack(below, sides, levels, part)
 
     def _stack(
         self,
         below: int,
         sides: tuple[float, float],
         levels: tuple[float, float],
-        course: float,
-        name: str,
+        part: Courses,
     ) -> int:
         """Courses on a block, between two levels; the number of the uppermost."""
         low, high = levels
         if high - low < 1e-9:
             return below
-        for y, top in pairwise(np.linspace(low, high, max(1, round((high - low) / course)) + 1)):
-            number = self._course(sides, (y, top), name)
-            self._bed((below, number), sides, y, name)
+        for y, top in pairwise(
+            np.linspace(low, high, max(1, round((high - low) / part.course)) + 1)
+        ):
+            number = self._course(sides, (y, top), part)
+            self._bed((below, number), sides, y, part)
             below = number
         return below
 
-    def _course(self, sides: tuple[float, float], levels: tuple[float, float], name: str) -> int:
+    def _course(
+        self, sides: tuple[float, float], levels: tuple[float, float], part: Courses
+    ) -> int:
         """One rectangular course."""
         (left, right), (low, top) = sorted(sides), levels
-        count = sum(block.part == name and not block.fixed for block in self.blocks)
+        count = sum(block.part == part.name and not block.fixed for block in self.blocks)
         outline = [(left, top), (left, low), (right, low), (right, top)]
-        return self.add(outline, f"{name}, course {count + 1}", part=name, structured=True)
+        return self._stone(outline, f"course {count + 1}", part, structured=True)
 
     def _bed(
-        self, pair: tuple[int, int], sides: tuple[float, float], level: float, name: str
+        self, pair: tuple[int, int], sides: tuple[float, float], level: float, part: Courses
     ) -> None:
         """A level joint between two courses."""
         left, right = ((float(x), float(level)) for x in sorted(sides))
-        count = sum(joint.part == name for joint in self.joints)
-        words = f"joint {count}" if count else "base"
-        self._join(pair, (left, right), f"{name}, {words}", name)
+        count = sum(joint.part == part.name for joint in self.joints)
+        self._join(pair, (left, right), f"joint {count}" if count else "base", part)
 
     def _end(self, face: Face, inward: float, walls: Sequence[Sidewall], bare: str) -> int:
         """What an outer springing bears on; the number of the block at the joint."""
@@ -209,21 +240,21 @@ class Site:
             )
         if wall.state == "fixed":
             outline = [(outer, -wall.height), (x, -wall.height), (x, y), (edge, level)]
-            return self.add([*outline, *reversed(steps)], wall.name, fixed=True)
+            return self.add([*outline, *reversed(steps)], wall.name, role=wall.role, fixed=True)
         step = wall.height / max(1, round(wall.height / wall.course))
-        below = self._courses((outer, x), (-wall.height, -step), wall.course, wall.name)
+        below = self._courses((outer, x), (-wall.height, -step), wall)
         corner = [(back, level)] if wall.setback > 0.0 else []
         outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]
-        skewback = self.add(outline, f"{wall.name}, skewback", part=wall.name)
-        self._bed((below, skewback), (back, x), -step, wall.name)
-        behind = self._course((outer, back), (-step, level), wall.name)
-        self._bed((below, behind), (outer, back), -step, wall.name)
+        skewback = self._stone(outline, "skewback", wall)
+        self._bed((below, skewback), (back, x), -step, wall)
+        behind = self._course((outer, back), (-step, level), wall)
+        self._bed((below, behind), (outer, back), -step, wall)
         high = level + wall.above
-        self._stack(behind, (outer, back), (level, high), wall.course, wall.name)
+        self._stack(behind, (outer, back), (level, high), wall)
         if wall.state == "retained":
             far = outer - inward * DEEP
             corners = [(outer, -wall.height), (outer, high), (far, high), (far, -wall.height)]
-            self.add(corners, f"{wall.name}, retaining wall", part=wall.name, fixed=True)
+            self._stone(corners, "retaining wall", wall, fixed=True)
         return skewback
 
 
@@ -245,11 +276,12 @@ def _moved(ring: Structure, shift: np.ndarray, name: str) -> Structure:
             block.fixed,
             block.corners,
             name,
+            role="ring",
         )
         for block in ring.blocks
     ]
     joints = [
-        Joint(each.blocks, at(each.intrados), at(each.extrados), each.contact, each.name, name)
+        replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=name)
         for each in ring.joints
     ]
     return Structure(tuple(blocks), tuple(joints), ring.width, ring.gravity, name)

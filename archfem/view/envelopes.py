@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from archfem.criteria import HINGE, envelope, opened
+from archfem.criteria import HINGE, envelope, opened, roles_of
 from archfem.errors import InvalidInput
 from archfem.history import History
-from archfem.roles import judged_parts, part_role
+from archfem.roles import judged_parts
 from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
 from archfem.view.style import HINGE as RED
 
@@ -145,11 +145,14 @@ def _panels(drawn: Mapping[str, xr.Dataset], limit: float, axes: Axes | None) ->
     if not 1 <= len(drawn) <= len(LINES):
         raise InvalidInput(f"{len(drawn)} runs in one picture: give 1 to {len(LINES)}")
     sizes: dict[str, int] = {}
+    roles: dict[str, str] = {}
     for joints in drawn.values():
         names = joints["part"].values.astype(str)
-        for part in judged_parts(names):
+        own = roles_of(joints)
+        roles |= own
+        for part in judged_parts(own):
             sizes[part] = max(sizes.get(part, 0), int(np.sum(names == part)))
-    parts = sorted(sizes, key=lambda part: part_role(part) != "ring")
+    parts = sorted(sizes, key=lambda part: roles[part] != "ring")
     if axes is None:
         shown = _page({part: sizes[part] for part in parts})
     elif len(parts) == 1:

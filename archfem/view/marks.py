@@ -12,7 +12,6 @@ from archfem.models import Model
 from archfem.resultants import thrust_line
 from archfem.rigid_blocks import RigidBlocks
 from archfem.rigid_motion import motion_of
-from archfem.roles import judged_parts
 from archfem.structure import Array, Structure
 
 ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
@@ -74,7 +73,7 @@ def joint_marks(
     ends = structure.ends + shift
     share = 0.5 + joints["eccentricity"].values[:, None]
     carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-    shown = shown_joints(structure)
+    shown = structure.judged
     side = np.where(shown, hinged(joints, limit).values, 0)
     failed = np.flatnonzero(side)
     slipping = np.flatnonzero(shown & sliding(joints).values)
@@ -88,12 +87,6 @@ def joint_marks(
         slips=np.array(arrows).reshape(-1, *ARROW.shape),
         gaps=ends[shown & opened(joints).values],
     )
-
-
-def shown_joints(structure: Structure) -> NDArray[np.bool_]:
-    """Which joints are drawn: those of rings and piers, or all where there are neither."""
-    parts = [joint.part for joint in structure.joints]
-    return np.isin(parts, judged_parts(parts))
 
 
 def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:

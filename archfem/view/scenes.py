@@ -15,7 +15,6 @@ from archfem.history import History
 from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
-from archfem.roles import judged_parts
 from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
@@ -117,7 +116,7 @@ def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int])
     structure, carriers = setting.model.structure, joint_ends(setting.model)
     times = run.dataset["frame_time"].values[frames]
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
-    been = _been(run.joints)
+    been = _been(run.joints, structure.judged)
     page = Page(setting, size, run)
     shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
     bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
@@ -137,10 +136,9 @@ def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
     return setting.magnification * moved
 
 
-def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
+def _been(joints: xr.Dataset, judged: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
-    parts = joints["part"].values.astype(str)
-    side = hinged(joints).transpose("time", "joint").values * np.isin(parts, judged_parts(parts))
+    side = hinged(joints).transpose("time", "joint").values * judged
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
 

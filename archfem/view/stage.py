@@ -16,7 +16,7 @@ from archfem.models import Model
 from archfem.models.shape import Shape
 from archfem.structure import Array, Structure
 from archfem.view.film import Image
-from archfem.view.marks import SWING, Marks, shown_joints, support_outlines
+from archfem.view.marks import SWING, Marks, support_outlines
 from archfem.view.shades import Scale, scale_for, shade
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
@@ -256,7 +256,7 @@ class Stage:
 
 def _disc(structure: Structure) -> float:
     """Radius of a hinge [m]."""
-    depths = structure.depths[shown_joints(structure)]
+    depths = structure.depths[structure.judged]
     return min(DISC * structure.size, SNUG * float(depths.min()))
 
 

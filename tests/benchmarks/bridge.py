@@ -21,7 +21,6 @@ from timing import stopwatch, table
 
 import archfem as af
 from archfem.resultants import joint_dataset
-from archfem.roles import part_role
 from archfem.steppers import stepper_for
 
 DT = 0.005
@@ -109,8 +108,7 @@ def peaks(structure: af.Structure, resultants: np.ndarray) -> np.ndarray:
     """Largest |e| of every ring and pier joint [-]."""
     times = DT * np.arange(len(resultants))
     e = joint_dataset(structure, resultants, times)["eccentricity"].values
-    judged = [part_role(joint.part) in ("ring", "pier") for joint in structure.joints]
-    return np.nanmax(np.abs(e[:, judged]), axis=0)
+    return np.nanmax(np.abs(e[:, structure.judged]), axis=0)
 
 
 def report(scale: float, folder: Path) -> str:

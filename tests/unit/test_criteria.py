@@ -117,6 +117,7 @@ def test_table_says_when_and_how_long(joints):
 
 
 PARTS = ["arch 1"] * 5 + ["pier 1"] * 4 + ["arch 2"] * 5 + ["backfill"] * 6
+ROLES = ["ring"] * 5 + ["pier"] * 4 + ["ring"] * 5 + ["other"] * 6
 
 
 def joints_of(failing):
@@ -134,6 +135,7 @@ def joints_of(failing):
             "time": np.arange(len(failing), dtype=float),
             "joint": np.arange(20),
             "part": ("joint", PARTS),
+            "role": ("joint", ROLES),
             "friction_limit": ("joint", np.full(20, 0.6)),
         },
     )
@@ -171,8 +173,8 @@ def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
     assert turned["joint"].values.tolist() == list(range(13, -1, -1))
     soil = joints.isel(joint=slice(14, None))
     assert judged(soil).identical(soil)  # there is nothing else to judge
-    assert judged_parts(["wall", "pier", "wall", "", "fill"]) == ("pier", "")
-    assert judged_parts(["wall", "fill", "wall"]) == ("wall", "fill")
+    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
+    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
 
 
 def test_a_wall_by_itself_is_counted():

@@ -12,7 +12,6 @@ from archfem.mechanism import first_verified_mechanism, verified_mechanism
 from archfem.resultants import joint_dataset
 from archfem.rigid_blocks import RigidBlocks
 from archfem.rigid_motion import motion_of
-from archfem.roles import part_role
 from archfem.shapes import arch_on_piers, circular_arch, column
 
 WEIGHT = 1e4  # normal force in every joint [N]: only signs and ratios matter
@@ -197,38 +196,21 @@ def test_count_takes_the_class_of_all_that_failed_or_the_class_asked_for():
 
 
 @pytest.mark.parametrize(
-    ("parts", "kind"),
+    ("roles", "kind"),
     [
         ([], "none"),
-        (["main arch"], "local"),
-        (["pier 2"], "local"),
-        (["backfill"], "local"),
-        (["arch", "backfill", "parapet"], "local"),
-        (["arch 1", "north pier"], "semi-global"),
-        (["arch 1", "arch 2"], "global"),
-        (["pier 1", "pier 2"], "global"),
-        (["arch", "left pier", "right pier"], "global"),
+        (["ring"], "local"),
+        (["pier"], "local"),
+        (["other"], "local"),
+        (["ring", "other", "other"], "local"),
+        (["ring", "pier"], "semi-global"),
+        (["ring", "ring"], "global"),
+        (["pier", "pier"], "global"),
+        (["ring", "pier", "pier"], "global"),
     ],
 )
-def test_class_follows_from_rings_and_piers(parts, kind):
-    assert mechanism_kind(parts) == kind
-
-
-@pytest.mark.parametrize(
-    ("part", "role"),
-    [
-        ("", "ring"),
-        ("arch", "ring"),
-        ("north_arch", "ring"),
-        ("Ring2", "ring"),
-        ("left pier", "pier"),
-        ("spring line", "other"),
-        ("left abutment", "other"),
-        ("backfill", "other"),
-    ],
-)
-def test_role_of_a_part(part, role):
-    assert part_role(part) == role
+def test_class_follows_from_rings_and_piers(roles, kind):
+    assert mechanism_kind(roles) == kind
 
 
 def test_several_instants_or_other_joints_are_refused():

@@ -12,7 +12,6 @@ from archfem.criteria import hinged, opened, sliding
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
-from archfem.roles import part_role
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
 from archfem.view.joints import draw_joint_histories
 from archfem.view.marks import joint_ends, joint_marks
@@ -128,7 +127,7 @@ def test_structure_is_drawn_true_to_scale_with_units_and_time(ring, joints):
 
 def test_only_joints_of_rings_and_piers_are_marked(bridge):
     """All joints hinge, or slide, or are open: those of soil and sidewalls show nothing."""
-    judged = np.array([part_role(joint.part) != "other" for joint in bridge.joints])
+    judged = np.array([joint.role != "other" for joint in bridge.joints])
     assert 0 < judged.sum() < len(judged)
     depth = np.array([joint.depth for joint in bridge.joints])
     rows = np.zeros((len(depth), 3))

@@ -122,11 +122,21 @@ def finding(**given):
         "case": "text",
         "frequency": 9.0,
         "mass": 0.7,
+        "roles": {"arch": "ring"},
         "dead": {"arch": 0.2},
         "runs": {"a": run, "b": run},
         "scales": {"a": brackets, "b": brackets},
     }
     return Finding(**every | given)
+
+
+def test_a_study_tells_rings_from_piers_by_their_roles():
+    named = {"runs": {}, "scales": {}, "dead": {"vault": 0.2, "stem": 0.1}}
+    found = finding(roles={"vault": "ring", "stem": "pier"}, **named)
+    run = finding().runs["a"] | {"eccentricity": {"vault": 0.41, "stem": 0.32}}
+    found.runs = {"a": run}
+    head, row = study_table({"bridge": found}).splitlines()[:2]
+    assert row[head.index("|e| rings") :].split()[:2] == ["0.410", "0.320"]
 
 
 def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):

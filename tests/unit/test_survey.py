@@ -13,7 +13,6 @@ from archfem.case import Case
 from archfem.cli import main
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
-from archfem.roles import part_role
 from archfem.shapes import Arch, Backfill, Pier, Sidewall, bridge
 from archfem.survey import Layer, read_outlines, surveyed, write_outlines
 
@@ -89,7 +88,7 @@ def assert_same(found, given, tolerance):
     assert len(found.joints) == len(given.joints)
     named = {joint.name: joint for joint in found.joints}
     for joint in given.joints:
-        if part_role(joint.part) == "other":
+        if joint.role == "other":
             others = [each for each in found.joints if set(each.blocks) == set(joint.blocks)]
             away = [np.abs(each.ends - joint.ends).max() for each in others]
             mine = others[int(np.argmin(away))]
@@ -97,7 +96,8 @@ def assert_same(found, given, tolerance):
             mine = named[joint.name]
         assert set(mine.blocks) == set(joint.blocks)
         assert mine.ends == pytest.approx(joint.ends, abs=tolerance)
-        assert (mine.part, mine.contact) == (joint.part, joint.contact)
+        assert (mine.part, mine.role) == (joint.part, joint.role)
+        assert mine.contact == joint.contact
 
 
 def test_round_trip_through_geojson(viaduct, drawing):
@@ -186,7 +186,7 @@ def test_shipped_survey_bears_as_the_viaduct_does(viaduct):
     mine = {}
     for key, structure in (("survey", case.structure), ("viaduct", viaduct)):
         joints = af.dead_load(af.build(structure, fidelity="full", cells=(2, 2))).joints
-        judged = [n for n, each in enumerate(structure.joints) if part_role(each.part) != "other"]
+        judged = [n for n, each in enumerate(structure.joints) if each.role != "other"]
         names = [structure.joints[n].name for n in judged]
         order = [judged[k] for k in np.argsort(names)]
         mine[key] = {name: joints[name].values[order] for name in ("N", "V", "eccentricity")}
@@ -199,7 +199,7 @@ def test_shipped_survey_bears_as_the_viaduct_does(viaduct):
 
 def test_four_sided_stones_are_meshed_from_side_to_side(viaduct, drawing):
     for mine, given in zip(read_outlines(drawing).blocks, viaduct.blocks, strict=True):
-        if part_role(given.part) != "other" and given.corners is not None:
+        if given.role != "other" and given.corners is not None:
             first = mine.points[list(mine.corners)]
             assert {tuple(p) for p in first[:2]} == {
                 tuple(p) for p in given.points[list(given.corners)][:2]
