@@ -224,7 +224,7 @@ def _dead_load(case: Case) -> "Equilibrium":
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / 1e3:.2f} kN"
     )
-    if model.shape.stress is not None:
+    if model.cells.stress is not None:
         print(f"dead load: {use_sentence(strength_use(model, dead.q))}")
     return dead
 

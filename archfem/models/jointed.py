@@ -9,7 +9,7 @@ from scipy import sparse
 from archfem.actions import Action, BodyForce, Settlement
 from archfem.joints import JointOperator
 from archfem.kinematics import gaps_of
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
 
@@ -52,7 +52,7 @@ class Jointed:
         blocks: sparse.csr_matrix,
         body: Array,
         joints: JointOperator,
-        shape: Shape,
+        cells: Cells,
     ) -> None:
         pattern = Pattern.of(mass, blocks, joints.couplings())
         self.structure = structure
@@ -62,7 +62,7 @@ class Jointed:
         self.blocks = pattern.spread(blocks)
         self.body = body
         self.joints = joints
-        self.shape = shape
+        self.cells = cells
         self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
         self._always = self.blocks.data + pattern.spread(joints.shear_stiffness()).data
@@ -79,7 +79,7 @@ class Jointed:
             blocks=self.blocks,
             body=self.body,
             joints=joints,
-            shape=self.shape,
+            cells=self.cells,
         ).moved(self.supports)
 
     def settled(self, settlement: Settlement) -> "Jointed":
@@ -126,4 +126,4 @@ class Jointed:
             multiples = np.array([action.horizontal, action.vertical])
             return self.body @ multiples * self.structure.gravity
         block, point = action.place(self.structure)
-        return self.shape.at(block, point).T @ np.array(action.force)
+        return self.cells.at(block, point).T @ np.array(action.force)

@@ -30,7 +30,7 @@ RUNGS = ("rigid", "faces", "condensed", "full")
 
 def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointed:
     """Express a model in the coordinates of a basis (n, m)."""
-    shape, back = model.shape, basis.T.tocsr()
+    cells, back = model.cells, basis.T.tocsr()
     return Jointed(
         model.structure,
         fidelity,
@@ -38,10 +38,10 @@ def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointe
         blocks=product(back, product(model.blocks, basis)),
         body=basis.T @ model.body,
         joints=model.joints.projected(basis),
-        shape=replace(
-            shape,
-            lift=product(shape.lift, basis),
-            stress=None if shape.stress is None else product(shape.stress, basis),
+        cells=replace(
+            cells,
+            lift=product(cells.lift, basis),
+            stress=None if cells.stress is None else product(cells.stress, basis),
         ),
     ).moved(model.supports)
 
@@ -68,7 +68,7 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
     pieces, order = [], []
     plane = {number for number, block in enumerate(model.structure.blocks) if block.fixed}
     for number in model.structure.free:
-        nodes = np.flatnonzero(model.shape.block == number)
+        nodes = np.flatnonzero(model.cells.block == number)
         faces = [own for face in joints if len(own := np.intersect1d(face, nodes))]
         rung = rungs[number]
         if rung == "faces" and _bends(model.structure, number):
@@ -116,7 +116,7 @@ def _basis(model: Jointed, nodes: Numbers, faces: list[Numbers], rung: str) -> s
     """Basis of one block (2 nodes, m), its nodes in ascending order."""
     if rung == "full":
         return sparse.identity(2 * len(nodes), format="csr")
-    places = model.shape.places
+    places = model.cells.places
     if rung == "rigid":
         motion = motion_of(places[nodes], places[nodes].mean(axis=0))
         return sparse.csr_matrix(motion.reshape(-1, 3))

@@ -146,8 +146,8 @@ def one_arch(**parts):
 
 def scaled_jacobians(made):
     """Least scaled Jacobian of each cell: 1 for squares and equilateral triangles, 0 for lines."""
-    corners = full(broken_space(made), Quadrature()).shape
-    points = corners.places[np.array(corners.cells)]
+    cells = full(broken_space(made), Quadrature()).cells
+    points = cells.places[np.array(cells.polygons)]
     ahead = np.roll(points, -1, axis=1) - points
     behind = np.roll(ahead, 1, axis=1)
     turn = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
@@ -170,10 +170,10 @@ def test_meshes_of_bridges_are_sound(make, cell, count):
     assert quality.min() > (0.15 if cell == "quadrilateral" else 0.05)
 
 
-def outer_edges(shape, places):
+def outer_edges(cells, places):
     """Edges that only one cell has, as pairs of places (e, 2)."""
-    cells = places[np.array(shape.cells)]
-    pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    own = places[np.array(cells.polygons)]
+    pairs = np.sort(np.stack([own, np.roll(own, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, times = np.unique(pairs, axis=0, return_counts=True)
     assert times.max() == 2
     return edges[times == 1]
@@ -190,15 +190,15 @@ def test_cells_of_touching_blocks_meet(make, cell):
     blocks = tuple(replace(block, material=STONE) for block in structure.blocks)
     structure = replace(structure, blocks=blocks)
     model = full(broken_space(mesh(structure, Meshing(3, 4, cell))), Quadrature())
-    points, places = np.unique(model.shape.places.round(9), axis=0, return_inverse=True)
-    rim = outer_edges(model.shape, places.ravel())
+    points, places = np.unique(model.cells.places.round(9), axis=0, return_inverse=True)
+    rim = outer_edges(model.cells, places.ravel())
     length = np.linalg.norm(points[rim[:, 0]] - points[rim[:, 1]], axis=1).sum()
     free = set(structure.free)
     outlines = [structure.blocks[number].points for number in free]
     around = sum(np.linalg.norm(np.roll(p, 1, axis=0) - p, axis=1).sum() for p in outlines)
     inner = sum(joint.depth for joint in structure.joints if free.issuperset(joint.blocks))
     assert length == pytest.approx(around - 2.0 * inner, rel=1e-9)
-    stretched = model.shape.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
+    stretched = model.cells.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
     forces = np.zeros((len(points), 2))
     np.add.at(forces, places.ravel(), (model.blocks @ stretched.ravel()).reshape(-1, 2))
     inside = np.setdiff1d(np.arange(len(points)), rim)

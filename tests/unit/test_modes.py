@@ -361,9 +361,9 @@ def test_picture_of_shapes(ring_model):
     assert axes[1].get_title().startswith("mode 3: 27.75 Hz")
     blocks = drawn(axes[0])
     assert len(blocks) == 17
-    shape, size = ring_model.shape, ring_model.structure.size
-    moves = shape.displacement(found.shapes[:, 0])
-    moved = shape.places + REACH * size * moves / np.linalg.norm(moves, axis=1).max()
+    cells, size = ring_model.cells, ring_model.structure.size
+    moves = cells.displacement(found.shapes[:, 0])
+    moved = cells.places + REACH * size * moves / np.linalg.norm(moves, axis=1).max()
     for corner in np.concatenate(blocks):
         assert np.linalg.norm(moved - corner, axis=1).min() < 1e-9 * size
     for numbers in ([], [0], [4]):
@@ -372,11 +372,11 @@ def test_picture_of_shapes(ring_model):
 
 
 def test_rims_run_once_around_each_block(ring_model):
-    shape = ring_model.shape
-    start, end = shape.places[shape.rims].transpose(1, 0, 2)
+    cells = ring_model.cells
+    start, end = cells.places[cells.rims].transpose(1, 0, 2)
     twice = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     for number in ring_model.structure.free:
-        own = shape.block[shape.rims[:, 0]] == number
+        own = cells.block[cells.rims[:, 0]] == number
         block_ = ring_model.structure.blocks[number]
         # The mesh has four chords where the block has arcs: 0.02 % of its area.
         assert abs(twice[own].sum()) / 2.0 == pytest.approx(block_.area, rel=5e-4)

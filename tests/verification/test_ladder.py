@@ -152,8 +152,8 @@ def test_rungs_may_differ_from_block_to_block(ring, full):
 def test_inner_fields_are_recovered(ring, full):
     """Stress of the condensed model is that of all nodes, but for the weight inside a block."""
     condensed = build(ring, fidelity="condensed")
-    whole = full.shape.stress @ dead_load(full).q
-    found = condensed.shape.stress @ dead_load(condensed).q
+    whole = full.cells.stress @ dead_load(full).q
+    found = condensed.cells.stress @ dead_load(condensed).q
     weight = 20e3 * 0.55  # the stress that a stone's own weight makes in it [Pa]
     assert np.abs(found - whole).max() < weight
     assert np.abs(whole).max() > 10.0 * weight

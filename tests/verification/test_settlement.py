@@ -51,8 +51,8 @@ def test_supports_that_move_together_change_nothing(rung):
     assert (
         differ(found.joints, reference.joints) < 1e-5
     )  # round-off of 1 cm, or 1e-16 of 0.7 modal units, against µm
-    gap = model.shape.displacement(found.q - reference.q)
-    plane = motion_of(model.shape.places, np.zeros(2)) @ [0.01, -0.01, 1e-3]
+    gap = model.cells.displacement(found.q - reference.q)
+    plane = motion_of(model.cells.places, np.zeros(2)) @ [0.01, -0.01, 1e-3]
     np.testing.assert_allclose(gap, plane, atol=1e-7)
 
 
