@@ -96,13 +96,10 @@ def study(given: argparse.Namespace) -> None:
 
 def mesh(given: argparse.Namespace) -> None:
     """Write the mesh of a case as a gmsh file."""
-    from archfem.mesh import Meshing, write_mesh
+    from archfem.mesh import write_mesh
 
     case = Case.read(given.case, given.changes)
-    through, along = case.model.get("cells", [4, 4])
-    others = {key: case.model[key] for key in ("cell", "coarse") if key in case.model}
-    meshing = Meshing(through, along, **others)
-    write_mesh(case.structure, given.out, meshing)
+    write_mesh(case.structure, given.out, case.discretisation)
     print(f"wrote {given.out}")
 
 

@@ -13,7 +13,7 @@ ROOT = Path(archfem.__file__).parent
 LAYERS = [
     "errors units laws roles _petsc",
     "criteria materials quadrature quantities schemes signals oscillator records naming _slepc",
-    "structure synthetic codes settings counted",
+    "structure synthetic codes settings counted discretisation",
     "actions drawings polygons rows sparsity resultants motion soft",
     "assembly snapping",
     "shapes survey",
@@ -25,8 +25,8 @@ LAYERS = [
     "matching mechanism sliding",
     "limit suite events",
     "capacity ground",
-    "_fenicsx outlines",
-    "intervals",
+    "_fenicsx edges",
+    "division",
     "mesh",
     "space",
     "forms",
@@ -39,6 +39,7 @@ LAYERS = [
     "modal_damping findings",
     "tape",
     "runs push",
+    "probe",
     "ladder scales",
     "tradeoff case",
     "analysis",
@@ -124,9 +125,11 @@ for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "ufl"):
     sys.modules[name] = None
 import archfem as af
 from archfem import kinematics, limit, mechanism, resultants, criteria
+from archfem.discretisation import Discretisation
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 assert kinematics.rigid_joints(ring, 4, kinematics.Quadrature()).opening.shape == (162, 51)
 assert af.Motion.synthetic(duration=2.0, seed=1).pga > 0
+assert Discretisation("faces", (2, 2)).rule.count(1) == 3
 """
     subprocess.run([sys.executable, "-c", script], check=True)
 

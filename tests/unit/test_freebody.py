@@ -10,8 +10,8 @@ from archfem.assembly import assembled
 from archfem.case import Case
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.freebody import forces_on
+from archfem.ladder import build
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.models.build import build
 from archfem.resultants import joint_dataset
 from archfem.shapes import arch_on_piers
 from archfem.statics import dead_load, equilibrium

@@ -11,8 +11,8 @@ import xarray as xr
 from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import History
+from archfem.ladder import build
 from archfem.mechanism import verified_mechanism
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.runs import CountedMechanism, Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh

@@ -8,8 +8,8 @@ from archfem.actions import Settlement
 from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.ladder import build
 from archfem.mechanism import verified_mechanism
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.resultants import joint_dataset
 from archfem.runs import Record, time_history

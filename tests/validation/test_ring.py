@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archfem.ladder import build
 from archfem.materials import Contact, Material
-from archfem.models.build import build
 from archfem.shapes import circular_arch
 from archfem.statics import dead_load
 from archfem.structure import Structure

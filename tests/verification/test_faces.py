@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from archfem.assembly import assembled
+from archfem.ladder import build
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.runs import time_history
