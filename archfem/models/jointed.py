@@ -103,14 +103,14 @@ class Jointed:
         """Derivative of `force`; the same object as before while no point opens or closes."""
         stiffness = self.joints.stiffness(q)
         if self._last is None or not np.array_equal(stiffness, self._last[0]):
-            matrix = self._pattern.matrix(self._always + self._across(stiffness))
+            matrix = self._pattern.matrix(self._always + self._across @ stiffness)
             self._last = (stiffness, matrix)
         return self._last[1]
 
     def closed(self) -> sparse.csr_matrix:
         """Tangent with every joint closed over its whole depth."""
         whole = self.joints.law.stiffness(np.full(self.joints.opening.shape[0], -1.0))
-        return self._pattern.matrix(self._always + self._across(whole))
+        return self._pattern.matrix(self._always + self._across @ whole)
 
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints [J]."""
