@@ -9,7 +9,7 @@ from archfem.case import Case
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import CountedMechanism
 from archfem.history import History
-from archfem.ladder import build, finest
+from archfem.ladder import Damping, build
 from archfem.modal_damping import effective_range
 from archfem.motion import Motion
 from archfem.runs import Record, time_history
@@ -47,10 +47,10 @@ def _wanted(case: Case) -> dict[str, Any]:
     return {"motion": motion, "damping": expected_damping(case), "dt": case.analysis.get("dt")}
 
 
-def expected_damping(case: Case) -> Rayleigh | None:
-    """Damping of a case whose model is not yet chosen: as the finest model has it."""
+def expected_damping(case: Case) -> Damping:
+    """Damping of a case whose model is not yet chosen: known, or a function of the finest model."""
     if isinstance(case.damping, EffectiveRayleigh):
-        return damping_of(case, dead_load(finest(case.structure).build(case.structure)))[0]
+        return lambda model: damping_of(case, dead_load(model))[0]
     return case.damping
 
 

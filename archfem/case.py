@@ -14,6 +14,7 @@ import tomli_w
 
 from archfem import ground
 from archfem.codes import DesignSpectrum
+from archfem.discretisation import Discretisation
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
 from archfem.plans import planned
@@ -134,12 +135,20 @@ class Case:
 
     def _check(self) -> None:
         """Refuse what would otherwise be found out only after the dead load."""
-        _ = self.damping, self.scheme, self.joints
+        _ = self.discretisation, self.damping, self.scheme, self.joints
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """What the structure is modelled by; its mesh alone counts where "auto" is to choose."""
+        given = {key: value for key, value in self.model.items() if key != "tolerance"}
+        if given.get("fidelity") == "auto":
+            del given["fidelity"]
+        return Discretisation(**given)
 
     @property
     def damping(self) -> Rayleigh | EffectiveRayleigh | None:

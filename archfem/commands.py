@@ -97,13 +97,10 @@ def study(given: argparse.Namespace) -> None:
 
 def mesh(given: argparse.Namespace) -> None:
     """Write the mesh of a case as a gmsh file."""
-    from archfem.mesh import Meshing, write_mesh
+    from archfem.mesh import write_mesh
 
     case = Case.read(given.case, given.changes)
-    through, along = case.model.get("cells", [4, 4])
-    others = {key: case.model[key] for key in ("cell", "coarse") if key in case.model}
-    meshing = Meshing(through, along, **others)
-    write_mesh(case.structure, given.out, meshing)
+    write_mesh(case.structure, given.out, case.discretisation)
     print(f"wrote {given.out}")
 
 
@@ -225,7 +222,7 @@ def _dead_load(case: Case) -> "Equilibrium":
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / 1e3:.2f} kN"
     )
-    if model.shape.stress is not None:
+    if model.cells.stress is not None:
         print(f"dead load: {use_sentence(strength_use(model, dead.q))}")
     return dead
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.errors import InvalidInput
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.resultants import check_instant, thrust_line
 from archfem.structure import Array, Block, Structure
 
@@ -52,7 +52,7 @@ class FreeBody:
 
 
 def forces_on(
-    structure: Structure, joints: xr.Dataset, block: int | str, shape: Shape | None = None
+    structure: Structure, joints: xr.Dataset, block: int | str, cells: Cells | None = None
 ) -> FreeBody:
     """Find the forces on one block at rest: the resultants of its joints, and its weight.
 
@@ -65,7 +65,7 @@ def forces_on(
         structure: whose block it is.
         joints: as made by `joint_dataset`, at one instant.
         block: its number or name; it must not be fixed.
-        shape: of a model with a mesh, for the weight as meshed: there the arcs of sectors are
+        cells: of a model with a mesh, for the weight as meshed: there the arcs of sectors are
             chords, which makes them lighter. By default that of the true outline.
 
     Raises:
@@ -87,7 +87,7 @@ def forces_on(
     pushes -= shear[:, None] * structure.tangents[around]
     crossings = thrust_line(structure, joints).values[around]
     crossings = np.where(np.isnan(crossings), structure.middles[around], crossings)
-    area, centroid = _area(own, number, shape)
+    area, centroid = _area(own, number, cells)
     weight = area * structure.width * own.material.unit_weight
     return FreeBody(
         own,
@@ -98,15 +98,15 @@ def forces_on(
     )
 
 
-def _area(block: Block, number: int, shape: Shape | None) -> tuple[float, Array]:
+def _area(block: Block, number: int, cells: Cells | None) -> tuple[float, Array]:
     """Area and centroid of a block, or of the cells it is meshed with."""
-    if shape is None or shape.stress is None:
+    if cells is None or cells.stress is None:
         return block.area, block.centroid
-    cells = [
-        Block(tuple(map(tuple, shape.places[cell])), block.material, block.name)
-        for cell, owner in zip(shape.cells, shape.owner, strict=True)
+    pieces = [
+        Block(tuple(map(tuple, cells.places[cell])), block.material, block.name)
+        for cell, owner in zip(cells.polygons, cells.owner, strict=True)
         if owner == number
     ]
-    areas = np.array([cell.area for cell in cells])
-    centroids = np.array([cell.centroid for cell in cells])
+    areas = np.array([piece.area for piece in pieces])
+    centroids = np.array([piece.centroid for piece in pieces])
     return float(areas.sum()), areas @ centroids / areas.sum()

@@ -58,7 +58,7 @@ class Guard:
         return drift
 
     def _look(self, state: State) -> None:
-        moved = np.abs(self.model.shape.lift @ state.q).max()
+        moved = np.abs(self.model.cells.lift @ state.q).max()
         self.largest_displacement = max(self.largest_displacement, float(moved))
 
     def judge(self) -> None:

@@ -7,7 +7,7 @@ at the points becomes the forces f is the law's: springs at quadrature points, f
 integral over facets along which opening and slip are linear.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,14 +17,11 @@ from scipy import sparse
 
 from archfem.laws import is_closed, normal_traction
 from archfem.quadrature import Quadrature
-from archfem.sparsity import Pattern, product
+from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
 Status = NDArray[np.bool_]
-
-LARGEST_MAP = 20_000_000
-"""Entries of the map from stiffness to tangent up to which it is stored: 240 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,29 +222,21 @@ class JointOperator:
         """The numbers on which the tangent depends, for `normal_stiffness` (entries,) [N/m]."""
         return self.law.stiffness(self.openings(q))
 
-    def normal_stiffness(self, pattern: Pattern) -> Callable[[Array], Array]:
-        """The linear map from `stiffness` to the entries of the tangent on a pattern (nnz,).
-
-        Where points depend on few coordinates it is a sparse matrix made once; where they depend
-        on all, as in a modal basis, that would be far larger than the tangent itself.
-        """
+    def normal_stiffness(self, pattern: Pattern) -> sparse.csr_matrix:
+        """The linear map from `stiffness` to the entries of the tangent on a pattern (nnz, m)."""
         first, second = (self.opening[side] for side in self.law.entries)
-        if np.diff(first.indptr) @ np.diff(second.indptr) <= LARGEST_MAP:
-            across = pattern.outer(first, second)
-            return lambda stiffness: across @ stiffness
-        rows, columns = first.toarray().T, second.toarray()
-        return lambda stiffness: pattern.taken(rows @ (stiffness[:, None] * columns))
+        return pattern.outer(first, second)
 
     def shear_stiffness(self) -> sparse.csr_matrix:
         """The part of the tangent that never changes (n, n)."""
-        return product(self._back[1], self.slip)
+        return self._back[1] @ self.slip
 
     def couplings(self) -> sparse.csr_matrix:
         """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
         first, second = self.law.entries
         opening, slip = _ones(self.opening), _ones(self.slip)
-        across = product(opening[first].T.tocsr(), opening[second])
-        return (across + product(slip.T.tocsr(), product(_ones(self.law.shear), slip))).tocsr()
+        across = opening[first].T @ opening[second]
+        return (across + slip.T @ (_ones(self.law.shear) @ slip)).tocsr()
 
     def resultants(self, q: Array) -> Array:
         """N, V, M of every joint (n_joints, 3) [N, N, N m].
@@ -261,7 +250,7 @@ class JointOperator:
 
     def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
         """Express the same joints in the coordinates of a basis (n, m): G B."""
-        return replace(self, opening=product(self.opening, basis), slip=product(self.slip, basis))
+        return replace(self, opening=self.opening @ basis, slip=self.slip @ basis)
 
     def spanned(self, whole: Sequence[bool]) -> "JointOperator":
         """One facet instead of several on each joint that moves as a plane (n_joints,).

@@ -1,36 +1,35 @@
 """Which rung, mesh and time step a scene needs: the cheapest whose error stays below a tolerance.
 
 The error is predicted, not assumed: candidates are run on the strongest part of the motion and
-compared with a finer model on the same part. What is compared is the envelope of |e|, joint by
-joint, since that is what hinges are judged by.
+compared with a finer model on the same part. What is compared is the largest |e|, joint by joint,
+since that is what hinges are judged by.
 """
 
 import logging
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse.linalg import eigsh
 
-from archfem.actions import BodyForce
 from archfem.compiled.contact import LARGEST
-from archfem.criteria import judged
+from archfem.discretisation import Discretisation
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model, Prediction
 from archfem.models import build as plain
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
+from archfem.probe import largest_difference, peaks, severe_motion, strongest, usual_damping
 from archfem.quadrature import Quadrature
-from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.softness import soft_blocks
-from archfem.statics import equilibrium, self_weight
 from archfem.structure import Array, Structure
 
-logger = logging.getLogger("archfem")
+Damping = Rayleigh | Callable[[Model], Rayleigh | None] | None
+"""Of a run to come: known, or to be found of the finest model."""
 
-WINDOW = 8.0
-"""Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
+Builder = Callable[[Structure, Discretisation], Model]
+
+logger = logging.getLogger("archfem")
 
 SAFETY = 1.5
 """By how much an error elsewhere in the motion may exceed that in the window: 1.0 to 2.1 times in
@@ -39,9 +38,6 @@ the rings and columns tried, once 4.7 times."""
 SAFETY_WITH_SOIL = 1.2
 """The same where models are compared on one mesh: 0.65 to 1.02 times on a bridge of three spans
 under six motions."""
-
-SEVERE = 0.40
-"""|e| to which a probing motion is scaled where none is given."""
 
 STEPS = (0.005, 0.0025)
 """Time steps considered [s]."""
@@ -67,40 +63,23 @@ class Setting:
     """A model and a time step.
 
     Attributes:
-        fidelity: rung, or rungs by block.
-        cells: through the thickness and along each block.
-        quadrature: rule on the joints.
+        discretisation: rung, mesh, and rule on the joints.
         dt: time step [s].
-        points: of the rule, on a facet.
     """
 
-    fidelity: str | Mapping[str, str]
-    cells: tuple[int, int]
-    quadrature: str
+    discretisation: Discretisation
     dt: float
-    points: int | None = None
 
     @property
     def label(self) -> str:
         """The setting in a few words."""
-        rung = (
-            self.fidelity if isinstance(self.fidelity, str) else self.fidelity["rest"] + " + soil"
-        )
-        rule = self.quadrature + (f" {self.points}" if self.points else "")
-        return f"{rung} {self.cells[0]}×{self.cells[1]} {rule} {1e3 * self.dt:g} ms"
-
-    def build(self, structure: Structure) -> Model:
-        """The model of a structure."""
-        return plain.build(
-            structure,
-            fidelity=self.fidelity,
-            cells=self.cells,
-            quadrature=self.quadrature,
-            points=self.points,
-        )
+        asked, fidelity = self.discretisation, self.discretisation.fidelity
+        rung = fidelity if isinstance(fidelity, str) else fidelity["rest"] + " + soil"
+        rule = asked.quadrature + (f" {asked.points}" if asked.points else "")
+        return f"{rung} {asked.through}×{asked.along} {rule} {1e3 * self.dt:g} ms"
 
 
-def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
+def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice needs)
     structure: Structure,
     *,
     fidelity: str | Mapping[str, str] = "full",
@@ -112,26 +91,35 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
     points: int | None = None,
     tolerance: float = 0.005,
     motion: Motion | None = None,
-    damping: Rayleigh | None = None,
+    damping: Damping = None,
     dt: float | None = None,
 ) -> Model:
     """Build a model of a structure, on a rung that is named or chosen.
 
     Args:
         structure: what stands.
-        fidelity: a rung as in `models.build`, or "auto": the cheapest rung, mesh and time step
-            whose predicted error stays below the tolerance. What was predicted is the model's
-            `prediction`; cells, quadrature and points are then chosen too.
-        cells: through the thickness (facets on a joint) and along each block.
+        fidelity: a rung of the ladder:
+            "rigid": rigid blocks, no mesh; all compliance is in the joints;
+            "faces": each joint face moves as a plane, the rest statically condensed;
+            "condensed": all nodes on joints, the rest statically condensed; "full": all nodes;
+            "monolithic": all nodes, UFL forms assembled at each iteration.
+            Or rungs by block name or part, with "rest" for all others, for example
+            {"backfill": "full", "rest": "faces"}.
+            Or "auto": the cheapest rung, mesh and time step whose predicted error stays below the
+            tolerance. What was predicted is the model's `prediction`; what says how blocks and
+            joints are cut is then chosen too.
+        cells: through the thickness (facets on a joint) and along each block, at least.
         cell: "quadrilateral" or "triangle".
-        coarse: largest cell inside blocks without corners [m].
+        coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
+            given, half of the block's mean thickness.
         degree: of the elements, 1 or 2.
         quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
         points: on each facet, 3 where not given.
         tolerance: for "auto", of the largest |e| of every joint [-].
         motion: for "auto", the ground motion to come; without it a synthetic one is used that
             brings |e| to 0.4, and the prediction is the less certain.
-        damping: for "auto", that of the run to come.
+        damping: for "auto", that of the run to come, or a function that finds it of a model: it
+            is asked once, of the finest that candidates are compared with.
         dt: for "auto", the time step of the run to come [s]; errors are then those of the model
             alone. Without it the step is chosen too, and its error counts.
 
@@ -141,52 +129,38 @@ def build(  # noqa: PLR0913  (as `models.build`, and what the choice needs)
     """
     if not 0.0 < tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
-    rungs = ("auto", *plain.FIDELITIES)
-    if isinstance(fidelity, str) and fidelity not in rungs:
-        raise InvalidInput(f"fidelity '{fidelity}' is not known: use one of {rungs}")
     if fidelity == "auto":
         return choose(structure, tolerance, motion, damping, dt)
-    return plain.build(
-        structure,
-        fidelity=fidelity,
-        cells=cells,
-        cell=cell,
-        coarse=coarse,
-        degree=degree,
-        quadrature=quadrature,
-        points=points,
-    )
+    asked = Discretisation(fidelity, cells, cell, coarse, degree, quadrature, points)
+    return plain.build(structure, asked)
 
 
 def choose(
     structure: Structure,
     tolerance: float,
     motion: Motion | None = None,
-    damping: Rayleigh | None = None,
+    damping: Damping = None,
     dt: float | None = None,
+    *,
+    builder: Builder = plain.build,
 ) -> Model:
     """Find the cheapest model, and time step, whose predicted error is within a tolerance.
 
     Where none is, the best is given, and a warning says so.
+
+    Args:
+        structure: what stands.
+        tolerance: of the largest |e| of every joint [-].
+        motion: to come; without it a synthetic one is used that brings |e| to 0.4.
+        damping: of the run to come, or a function that finds it of the finest model.
+        dt: time step of the run to come [s]; without it the step is chosen too.
+        builder: makes the models.
     """
-    best = finest(structure).build(structure)
-    soil = bool(soft_blocks(structure))
-    safety = SAFETY_WITH_SOIL if soil else SAFETY
-    probe = best if soil else rigid(structure, rule=Quadrature("exact"))
-    damping = damping or _usual_damping(probe)
-    window = strongest(motion) if motion is not None else _probe(probe)
-    references: dict[float, Array] = {}
+    yardstick = _yardstick(structure, motion, damping, builder, finer=0.5 if dt is None else 1.0)
     considered: list[tuple[Setting, float, Model]] = []
     for setting in _candidates(structure, STEPS if dt is None else (dt,)):
-        model = setting.build(structure)
-        if setting.dt not in references:
-            step = setting.dt / 2.0 if dt is None else dt
-            references[setting.dt] = envelope(best, window, damping, step)
-        try:
-            found = envelope(model, window, damping, setting.dt)
-            error = safety * largest_difference(found, references[setting.dt])
-        except DidNotConverge:
-            error = np.inf
+        model = builder(structure, setting.discretisation)
+        error = yardstick.error(model, setting.dt)
         considered.append((setting, error, model))
         if error <= tolerance:
             break
@@ -203,28 +177,62 @@ def choose(
     return model.predicted(Prediction(error, tolerance, setting.dt, tried))
 
 
-def envelope(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
-    """Largest |e| of each joint that is judged over a run (n,); 0.5 where it came apart."""
-    joints = judged(time_history(model, motion, damping=damping, dt=dt).joints)
-    return abs(joints["eccentricity"]).fillna(0.5).max("time").values
+@dataclass(frozen=True, eq=False)
+class _Yardstick:
+    """The finest model under the strongest part of a motion, with which others are compared.
+
+    Attributes:
+        model: the finest.
+        window: the part of the motion.
+        damping: of all runs.
+        safety: factor on what is found.
+        finer: its time step, as a share of that of the model compared.
+    """
+
+    model: Model
+    window: Motion
+    damping: Rayleigh
+    safety: float
+    finer: float
+    _known: dict[float, Array] = field(default_factory=dict)
+
+    def error(self, model: Model, dt: float) -> float:
+        """Error of a model stepped by dt [s]; infinite where its run fails."""
+        if dt not in self._known:
+            self._known[dt] = peaks(self.model, self.window, self.damping, self.finer * dt)
+        try:
+            found = peaks(model, self.window, self.damping, dt)
+        except DidNotConverge:
+            return np.inf
+        return self.safety * largest_difference(found, self._known[dt])
 
 
-def largest_difference(first: Array, second: Array) -> float:
-    """Error in eccentricity: the largest difference of two envelopes over the joints."""
-    return float(np.abs(first - second).max())
+def _yardstick(
+    structure: Structure, motion: Motion | None, damping: Damping, builder: Builder, *, finer: float
+) -> _Yardstick:
+    """Build the finest model; what is not known of the run is assumed."""
+    best = builder(structure, finest(structure).discretisation)
+    soil = bool(soft_blocks(structure))
+    probe = best if soil else rigid(structure, rule=Quadrature("exact"))
+    return _Yardstick(
+        best,
+        strongest(motion) if motion is not None else severe_motion(probe),
+        damping_for(best, damping) or usual_damping(probe),
+        SAFETY_WITH_SOIL if soil else SAFETY,
+        finer,
+    )
 
 
-def strongest(motion: Motion) -> Motion:
-    """The part of a motion around its peak."""
-    peak = float(motion.times()[np.argmax(np.abs(motion.horizontal))])
-    start = max(0.0, min(peak - WINDOW / 2.0, motion.duration - WINDOW))
-    return motion.cut(start, min(start + WINDOW, motion.duration))
+def damping_for(model: Model, damping: Damping) -> Rayleigh | None:
+    """Damping of a run, asked of the finest model where it is yet to be found."""
+    return damping(model) if callable(damping) else damping
 
 
-def _mixed(structure: Structure, rung: str) -> str | dict[str, str]:
-    """A rung for all blocks but the soft ones, which keep all their nodes."""
+def _exact(structure: Structure, rung: str, cells: tuple[int, int]) -> Discretisation:
+    """A rung for all blocks but the soft ones, which keep all their nodes; exact joints."""
     soft = [structure.blocks[number].name for number in soft_blocks(structure)]
-    return {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
+    fidelity = {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
+    return Discretisation(fidelity, cells, quadrature="exact")
 
 
 def _candidates(structure: Structure, steps: tuple[float, ...]) -> Iterator[Setting]:
@@ -235,7 +243,7 @@ def _candidates(structure: Structure, steps: tuple[float, ...]) -> Iterator[Sett
         for rung, cells in rungs:
             fits = soil or rung == "rigid" or _size(structure, rung, cells) <= LARGEST
             if fits or (rung, cells) == CANDIDATES[1]:
-                yield Setting(_mixed(structure, rung), cells, "exact", dt)
+                yield Setting(_exact(structure, rung, cells), dt)
 
 
 def finest(structure: Structure) -> Setting:
@@ -245,7 +253,7 @@ def finest(structure: Structure) -> Setting:
     """
     small = (each for each in REFERENCE if _size(structure, *each) <= LARGEST)
     rung, cells = WITH_SOIL if soft_blocks(structure) else next(small, REFERENCE[-1])
-    return Setting(_mixed(structure, rung), cells, "exact", min(STEPS) / 2.0)
+    return Setting(_exact(structure, rung, cells), min(STEPS) / 2.0)
 
 
 def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
@@ -256,27 +264,3 @@ def _size(structure: Structure, rung: str, cells: tuple[int, int]) -> int:
     )
     each = 3 if rung == "faces" else 2 * (cells[0] + 1)
     return each * int(sum(sides[number] for number in structure.free))
-
-
-def _usual_damping(model: Model) -> Rayleigh:
-    """Five per cent at the first closed frequency and at three times that."""
-    square = eigsh(
-        model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
-    )[0]
-    first = float(np.sqrt(square) / (2.0 * np.pi))
-    return Rayleigh(0.05, (first, 3.0 * first))
-
-
-def _probe(model: Model) -> Motion:
-    """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
-    weight, low, high = self_weight(model), 0.0, 2.0
-    for _ in range(10):
-        middle = 0.5 * (low + high)
-        try:
-            joints = equilibrium(model, weight + model.load(BodyForce(middle))).joints
-            severe = float(abs(judged(joints)["eccentricity"]).max()) > SEVERE
-        except DidNotConverge:
-            severe = True
-        low, high = (low, middle) if severe else (middle, high)
-    pga = max(low, 0.02) * model.structure.gravity
-    return Motion.synthetic(duration=WINDOW, pga=pga, seed=1)

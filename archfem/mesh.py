@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem import _fenicsx
+from archfem.discretisation import Discretisation
+from archfem.division import Division, divided
 from archfem.errors import InvalidInput, MeshError
-from archfem.intervals import Division, Meshing, divided
 from archfem.structure import TOUCHING, Structure
 
 FRONTAL = 6
@@ -44,21 +45,21 @@ class Mesh:
     joints: tuple[NDArray[np.int32], NDArray[np.int32]]
 
 
-def mesh(structure: Structure, meshing: Meshing | None = None) -> Mesh:
+def mesh(structure: Structure, asked: Discretisation | None = None) -> Mesh:
     """Mesh a structure.
 
     Raises:
         MeshError: the blocks cannot be cut conformingly as asked.
     """
     with _model(structure.name):
-        _generate(structure, meshing or Meshing())
+        _generate(structure, asked or Discretisation())
         return _imported(structure)
 
 
-def write_mesh(structure: Structure, path: str | Path, meshing: Meshing | None = None) -> None:
+def write_mesh(structure: Structure, path: str | Path, asked: Discretisation | None = None) -> None:
     """Mesh a structure and write a gmsh file (.msh) with named physical groups."""
     with _model(structure.name):
-        _generate(structure, meshing or Meshing())
+        _generate(structure, asked or Discretisation())
         gmsh.write(str(path))
 
 
@@ -91,28 +92,28 @@ def _model(name: str) -> Iterator[None]:
         gmsh.finalize()
 
 
-def _generate(structure: Structure, meshing: Meshing) -> None:
+def _generate(structure: Structure, asked: Discretisation) -> None:
     """Build geometry and mesh of all blocks in the current gmsh model."""
-    division = divided(structure, meshing)
-    outlines = division.outlines
+    division = divided(structure, asked)
+    edges = division.edges
     geo = gmsh.model.geo
-    corners = [geo.addPoint(x, y, 0.0) for x, y in outlines.points]
-    pieces = [_pieces(division, edge, corners) for edge in range(len(outlines.edges))]
+    corners = [geo.addPoint(x, y, 0.0) for x, y in edges.points]
+    pieces = [_pieces(division, edge, corners) for edge in range(len(edges.ends))]
     for number, block in enumerate(structure.blocks):
         loop = [
             line
-            for start, edge in zip(outlines.loops[number], outlines.around[number], strict=True)
-            for line in _run(pieces[edge], start == outlines.edges[edge, 0])
+            for start, edge in zip(edges.boundaries[number], edges.around[number], strict=True)
+            for line in _run(pieces[edge], start == edges.ends[edge, 0])
         ]
         surface = geo.addPlaneSurface([geo.addCurveLoop(loop)], number + 1)
         if block.corners is not None:
-            ends = [corners[point] for point in outlines.corners(number)]
+            ends = [corners[point] for point in edges.corners(number)]
             geo.mesh.setTransfiniteSurface(surface, "Alternate", ends)
-        if meshing.cell == "quadrilateral":
+        if asked.cell == "quadrilateral":
             geo.mesh.setRecombine(2, surface)
         gmsh.model.addPhysicalGroup(2, [surface], number + 1, block.name)
-    for number, (joint, edges) in enumerate(zip(structure.joints, outlines.joints, strict=True)):
-        lines = [line for edge in edges for line in pieces[edge]]
+    for number, (joint, shared) in enumerate(zip(structure.joints, edges.joints, strict=True)):
+        lines = [line for edge in shared for line in pieces[edge]]
         gmsh.model.addPhysicalGroup(1, lines, number + 1, joint.name)
     geo.synchronize()
     _fill(division)
@@ -122,8 +123,8 @@ def _pieces(division: Division, edge: int, corners: list[int]) -> list[int]:
     """Lines along an edge, of as many cells each as its number is a multiple of."""
     geo = gmsh.model.geo
     unit = int(division.units[edge])
-    first, last = division.outlines.edges[edge]
-    start, end = division.outlines.points[[first, last]]
+    first, last = division.edges.ends[edge]
+    start, end = division.edges.points[[first, last]]
     inner = division.stations[edge][unit:-unit:unit, None]
     points = [geo.addPoint(x, y, 0.0) for x, y in start + (end - start) * inner]
     lines = [geo.addLine(a, b) for a, b in pairwise([corners[first], *points, corners[last]])]
@@ -154,7 +155,7 @@ def _fill(division: Division) -> None:
         gmsh.model.mesh.generate(2)
     except Exception as error:  # gmsh raises nothing more specific
         failure = f": {error}"
-    for number, block in enumerate(division.outlines.structure.blocks):
+    for number, block in enumerate(division.edges.structure.blocks):
         kinds = gmsh.model.mesh.getElementTypes(2, number + 1)
         if not len(kinds):
             raise MeshError(

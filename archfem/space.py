@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem import _fenicsx
-from archfem.errors import InvalidInput
 from archfem.joints import JointOperator, JointPoints, law_of
 from archfem.mesh import Mesh
 from archfem.quadrature import Quadrature
@@ -53,13 +52,7 @@ class BrokenSpace:
 
 
 def broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
-    """Build the space of continuous displacements in each block.
-
-    Raises:
-        InvalidInput: the degree is not 1 or 2.
-    """
-    if degree not in (1, 2):
-        raise InvalidInput(f"degree {degree!r}: elements are of degree 1 or 2")
+    """Build the space of continuous displacements in each block."""
     whole = _fenicsx.space(mesh.grid, "CG", degree, 2)
     old = _fenicsx.cell_dofs(whole)
     count = int(old.max()) + 1

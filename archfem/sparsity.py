@@ -8,25 +8,6 @@ from scipy import sparse
 
 from archfem.structure import Array
 
-FULL = 0.3
-"""Share of entries from which matrices are multiplied as full ones."""
-
-
-def product(left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The product of two matrices, either of which may be nearly full, as a modal basis is."""
-    few, many = sorted((left, right), key=_share)
-    if _share(many) < FULL:
-        return (left @ right).tocsr()
-    if _share(few) >= FULL:
-        return sparse.csr_matrix(left.toarray() @ right.toarray())
-    if many is right:
-        return sparse.csr_matrix(left @ right.toarray())
-    return sparse.csr_matrix((right.T @ left.toarray().T).T)
-
-
-def _share(matrix: sparse.csr_matrix) -> float:
-    return float(matrix.nnz / max(1, matrix.shape[0] * matrix.shape[1]))
-
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
@@ -74,11 +55,6 @@ class Pattern:
         data = np.zeros(len(self.indices))
         np.add.at(data, self._places(entries.row, entries.col), entries.data)
         return self.matrix(data)
-
-    def taken(self, matrix: Array) -> Array:
-        """Entries of a full matrix (n, n) on this pattern (nnz,)."""
-        rows = np.repeat(np.arange(self.size), np.diff(self.indptr))
-        return matrix[rows, self.indices]
 
     def outer(self, left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
         """Linear map (nnz, m) from factors d to the entries of Σ_k d_k l_k r_kᵀ.

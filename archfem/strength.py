@@ -190,10 +190,10 @@ def _where(block: xr.Dataset) -> str:
 
 def _peaks(model: Model, fields: Array) -> Array:
     """Largest compression and tension in each free block, never negative (frames, 2, blocks)."""
-    shape, free = model.shape, model.structure.free
-    operator = at_corners(shape)
-    corners = np.unique(np.concatenate(shape.cells))
-    owner = np.searchsorted(free, shape.block[corners])
+    cells, free = model.cells, model.structure.free
+    operator = at_corners(cells)
+    corners = np.unique(np.concatenate(cells.polygons))
+    owner = np.searchsorted(free, cells.block[corners])
     peaks = np.zeros((len(fields), 2, len(free)))
     for found, q in zip(peaks, fields, strict=True):
         largest, least = principal_values(*(operator @ q).reshape(-1, 3)[corners].T)

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from archfem.errors import InvalidInput
 from archfem.models import Model
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.structure import Array
 
 PATCH = 4
@@ -33,7 +33,7 @@ def cell_stress(model: Model, q: Array) -> Array:
         InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
     """
     check_state(model, q)
-    return (_stress(model.shape) @ q).reshape(-1, 3)
+    return (_stress(model.cells) @ q).reshape(-1, 3)
 
 
 def principal(model: Model, q: Array) -> xr.Dataset:
@@ -51,11 +51,11 @@ def principal(model: Model, q: Array) -> xr.Dataset:
     Raises:
         InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
     """
-    shape, structure = model.shape, model.structure
+    cells, structure = model.cells, model.structure
     across, up, shear = cell_stress(model, q).T
     largest, least = principal_values(across, up, shear)
-    centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
-    blocks = [structure.blocks[number] for number in shape.owner]
+    centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
+    blocks = [structure.blocks[number] for number in cells.owner]
     return xr.Dataset(
         {
             "s1": ("cell", largest, {"units": "Pa", "long_name": "larger principal stress"}),
@@ -63,7 +63,7 @@ def principal(model: Model, q: Array) -> xr.Dataset:
             "angle": ("cell", 0.5 * np.arctan2(2.0 * shear, across - up), {"units": "rad"}),
         },
         {
-            "block": ("cell", shape.owner),
+            "block": ("cell", cells.owner),
             "name": ("cell", [block.name for block in blocks]),
             "part": ("cell", [block.part for block in blocks]),
             "x": ("cell", centre[:, 0], {"units": "m"}),
@@ -78,7 +78,7 @@ def principal_values(across: Array, up: Array, shear: Array) -> tuple[Array, Arr
     return middle + radius, middle - radius
 
 
-def at_corners(shape: Shape) -> sparse.csr_matrix:
+def at_corners(cells: Cells) -> sparse.csr_matrix:
     """Stress at the cells' corners, (σ_xx, σ_yy, σ_xy) in turn, from coordinates (3 m, n).
 
     Each value lies on the plane that fits the centres of the cells around the corner best; where
@@ -86,22 +86,22 @@ def at_corners(shape: Shape) -> sparse.csr_matrix:
     across a joint. A linear stress field is recovered exactly.
 
     Args:
-        shape: of a model with a mesh.
+        cells: of a model with a mesh.
 
     Raises:
         InvalidInput: the blocks are rigid.
     """
-    return (sparse.kron(_fit(shape), sparse.identity(3)) @ _stress(shape)).tocsr()
+    return (sparse.kron(_fit(cells), sparse.identity(3)) @ _stress(cells)).tocsr()
 
 
-def _stress(shape: Shape) -> sparse.csr_matrix:
+def _stress(cells: Cells) -> sparse.csr_matrix:
     """Mean stress of the cells, from coordinates."""
-    if shape.stress is None:
+    if cells.stress is None:
         raise InvalidInput(
             "rigid blocks have no stress: build the model with fidelity='faces' or a higher rung, "
             "or take joint_stress, which needs only N and e"
         )
-    return shape.stress
+    return cells.stress
 
 
 def check_state(model: Model, q: Array) -> None:
@@ -117,22 +117,22 @@ def check_state(model: Model, q: Array) -> None:
         )
 
 
-def _fit(shape: Shape) -> sparse.csr_matrix:
+def _fit(cells: Cells) -> sparse.csr_matrix:
     """Values at the cells' corners of planes fitted to values at their centres (m, cells)."""
-    sizes = [len(cell) for cell in shape.cells]
-    entries = (np.concatenate(shape.cells), np.repeat(np.arange(len(sizes)), sizes))
+    sizes = [len(cell) for cell in cells.polygons]
+    entries = (np.concatenate(cells.polygons), np.repeat(np.arange(len(sizes)), sizes))
     touching = sparse.csr_matrix(
-        (np.ones(sum(sizes)), entries), (len(shape.places), len(shape.cells))
+        (np.ones(sum(sizes)), entries), (len(cells.places), len(cells.polygons))
     )
     few = sparse.diags((np.diff(touching.indptr) < PATCH).astype(float))
     row, column = (touching + few @ touching @ (touching.T @ touching)).nonzero()
-    count = np.bincount(row, minlength=len(shape.places))[:, None].clip(1)
-    centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
-    middle = np.stack([np.bincount(row, c[column], len(shape.places)) for c in centre.T], 1) / count
+    count = np.bincount(row, minlength=len(cells.places))[:, None].clip(1)
+    centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
+    middle = np.stack([np.bincount(row, c[column], len(cells.places)) for c in centre.T], 1) / count
     arm = centre[column] - middle[row]
-    moments = np.zeros((len(shape.places), 2, 2))
+    moments = np.zeros((len(cells.places), 2, 2))
     np.add.at(moments, row, arm[:, :, None] * arm[:, None, :])
     slope = np.linalg.pinv(moments, rcond=1e-6, hermitian=True)
-    reach = shape.places - middle
+    reach = cells.places - middle
     share = 1.0 / count[row, 0] + np.einsum("pi,pij,pj->p", reach[row], slope[row], arm)
     return sparse.csr_matrix((share, (row, column)), touching.shape)

@@ -1,15 +1,18 @@
 """Speed against error: one scene over rungs, meshes, quadratures and time steps."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from tqdm import tqdm
 
+from archfem.discretisation import Discretisation
 from archfem.errors import DidNotConverge
-from archfem.ladder import Setting, envelope, finest, largest_difference
+from archfem.ladder import Damping, Setting, damping_for, finest
+from archfem.models.build import build
 from archfem.motion import Motion
+from archfem.probe import largest_difference, peaks
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.structure import Structure
@@ -94,7 +97,7 @@ def accuracy(
     structure: Structure,
     motion: Motion,
     *,
-    damping: Rayleigh | None = None,
+    damping: Damping = None,
     rungs: Sequence[str] = RUNGS,
     cells: Sequence[tuple[int, int]] = CELLS,
     rules: Sequence[tuple[str, int | None]] = RULES,
@@ -103,12 +106,12 @@ def accuracy(
 ) -> Accuracy:
     """Run a scene over rungs × meshes × quadratures × time steps against a converged reference.
 
-    The error of a setting is the largest difference, over the joints, of the envelope of |e|.
+    The error of a setting is the largest difference, over the joints, of the largest |e|.
 
     Args:
         structure: what stands.
         motion: of the ground.
-        damping: of all runs.
+        damping: of all runs, or a function that finds it of the reference.
         rungs: fidelities to try.
         cells: meshes to try; "rigid" takes the first number as facets on a joint.
         rules: quadratures to try, each with its points on a facet (None: 3).
@@ -119,13 +122,14 @@ def accuracy(
         InvalidInput: a rung, rule or step is not known.
         DidNotConverge: the reference itself failed.
     """
-    best = finest(structure)
-    reference = envelope(best.build(structure), motion, damping, best.dt)
-    coarse = Setting(
-        best.fidelity, (best.cells[0] // 2, best.cells[1] // 2), best.quadrature, 2.0 * best.dt
-    )
-    doubt = _trial(coarse, structure, motion, damping, reference).error
     settings = list(_settings(rungs, cells, rules, steps))
+    best = finest(structure)
+    model = build(structure, best.discretisation)
+    damping = damping_for(model, damping)
+    reference = peaks(model, motion, damping, best.dt)
+    through, along = best.discretisation.cells
+    halved = replace(best.discretisation, cells=(through // 2, along // 2))
+    doubt = _trial(Setting(halved, 2.0 * best.dt), structure, motion, damping, reference).error
     trials = [
         _trial(setting, structure, motion, damping, reference)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
@@ -143,9 +147,9 @@ def _settings(
     for rung in rungs:
         for rule, points in rules:
             meshless = rung == "rigid" and rule == "exact"
-            for mesh in cells[:1] if meshless else cells:
-                for dt in steps:
-                    yield Setting(rung, (1, 1) if meshless else mesh, rule, dt, points)
+            for mesh in [(1, 1)] if meshless else cells:
+                asked = Discretisation(rung, mesh, quadrature=rule, points=points)
+                yield from (Setting(asked, dt) for dt in steps)
 
 
 def _trial(
@@ -156,11 +160,11 @@ def _trial(
     reference: np.ndarray,
 ) -> Trial:
     """Build, run and compare one setting; what is compiled on first use is not counted."""
-    model = setting.build(structure)
+    model = build(structure, setting.discretisation)
     time_history(model, motion.cut(0.0, 2.0 * setting.dt), damping=damping, dt=setting.dt)
     start = perf_counter()
     try:
-        error = largest_difference(envelope(model, motion, damping, setting.dt), reference)
+        error = largest_difference(peaks(model, motion, damping, setting.dt), reference)
     except DidNotConverge:
         error = np.inf
     return Trial(setting, model.size, perf_counter() - start, error)

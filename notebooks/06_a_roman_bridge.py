@@ -91,8 +91,8 @@ draw_stress(model, dead["as it stands"].q)
 
 # %%
 stone = "main arch, voussoir 9"
-body = forces_on(existing, joints, stone, model.shape)
-draw_free_body(existing, joints, stone, shape=model.shape)
+body = forces_on(existing, joints, stone, model.cells)
+draw_free_body(existing, joints, stone, cells=model.cells)
 
 # %% [markdown]
 # ## Modes (figure 11), and what the damping uses

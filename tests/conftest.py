@@ -19,7 +19,7 @@ def ring():
 @pytest.fixture(scope="session")
 def ring_model(ring):
     """The ring with all nodes of 4 × 4 cells a voussoir."""
-    from archfem.models.build import build
+    from archfem.ladder import build
 
     return build(ring, fidelity="full", cells=(4, 4))
 

@@ -14,7 +14,7 @@ LAYERS = [
     "errors tables files geometry laws _petsc",
     "roles units naming",
     "criteria materials quadrature schemes signals oscillator records",
-    "structure synthetic codes settings counted",
+    "structure synthetic codes settings counted discretisation",
     "actions drawings polygons direction sparsity resultants motion softness rigid_motion",
     "assembly snapping",
     "shapes survey",
@@ -26,8 +26,8 @@ LAYERS = [
     "matching mechanism sliding",
     "limit suite events",
     "capacity ground",
-    "_fenicsx outlines",
-    "intervals",
+    "_fenicsx edges",
+    "division",
     "mesh",
     "space",
     "forms",
@@ -40,6 +40,7 @@ LAYERS = [
     "modal_damping findings",
     "recorder",
     "runs push",
+    "probe",
     "ladder scales",
     "tradeoff case",
     "analysis",
@@ -125,9 +126,11 @@ for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "ufl"):
     sys.modules[name] = None
 import archfem as af
 from archfem import criteria, limit, mechanism, resultants, rigid_joints
+from archfem.discretisation import Discretisation
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 assert rigid_joints.rigid_joints(ring, 4, rigid_joints.Quadrature()).opening.shape == (162, 51)
 assert af.Motion.synthetic(duration=2.0, seed=1).pga > 0
+assert Discretisation("faces", (2, 2)).rule.count(1) == 3
 """
     subprocess.run([sys.executable, "-c", script], check=True)
 

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from archfem.actions import Action, Settlement
 from archfem.joints import JointOperator
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.structure import Array, Structure
 
 
@@ -50,7 +50,7 @@ class Model(Protocol):
         mass: kinetic energy is ½ q̇ᵀ M q̇ (n, n).
         blocks: stiffness of the blocks without the joints (n, n).
         body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg …].
-        shape: how the blocks' points move with q.
+        cells: polygons that cover the blocks, and how they move with q.
         supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         prediction: what was predicted when it was chosen; None where it was asked for by name.
     """
@@ -61,7 +61,7 @@ class Model(Protocol):
     mass: sparse.csr_matrix
     blocks: sparse.csr_matrix
     body: Array
-    shape: Shape
+    cells: Cells
     supports: Array
     prediction: Prediction | None
 

@@ -3,84 +3,46 @@
 import logging
 from collections.abc import Mapping, Sequence
 
+from archfem.discretisation import Discretisation
 from archfem.errors import InvalidInput
 from archfem.models import Model
-from archfem.models.reduce import modal, reduced
+from archfem.models.reduce import reduced
 from archfem.models.rigid import rigid
-from archfem.quadrature import Quadrature
 from archfem.softness import soft_blocks, softness
 from archfem.structure import Structure
 
 logger = logging.getLogger("archfem")
 
-FIDELITIES = ("rigid", "modal", "faces", "condensed", "full", "monolithic")
-"""The ladder, the cheapest rung first."""
 
-MODAL_LIMIT = 25.0
-"""Frequency up to which "modal" keeps modes [Hz]."""
-
-
-def build(
-    structure: Structure,
-    *,
-    fidelity: str | Mapping[str, str] = "full",
-    cells: tuple[int, int] = (4, 4),
-    cell: str = "quadrilateral",
-    coarse: float | None = None,
-    degree: int = 1,
-    quadrature: str = "lobatto",
-    points: int | None = None,
-) -> Model:
+def build(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of a structure.
 
     Args:
         structure: what stands.
-        fidelity: a rung of the ladder:
-            "rigid": rigid blocks, no mesh; all compliance is in the joints;
-            "modal": vibration shapes of the closed structure up to 25 Hz and static rest at the
-            joints; "faces": each joint face moves as a plane, the rest statically condensed;
-            "condensed": all nodes on joints, the rest statically condensed; "full": all nodes;
-            "monolithic": all nodes, UFL forms assembled at each iteration.
-            Or rungs by block name or part, with "rest" for all others, for example
-            {"backfill": "full", "rest": "faces"}.
-        cells: through the thickness (facets on a joint) and along each block, at least.
-        cell: "quadrilateral" or "triangle".
-        coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
-            given, half of the block's mean thickness.
-        degree: of the elements, 1 or 2.
-        quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
-        points: on each facet, 3 where not given.
+        asked: rung, or rungs by block, mesh, and rule on the joints. Of the ladder, "rigid" has
+            rigid blocks and no mesh: all compliance is in the joints; "faces" lets each joint face
+            move as a plane and condenses the rest statically; "condensed" keeps all nodes on
+            joints and condenses the rest; "full" keeps all nodes; "monolithic" does, too, and
+            assembles the UFL forms at each iteration.
 
     Raises:
-        InvalidInput: an option is not one of those above.
+        InvalidInput: a rung is asked for blocks that there are not.
         MeshError: the blocks cannot be cut as asked.
     """
-    rule = Quadrature(quadrature, points)
-    if len(tuple(cells)) != 2:
-        raise InvalidInput(f"cells {cells!r}: give two numbers, through the thickness and along")
-    if isinstance(fidelity, str) and fidelity not in FIDELITIES:
-        raise InvalidInput(f"fidelity '{fidelity}' is not known: use one of {FIDELITIES}")
-    if rule.rule == "exact" and (degree != 1 or fidelity == "monolithic"):
-        raise InvalidInput(
-            "exact quadrature needs openings that are linear along a facet, and is not written in "
-            "UFL: use degree 1 and a rung other than monolithic"
-        )
-    rungs = _rungs(structure, fidelity)
+    rungs = _rungs(structure, asked.fidelity)
     _doubt(structure, rungs)
-    if fidelity == "rigid":
-        return rigid(structure, cells[0], rule)
-    from archfem.mesh import Meshing, mesh  # FEniCSx is needed from here on only
+    if asked.fidelity == "rigid":
+        return rigid(structure, asked.through, asked.rule)
+    from archfem.mesh import mesh  # FEniCSx is needed from here on only
     from archfem.models.full import full
     from archfem.models.monolithic import Monolithic
     from archfem.space import broken_space
 
-    space = broken_space(mesh(structure, Meshing(*cells, cell, coarse)), degree)
-    if fidelity == "monolithic":
-        return Monolithic(space, rule)
-    model = full(space, rule)
-    if fidelity == "modal":
-        return modal(model, MODAL_LIMIT)
-    return model if fidelity == "full" else reduced(model, rungs, _name(fidelity))
+    space = broken_space(mesh(structure, asked), asked.degree)
+    if asked.fidelity == "monolithic":
+        return Monolithic(space, asked.rule)
+    model = full(space, asked.rule)
+    return model if asked.fidelity == "full" else reduced(model, rungs, asked.name)
 
 
 def _rungs(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]:
@@ -110,9 +72,3 @@ def _doubt(structure: Structure, rungs: Sequence[str]) -> None:
                 found.ratio,
                 rungs[number],
             )
-
-
-def _name(fidelity: str | Mapping[str, str]) -> str:
-    if isinstance(fidelity, str):
-        return fidelity
-    return ", ".join(f"{key}: {rung}" for key, rung in fidelity.items())

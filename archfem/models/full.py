@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.forms import Forms
+from archfem.models.cells import Cells
 from archfem.models.jointed import Jointed
-from archfem.models.shape import Shape
 from archfem.quadrature import Quadrature
 from archfem.space import BrokenSpace, joint_operator
 
@@ -33,11 +33,11 @@ def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
         blocks=forms.stiffness()[free][:, free],
         body=mass @ axes,
         operator=joint_operator(space, rule),
-        shape=_shape(space, forms, free),
+        cells=_cells(space, forms, free),
     )
 
 
-def _shape(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Shape:
+def _cells(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Cells:
     """The cells of the free blocks, as polygons around their corners."""
     moving = np.isin(space.mesh.blocks, space.mesh.structure.free)
     nodes = free[0::2] // 2
@@ -45,10 +45,10 @@ def _shape(space: BrokenSpace, forms: Forms, free: NDArray[np.intp]) -> Shape:
     number[nodes] = np.arange(len(nodes))
     corners = [0, 1, 3, 2] if space.cells.shape[1] in (4, 9) else [0, 1, 2]
     rows = (3 * np.flatnonzero(moving)[:, None] + np.arange(3)).ravel()
-    return Shape(
+    return Cells(
         places=space.places[nodes],
         block=space.owner[nodes].astype(int),
-        cells=tuple(number[space.cells[moving][:, corners]]),
+        polygons=tuple(number[space.cells[moving][:, corners]]),
         lift=sparse.identity(len(free), format="csr"),
         stress=forms.stress()[rows][:, free].tocsr(),
     )

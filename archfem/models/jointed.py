@@ -9,7 +9,7 @@ from scipy import sparse
 from archfem.actions import Action, BodyForce, Settlement
 from archfem.joints import JointOperator
 from archfem.models import Prediction
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.rigid_joints import gaps_of
 from archfem.sparsity import Pattern
 from archfem.structure import Array, Structure
@@ -31,7 +31,7 @@ class Jointed:
         blocks: sparse.csr_matrix,
         body: Array,
         operator: JointOperator,
-        shape: Shape,
+        cells: Cells,
     ) -> None:
         pattern = Pattern.of(mass, blocks, operator.couplings())
         self.structure = structure
@@ -41,7 +41,7 @@ class Jointed:
         self.blocks = pattern.spread(blocks)
         self.body = body
         self.operator = operator
-        self.shape = shape
+        self.cells = cells
         self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
         self._always = self.blocks.data + pattern.spread(operator.shear_stiffness()).data
@@ -58,7 +58,7 @@ class Jointed:
             blocks=self.blocks,
             body=self.body,
             operator=operator,
-            shape=self.shape,
+            cells=self.cells,
         ).moved(self.supports)
 
     def settled(self, settlement: Settlement) -> "Jointed":
@@ -88,14 +88,14 @@ class Jointed:
         """Derivative of `force`; the same object as before while no point opens or closes."""
         stiffness = self.operator.stiffness(q)
         if self._last is None or not np.array_equal(stiffness, self._last[0]):
-            matrix = self._pattern.matrix(self._always + self._across(stiffness))
+            matrix = self._pattern.matrix(self._always + self._across @ stiffness)
             self._last = (stiffness, matrix)
         return self._last[1]
 
     def closed(self) -> sparse.csr_matrix:
         """Tangent with every joint closed over its whole depth."""
         whole = self.operator.law.stiffness(np.full(self.operator.opening.shape[0], -1.0))
-        return self._pattern.matrix(self._always + self._across(whole))
+        return self._pattern.matrix(self._always + self._across @ whole)
 
     def energy(self, q: Array) -> float:
         """Potential energy of blocks and joints [J]."""
@@ -111,4 +111,4 @@ class Jointed:
             multiples = np.array([action.horizontal, action.vertical])
             return self.body @ multiples * self.structure.gravity
         block, point = action.place(self.structure)
-        return self.shape.at(block, point).T @ np.array(action.force)
+        return self.cells.at(block, point).T @ np.array(action.force)

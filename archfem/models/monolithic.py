@@ -27,7 +27,7 @@ class Monolithic:
         self.structure = linear.structure
         self.size = linear.size
         self.body = linear.body
-        self.shape = linear.shape
+        self.cells = linear.cells
         self.load = linear.load
         self._forms = Forms(space, rule)
         self._free = space.free

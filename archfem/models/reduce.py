@@ -2,8 +2,7 @@
 
 Between joints everything is linear, so a basis B for each block gives every fidelity by the one
 formula M → BᵀMB, K → BᵀKB, G → GB. Displacements and stresses inside the blocks are recovered by
-the same basis. References: Guyan, AIAA J. 3 (1965) 380, for static condensation; Wilson, Three-
-dimensional static and dynamic analysis of structures (2002), chapter 18, for `modal`.
+the same basis. Reference: Guyan, AIAA J. 3 (1965) 380, for static condensation.
 """
 
 from collections.abc import Sequence
@@ -12,36 +11,30 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import eigh
-from scipy.sparse.linalg import eigsh, splu
+from scipy.sparse.linalg import splu
 
-from archfem.errors import InvalidInput
 from archfem.joints import Facets
 from archfem.models.jointed import Jointed
 from archfem.rigid_motion import motion_of
-from archfem.sparsity import product
 from archfem.structure import Array, Structure
 
 Numbers = NDArray[np.intp]
 
-RUNGS = ("rigid", "faces", "condensed", "full")
-"""What a block of a meshed model may be reduced to, the lowest first."""
-
 
 def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointed:
     """Express a model in the coordinates of a basis (n, m)."""
-    shape, back = model.shape, basis.T.tocsr()
+    cells, back = model.cells, basis.T.tocsr()
     return Jointed(
         model.structure,
         fidelity,
-        mass=product(back, product(model.mass, basis)),
-        blocks=product(back, product(model.blocks, basis)),
+        mass=back @ (model.mass @ basis),
+        blocks=back @ (model.blocks @ basis),
         body=basis.T @ model.body,
         operator=model.operator.projected(basis),
-        shape=replace(
-            shape,
-            lift=product(shape.lift, basis),
-            stress=None if shape.stress is None else product(shape.stress, basis),
+        cells=replace(
+            cells,
+            lift=cells.lift @ basis,
+            stress=None if cells.stress is None else cells.stress @ basis,
         ),
     ).moved(model.supports)
 
@@ -58,17 +51,14 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
 
     Args:
         model: with all nodes.
-        rungs: of each block of the structure (n_blocks,).
+        rungs: of each block of the structure, some of `RUNGS` (n_blocks,).
         fidelity: what to call the result.
     """
-    unknown = sorted(set(rungs) - set(RUNGS))
-    if unknown:
-        raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
     joints = _faces(model)
     pieces, order = [], []
     plane = {number for number, block in enumerate(model.structure.blocks) if block.fixed}
     for number in model.structure.free:
-        nodes = np.flatnonzero(model.shape.block == number)
+        nodes = np.flatnonzero(model.cells.block == number)
         faces = [own for face in joints if len(own := np.intersect1d(face, nodes))]
         rung = rungs[number]
         if rung == "faces" and _bends(model.structure, number):
@@ -116,7 +106,7 @@ def _basis(model: Jointed, nodes: Numbers, faces: list[Numbers], rung: str) -> s
     """Basis of one block (2 nodes, m), its nodes in ascending order."""
     if rung == "full":
         return sparse.identity(2 * len(nodes), format="csr")
-    places = model.shape.places
+    places = model.cells.places
     if rung == "rigid":
         motion = motion_of(places[nodes], places[nodes].mean(axis=0))
         return sparse.csr_matrix(motion.reshape(-1, 3))
@@ -172,59 +162,3 @@ def _spanned(model: Jointed, plane: set[int]) -> Jointed:
         return model
     whole = [set(joint.blocks) <= plane for joint in model.structure.joints]
     return model.with_operator(model.operator.spanned(whole))
-
-
-def modal(model: Jointed, below: float) -> Jointed:
-    """Reduce a whole structure to modes of its closed state and the static rest at its joints.
-
-    Wilson's fast nonlinear analysis: the modes below a frequency, and, for the residual
-    flexibility, the static displacements under a unit of each joint's resultants and of gravity
-    along x and y. Together they are made into vibration shapes, in which mass and closed
-    stiffness are diagonal.
-
-    Args:
-        model: any rung.
-        below: modes up to this frequency are kept [Hz].
-    """
-    closed = model.closed().tocsc()
-    solve = splu(closed).solve
-    attachments = solve(np.column_stack([_joint_loads(model), model.body]))
-    vectors = np.column_stack([_modes(model, closed, below), attachments])
-    vectors /= np.sqrt(np.sum(vectors * (model.mass @ vectors), axis=0))
-    squares, turn = eigh(vectors.T @ (model.mass @ vectors))
-    kept = squares > 1e-10 * squares[-1]  # what is left of vectors that nearly coincide
-    vectors = vectors @ (turn[:, kept] / np.sqrt(squares[kept]))
-    _, shapes = eigh(vectors.T @ (closed @ vectors))
-    return projected(model, sparse.csr_matrix(vectors @ shapes), "modal")
-
-
-def _joint_loads(model: Jointed) -> Array:
-    """Generalised forces of each joint when it closes, turns while closed, and slips (n, 3 joints).
-
-    They are those of the joint's own law, whatever integrates it: the basis then holds all rigid
-    motions of the blocks, without which no mechanism could form.
-    """
-    joints, columns = model.operator, []
-    for number in range(joints.points.count):
-        own = (joints.points.joint == number).astype(float)
-        turned = own * (joints.points.arm - 2.0 * np.abs(joints.points.arm).max())
-        columns += [
-            joints.opening.T @ joints.law.forces(-own),
-            joints.opening.T @ joints.law.forces(turned),
-            joints.slip.T @ (joints.law.shear @ own),
-        ]
-    return np.column_stack(columns)
-
-
-def _modes(model: Jointed, closed: sparse.csc_matrix, below: float) -> Array:
-    """Modes of the closed structure up to a frequency (n, modes)."""
-    limit = (2.0 * np.pi * below) ** 2
-    count = 32
-    while True:
-        if count >= model.size // 2:
-            squares, shapes = eigh(closed.toarray(), model.mass.toarray())
-            return shapes[:, squares <= limit]
-        squares, shapes = eigsh(closed, count, model.mass.tocsc(), sigma=0.0)
-        if squares.max() > limit:
-            return shapes[:, squares <= limit]
-        count *= 2

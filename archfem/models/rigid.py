@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
+from archfem.models.cells import Cells
 from archfem.models.jointed import Jointed
-from archfem.models.shape import Shape
 from archfem.quadrature import Quadrature
 from archfem.rigid_joints import rigid_joints
 from archfem.rigid_motion import motion_of
@@ -40,11 +40,11 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
         blocks=sparse.csr_matrix((size, size)),
         body=body,
         operator=rigid_joints(structure, facets, rule),
-        shape=_shape(structure),
+        cells=_cells(structure),
     )
 
 
-def _shape(structure: Structure) -> Shape:
+def _cells(structure: Structure) -> Cells:
     """One polygon a free block."""
     outlines = [structure.blocks[number].drawn() for number in structure.free]
     starts = np.cumsum([0, *map(len, outlines)])
@@ -52,9 +52,9 @@ def _shape(structure: Structure) -> Shape:
         motion_of(outline, structure.blocks[number].centroid).reshape(-1, 3)
         for number, outline in zip(structure.free, outlines, strict=True)
     ]
-    return Shape(
+    return Cells(
         places=np.concatenate(outlines),
         block=np.repeat(structure.free, [len(outline) for outline in outlines]),
-        cells=tuple(np.arange(a, b) for a, b in pairwise(starts)),
+        polygons=tuple(np.arange(a, b) for a, b in pairwise(starts)),
         lift=sparse.block_diag(motions, format="csr"),
     )

@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 
 from archfem.errors import InvalidInput
 from archfem.freebody import FreeBody, forces_on
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.structure import Array, Structure
 from archfem.units import kN
 from archfem.view.style import EDGE, FAINT, GHOST, INK, LINES, NORMAL, SMALL, STONE, dress
@@ -25,7 +25,7 @@ WIDTH, PANEL, LINE = 9.6, 5.0, 0.18
 
 
 def draw_free_body(
-    structure: Structure, joints: xr.Dataset, block: int | str, *, shape: Shape | None = None
+    structure: Structure, joints: xr.Dataset, block: int | str, *, cells: Cells | None = None
 ) -> Figure:
     """Draw the forces on one block at rest, and beside it the polygon they close.
 
@@ -38,13 +38,13 @@ def draw_free_body(
         structure: whose block it is.
         joints: as made by `joint_dataset`, at one instant.
         block: its number or name.
-        shape: of a model with a mesh, for the weight as meshed.
+        cells: of a model with a mesh, for the weight as meshed.
 
     Raises:
         InvalidInput: the block is fixed, or has too many joints to draw.
         InvalidStructure: there is no such block.
     """
-    body = forces_on(structure, joints, block, shape)
+    body = forces_on(structure, joints, block, cells)
     if len(body.joints) > MOST:
         raise InvalidInput(
             f"block '{body.block.name}' has {len(body.joints)} joints: forces of at most {MOST} "

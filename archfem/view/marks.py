@@ -119,7 +119,7 @@ def joint_ends(model: Model) -> sparse.csr_matrix:
     blocks = model.structure.blocks
     rows = [
         sum(
-            still if blocks[number].fixed else 0.5 * model.shape.at(number, end)
+            still if blocks[number].fixed else 0.5 * model.cells.at(number, end)
             for number in joint.blocks
         )
         for joint in model.structure.joints

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from archfem.errors import InvalidInput
 from archfem.modal import Modes
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.softness import yielding_blocks
 from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
@@ -126,14 +126,14 @@ class _Panel:
 
     def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
         model = modes.model
-        shape, structure = model.shape, model.structure
-        moves = shape.displacement(modes.shapes[:, number - 1])
+        cells, structure = model.cells, model.structure
+        moves = cells.displacement(modes.shapes[:, number - 1])
         self._moves = moves * REACH * structure.size / np.linalg.norm(moves, axis=1).max()
-        self._places = shape.places
+        self._places = cells.places
         soil = yielding_blocks(structure)
-        self._loops = sorted(_loops(shape), key=lambda loop: shape.block[loop[0]] not in soil)
-        pale = [shape.block[loop[0]] in soil for loop in self._loops]
-        rest = LineCollection(shape.places[shape.rims], colors=GHOST, linewidths=0.9, zorder=1)
+        self._loops = sorted(_loops(cells), key=lambda loop: cells.block[loop[0]] not in soil)
+        pale = [cells.block[loop[0]] in soil for loop in self._loops]
+        rest = LineCollection(cells.places[cells.rims], colors=GHOST, linewidths=0.9, zorder=1)
         still = PolyCollection(
             support_outlines(model, 1.0), facecolors=SUPPORT, edgecolors=EDGE, linewidths=0.6
         )
@@ -154,9 +154,9 @@ class _Panel:
         self._blocks.set_verts([places[loop] for loop in self._loops])
 
 
-def _loops(shape: Shape) -> list[list[int]]:
+def _loops(cells: Cells) -> list[list[int]]:
     """Points around each block, in order."""
-    following, loops = dict(shape.rims.tolist()), []
+    following, loops = dict(cells.rims.tolist()), []
     while following:
         start, point = following.popitem()
         loop = [start]

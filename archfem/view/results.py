@@ -37,13 +37,13 @@ def write_dead(case: Case, dead: Equilibrium, folder: Path) -> list[Path]:
     """
     model, structure = dead.model, dead.model.structure
     files = [save(draw_structure(structure, dead.joints), folder / "dead.png")]
-    if model.shape.stress is not None:
+    if model.cells.stress is not None:
         files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))
         table = folder / "dead_stress.txt"
         table.write_text(use_table(strength_use(model, dead.q)) + "\n", encoding="utf-8")
         files.append(table)
     if "free_body" in case.output:
-        body = draw_free_body(structure, dead.joints, case.output["free_body"], shape=model.shape)
+        body = draw_free_body(structure, dead.joints, case.output["free_body"], cells=model.cells)
         files.append(save(body, folder / "free_body.png"))
     return files
 

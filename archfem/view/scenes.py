@@ -156,7 +156,7 @@ def _check_picture(
     model: Model, colour: str, magnification: float | None, size: tuple[int, int]
 ) -> None:
     """Refuse what cannot be drawn."""
-    check_colour(model.shape, colour)
+    check_colour(model.cells, colour)
     if magnification is not None and not 0.0 < magnification < 1e12:
         raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
     if len(size) != 2 or any(n % 2 or n < least for n, least in zip(size, SMALLEST, strict=True)):

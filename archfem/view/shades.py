@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 
 from archfem.errors import InvalidInput
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.structure import Array
 from archfem.units import MPa, mm
 from archfem.view.style import STONE
@@ -44,7 +44,7 @@ class Scale:
     extend: str
 
 
-def check_colour(shape: Shape, colour: str) -> None:
+def check_colour(cells: Cells, colour: str) -> None:
     """Refuse what blocks cannot be coloured by.
 
     Raises:
@@ -52,38 +52,38 @@ def check_colour(shape: Shape, colour: str) -> None:
     """
     if colour not in COLOURS:
         raise InvalidInput(f"colour '{colour}' is not known: use one of {COLOURS}")
-    if colour == "stress" and shape.stress is None:
+    if colour == "stress" and cells.stress is None:
         raise InvalidInput(
             "rigid blocks have no stress: use colour='displacement', or build and run the model "
             "with fidelity='full'"
         )
 
 
-def shade(shape: Shape, q: Array, colour: str) -> Array:
+def shade(cells: Cells, q: Array, colour: str) -> Array:
     """What the blocks are coloured by.
 
     Args:
-        shape: of the model.
+        cells: of the model.
         q: coordinates (n,).
         colour: "displacement", the length of it at every point [mm], or "stress", the least
             principal one of every cell, compression negative [MPa].
     """
     if colour == "displacement":
-        return np.linalg.norm(shape.displacement(q), axis=1) / mm
-    assert shape.stress is not None, "checked by check_colour"
-    across, up, shear = (shape.stress @ q).reshape(-1, 3).T / MPa
+        return np.linalg.norm(cells.displacement(q), axis=1) / mm
+    assert cells.stress is not None, "checked by check_colour"
+    across, up, shear = (cells.stress @ q).reshape(-1, 3).T / MPa
     return 0.5 * (across + up) - np.hypot(0.5 * (across - up), shear)
 
 
-def scale_for(shape: Shape, fields: Array, colour: str) -> Scale:
+def scale_for(cells: Cells, fields: Array, colour: str) -> Scale:
     """Choose a scale that suits a whole film.
 
     Args:
-        shape: of the model.
+        cells: of the model.
         fields: coordinates (frames, n).
         colour: one of `COLOURS`.
     """
-    found = np.array([shade(shape, q, colour) for q in fields])
+    found = np.array([shade(cells, q, colour) for q in fields])
     if colour == "displacement":
         highest = float(found.max()) or 1.0
         return Scale(colour, "displacement [mm]", LIGHT_TO_DARK, 0.0, highest, "neither")

@@ -13,7 +13,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from archfem.models import Model
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.structure import Array, Structure
 from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines
@@ -73,14 +73,14 @@ class Setting:
             colour: one of `COLOURS`.
             magnification: of displacements, or None.
         """
-        shape, structure = model.shape, model.structure
-        moves = np.array([shape.displacement(q) for q in fields])
+        cells, structure = model.cells, model.structure
+        moves = np.array([cells.displacement(q) for q in fields])
         by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
         still = support_outlines(model, by)
-        moved = shape.places + by * moves
-        points = np.concatenate([*still, shape.places, moved.min(axis=0), moved.max(axis=0)])
+        moved = cells.places + by * moves
+        points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
         room = MARGIN * structure.size
-        scale = scale_for(shape, fields, colour)
+        scale = scale_for(cells, fields, colour)
         return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
 
     def with_outlines(self, outlines: list[Array], since: float) -> Self:
@@ -107,13 +107,13 @@ class Stage:
     def __init__(self, setting: Setting, size: tuple[int, int]) -> None:
         _go_headless()
         self._setting = setting
-        shape = setting.model.shape
+        cells = setting.model.cells
         self._pen = max(0.6, size[0] / FULL)
         self._height = 1e-3 * setting.model.structure.size
         self._disc = _disc(setting.model.structure)
-        self._blocks = _surface(shape)
-        self._edges = shape.rims
-        self._outlines = _lines(self._flat(shape.places, EDGES), self._edges)
+        self._blocks = _surface(cells)
+        self._edges = cells.rims
+        self._outlines = _lines(self._flat(cells.places, EDGES), self._edges)
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
         self._plotter.background_color = pv.Color("white")
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
@@ -153,8 +153,8 @@ class Stage:
             past: where hinges have been, as moved (n, 2) [m].
             outlines: of blocks as a mechanism moves them, each (k, 2) [m].
         """
-        setting, shape = self._setting, self._setting.model.shape
-        places = shape.places + setting.magnification * shape.displacement(q)
+        setting, cells = self._setting, self._setting.model.cells
+        places = cells.places + setting.magnification * cells.displacement(q)
         self._blocks.points = self._flat(places, 0)
         self._outlines.points = self._flat(places, EDGES)
         self._paint(q)
@@ -179,7 +179,7 @@ class Stage:
             around = np.arange(len(outline))
             edges = np.column_stack([around, np.roll(around, -1)])
             self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
-        rest = _lines(self._flat(self._setting.model.shape.places, REST), self._edges)
+        rest = _lines(self._flat(self._setting.model.cells.places, REST), self._edges)
         self._add(rest, GHOST)
         self._add(self._outlines, EDGE, 1.5)
         self._meshes = {
@@ -196,7 +196,7 @@ class Stage:
     def _paint(self, q: Array) -> None:
         """Give the blocks the values by which they are coloured."""
         scale = self._setting.scale
-        shades = shade(self._setting.model.shape, q, scale.colour)
+        shades = shade(self._setting.model.cells, q, scale.colour)
         if scale.colour == "stress":
             self._blocks.cell_data["shade"] = shades[self._blocks.cell_data["cell"]]
         else:
@@ -266,12 +266,12 @@ def _go_headless() -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
-def _surface(shape: Shape) -> pv.PolyData:
+def _surface(cells: Cells) -> pv.PolyData:
     """The blocks' cells, cut into triangles that know the number of their cell."""
-    listed = np.concatenate([[len(cell), *cell] for cell in shape.cells])
-    places = np.column_stack([shape.places, np.zeros(len(shape.places))])
+    listed = np.concatenate([[len(cell), *cell] for cell in cells.polygons])
+    places = np.column_stack([cells.places, np.zeros(len(cells.places))])
     surface = pv.PolyData(places, faces=listed)
-    surface.cell_data["cell"] = np.arange(len(shape.cells))
+    surface.cell_data["cell"] = np.arange(len(cells.polygons))
     return surface.triangulate()
 
 

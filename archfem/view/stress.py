@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from archfem.errors import InvalidInput
 from archfem.models import Model
-from archfem.models.shape import Shape
+from archfem.models.cells import Cells
 from archfem.resultants import joint_dataset
 from archfem.softness import yielding_blocks
 from archfem.stress import at_corners, cell_stress, principal_values
@@ -65,21 +65,21 @@ def draw_stress(
     Raises:
         InvalidInput: the blocks are rigid, or there is no such part.
     """
-    structure, shape = model.structure, model.shape
+    structure, cells = model.structure, model.cells
     chosen = _chosen(structure, parts)
-    corners = (at_corners(shape) @ q).reshape(-1, 3)
+    corners = (at_corners(cells) @ q).reshape(-1, 3)
     own = axes is None
     axes = canvas(structure).add_subplot() if axes is None else axes
     page = cast(Figure, axes.figure)
     dress(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
     draw_blocks(axes, structure)
-    _shade(axes, shape, -principal_values(*corners.T)[1], chosen)
+    _shade(axes, cells, -principal_values(*corners.T)[1], chosen)
     outlines = [block.drawn() for block in structure.blocks]
     axes.add_collection(
         PolyCollection(outlines, facecolors="none", edgecolors=EDGE, linewidths=0.6, zorder=3)
     )
-    _crosses(axes, shape, cell_stress(model, q), chosen)
+    _crosses(axes, cells, cell_stress(model, q), chosen)
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))
     axes.set_title(f"{structure.name}: principal compression", fontsize=NORMAL, color=INK)
@@ -101,14 +101,14 @@ def _chosen(structure: Structure, parts: Collection[str] | None) -> Numbers:
     return np.array([n for n in structure.free if structure.blocks[n].part in parts])
 
 
-def _shade(axes: Axes, shape: Shape, compression: Array, chosen: Numbers) -> None:
+def _shade(axes: Axes, cells: Cells, compression: Array, chosen: Numbers) -> None:
     """Colour the cells of blocks by compression at their corners [Pa], and add a colour bar."""
-    cells = [c for c, own in zip(shape.cells, shape.owner, strict=True) if own in chosen]
-    corners = np.array([[*cell, cell[-1]][:4] for cell in cells])
+    shaded = [c for c, own in zip(cells.polygons, cells.owner, strict=True) if own in chosen]
+    corners = np.array([[*cell, cell[-1]][:4] for cell in shaded])
     shown = compression[np.unique(corners)].clip(0.0)
     highest = max(float(np.percentile(shown, 100.0 - BEYOND)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
-    places, triangles = _cut(shape.places[corners])
+    places, triangles = _cut(cells.places[corners])
     painted = axes.tripcolor(
         Triangulation(places[..., 0].ravel(), places[..., 1].ravel(), triangles),
         _inside(compression[corners]).ravel().clip(0.0) / unit,
@@ -153,15 +153,15 @@ def _cut(corners: Array) -> tuple[Array, Numbers]:
     return places, (starts[:, None, None] + square.reshape(-1, 3)).reshape(-1, 3)
 
 
-def _crosses(axes: Axes, shape: Shape, stress: Array, chosen: Numbers) -> None:
+def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
-    spacing = APART * np.ptp(shape.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
-    centre = np.array([shape.places[cell].mean(axis=0) for cell in shape.cells])
+    spacing = APART * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
+    centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
     groups = [
-        np.flatnonzero(shape.owner == number)[group]
+        np.flatnonzero(cells.owner == number)[group]
         for number in chosen
         for group in _grid(
-            shape.places[shape.block == number], centre[shape.owner == number], spacing
+            cells.places[cells.block == number], centre[cells.owner == number], spacing
         )
     ]
     middle = np.array([centre[group].mean(axis=0) for group in groups])

@@ -8,7 +8,7 @@ from archfem.tradeoff import Accuracy, Trial
 from archfem.view.style import EDGE, FAINT, LINES, SMALL, dress
 from archfem.view.style import HINGE as RED
 
-MARKERS = {"rigid": "o", "modal": "P", "faces": "s", "condensed": "D", "full": "^"}
+MARKERS = {"rigid": "o", "faces": "s", "condensed": "D", "full": "^"}
 RULES = ("nodal", "lobatto", "gauss", "exact")
 
 
@@ -49,9 +49,9 @@ def draw_accuracy(found: Accuracy) -> Figure:
 
 def _mark(axes: Axes, trial: Trial, floor: float) -> None:
     """One setting; those on a mixed ladder are stars."""
-    rung = trial.setting.fidelity
-    marker = MARKERS.get(rung, "*") if isinstance(rung, str) else "*"
-    colour = LINES[RULES.index(trial.setting.quadrature) % len(LINES)]
+    asked = trial.setting.discretisation
+    marker = MARKERS.get(asked.name, "*")
+    colour = LINES[RULES.index(asked.quadrature) % len(LINES)]
     axes.plot(
         trial.seconds,
         max(trial.error, floor),
@@ -66,8 +66,8 @@ def _mark(axes: Axes, trial: Trial, floor: float) -> None:
 
 def _legend(axes: Axes, found: Accuracy) -> None:
     """Shapes for rungs, colours for quadratures."""
-    rungs = {str(t.setting.fidelity) for t in found.trials if isinstance(t.setting.fidelity, str)}
-    rules = {trial.setting.quadrature for trial in found.trials}
+    rungs = {trial.setting.discretisation.name for trial in found.trials}
+    rules = {trial.setting.discretisation.quadrature for trial in found.trials}
     for rung, marker in MARKERS.items():
         if rung in rungs:
             axes.plot([], [], marker, color=EDGE, ms=6, label=rung)

@@ -41,7 +41,6 @@ RUNGS = {
     "full": ("full", "auto"),
     "faces, full soil": ({SOIL: "full", "rest": "faces"}, "auto"),
     "rigid, full soil": ({SOIL: "full", "rest": "rigid"}, "auto"),
-    "modal": ("modal", "auto"),
 }
 """Fidelity and method of each rung."""
 

@@ -28,14 +28,14 @@ def build(model, element: str = "quad") -> None:
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 2)
     masses = model.mass.diagonal().reshape(-1, 2)
-    for tag, (place, mass) in enumerate(zip(model.shape.places, masses, strict=True), start=1):
+    for tag, (place, mass) in enumerate(zip(model.cells.places, masses, strict=True), start=1):
         ops.node(tag, *map(float, place))
         ops.mass(tag, *map(float, mass))
     structure = model.structure
-    stone = structure.blocks[model.shape.owner[0]].material
+    stone = structure.blocks[model.cells.owner[0]].material
     ops.nDMaterial("ElasticIsotropic", 1, stone.young, stone.poisson)
-    for tag, cell in enumerate(model.shape.cells, start=1):
-        corners = [int(node) + 1 for node in _anticlockwise(model.shape.places, cell)]
+    for tag, cell in enumerate(model.cells.polygons, start=1):
+        corners = [int(node) + 1 for node in _anticlockwise(model.cells.places, cell)]
         if element == "SSPquad":
             ops.element("SSPquad", tag, *corners, 1, "PlaneStress", structure.width)
         else:
@@ -51,17 +51,17 @@ def _anticlockwise(places, cell):
 
 def _springs(model) -> None:
     """Put a pair of springs at each joint point, between coinciding nodes or node and ground."""
-    points, count = model.operator.points, len(model.shape.places)
+    points, count = model.operator.points, len(model.cells.places)
     normals = model.structure.normals[points.joint]
     tangents = np.array([joint.tangent for joint in model.structure.joints])[points.joint]
     for point, (normal, tangent) in enumerate(zip(normals, tangents, strict=True)):
         lower, higher = _ends(model.operator.opening[point], normal)
         if lower is None or higher is None:
             count += 1
-            ops.node(count, *map(float, model.shape.places[higher if lower is None else lower]))
+            ops.node(count, *map(float, model.cells.places[higher if lower is None else lower]))
             ops.fix(count, 1, 1)
         pair = [count if node is None else node + 1 for node in (lower, higher)]
-        tag = len(model.shape.cells) + 1 + point
+        tag = len(model.cells.polygons) + 1 + point
         area = points.weight[point]
         ops.uniaxialMaterial("ENT", 2 * point + 1, float(points.normal_stiffness[point] * area))
         ops.uniaxialMaterial("Elastic", 2 * point + 2, float(points.shear_stiffness[point] * area))
@@ -119,7 +119,7 @@ def shake(model, motion, damping, dt, *, settings=None, keep: bool = False) -> S
     chosen = {**SETTINGS, **(settings or {})}
     build(model, chosen["element"])
     load_dead(model)
-    nodes = range(1, len(model.shape.places) + 1)
+    nodes = range(1, len(model.cells.places) + 1)
     first = [value for tag in nodes for value in ops.nodeDisp(tag)]
     ops.timeSeries("Path", 2, "-dt", motion.dt, "-values", *map(float, motion.horizontal))
     ops.pattern("UniformExcitation", 2, 1, "-accel", 2)
@@ -149,10 +149,10 @@ def _damp(model, damping, committed: bool) -> None:
     if not committed:
         ops.rayleigh(damping.mass, 0.0, damping.stiffness, 0.0)
         return
-    count = len(model.shape.cells)
+    count = len(model.cells.polygons)
     stones = [tag for tag in ops.getEleTags() if tag <= count]
     springs = [tag for tag in ops.getEleTags() if tag > count]
-    nodes = range(1, len(model.shape.places) + 1)
+    nodes = range(1, len(model.cells.places) + 1)
     ops.region(1, "-nodeOnly", *nodes, "-rayleigh", damping.mass, 0.0, 0.0, 0.0)
     ops.region(2, "-eleOnly", *stones, "-rayleigh", 0.0, 0.0, 0.0, damping.stiffness)
     ops.region(3, "-eleOnly", *springs, "-rayleigh", 0.0, 0.0, damping.stiffness, 0.0)

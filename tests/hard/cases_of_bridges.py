@@ -46,7 +46,7 @@ def unbalanced(dead: Equilibrium) -> float:
     """Largest sum of the forces on any free block at rest, relative to the largest force."""
     model = dead.model
     bodies = [
-        forces_on(model.structure, dead.joints, number, model.shape)
+        forces_on(model.structure, dead.joints, number, model.cells)
         for number in model.structure.free
     ]
     lacking = max(float(np.linalg.norm(body.sum)) for body in bodies)

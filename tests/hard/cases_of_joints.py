@@ -66,7 +66,7 @@ def steppers(rung, rule, method):
 
 for _rule in ("lobatto", "nodal", "gauss", "exact"):
     for _method, _rungs in (
-        ("contact", ("rigid", "modal", "faces", "condensed", "full")),
+        ("contact", ("rigid", "faces", "condensed", "full")),
         ("chain", ("rigid", "faces", "condensed", "full")),
     ):
         for _rung in _rungs:

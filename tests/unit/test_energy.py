@@ -9,8 +9,8 @@ from archfem.compiled import kernel
 from archfem.dynamics import State, Stepper
 from archfem.energy import Balance
 from archfem.errors import DidNotConverge
+from archfem.ladder import build
 from archfem.materials import Contact
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.runs import Record, last_state, time_history

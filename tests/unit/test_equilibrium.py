@@ -6,7 +6,7 @@ from scipy import sparse
 
 from archfem.actions import PointLoad
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.newton import Newton, Solver
 from archfem.shapes import circular_arch
 from archfem.statics import dead_load, equilibrium, self_weight

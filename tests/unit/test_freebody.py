@@ -10,8 +10,8 @@ from archfem.assembly import assembled
 from archfem.case import Case
 from archfem.errors import InvalidInput
 from archfem.freebody import forces_on
+from archfem.ladder import build
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.models.build import build
 from archfem.resultants import joint_dataset
 from archfem.shapes import arch_on_piers
 from archfem.statics import dead_load, equilibrium
@@ -36,7 +36,7 @@ def check_balance(model, joints):
     """Forces and moments of every free block add up to nothing."""
     structure = model.structure
     for number in structure.free:
-        body = forces_on(structure, joints, number, model.shape)
+        body = forces_on(structure, joints, number, model.cells)
         reach = np.ptp(body.points, axis=0).max()
         assert body.closing_error < BALANCED, body.block.name
         assert abs(body.moment) < BALANCED * reach * body.sizes.max(), body.block.name
@@ -84,7 +84,7 @@ def test_the_left_abutment_pushes_the_ring_up_and_inwards(ring, ring_model):
 def test_weight_is_that_of_the_outline_or_of_the_cells(ring, ring_model):
     """Four chords to a sector of angle φ weigh 1 - (φ / 4)² / 6 of it."""
     joints = dead_load(ring_model).joints
-    true, meshed = (forces_on(ring, joints, 9, s).sizes[-1] for s in (None, ring_model.shape))
+    true, meshed = (forces_on(ring, joints, 9, s).sizes[-1] for s in (None, ring_model.cells))
     turn = np.radians(159.0 / 17)
     assert true == pytest.approx(ring.weight / 17)
     assert meshed / true == pytest.approx(1.0 - (turn / 4.0) ** 2 / 6.0, abs=1e-6)
@@ -118,8 +118,8 @@ def arrows(axes):
 
 def test_the_picture_shows_forces_where_they_act_and_a_closed_polygon(ring, ring_model):
     joints = dead_load(ring_model).joints
-    figure = draw_free_body(ring, joints, "voussoir 5", shape=ring_model.shape)
-    body = forces_on(ring, joints, "voussoir 5", ring_model.shape)
+    figure = draw_free_body(ring, joints, "voussoir 5", cells=ring_model.cells)
+    body = forces_on(ring, joints, "voussoir 5", ring_model.cells)
     left, right = figure.axes
     beside = arrows(left)
     assert beside[:-1, 1] == pytest.approx(body.points[:-1])  # joints push at their points

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from archfem.assembly import assembled
+from archfem.discretisation import Discretisation
+from archfem.division import divided
 from archfem.errors import InvalidInput, MeshError
-from archfem.intervals import divided
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.mesh import Meshing, mesh, read_mesh, write_mesh
+from archfem.mesh import mesh, read_mesh, write_mesh
 from archfem.models.full import full
 from archfem.newton import Newton
 from archfem.quadrature import Quadrature
@@ -23,7 +24,6 @@ from archfem.shapes import (
     Sidewall,
     bridge,
     circular_arch,
-    column,
 )
 from archfem.space import broken_space
 from archfem.statics import dead_load
@@ -33,9 +33,9 @@ from archfem.structure import Block
 @pytest.mark.parametrize(
     ("meshing", "cells", "facets"),
     [
-        (Meshing(), 17 * 16 + 2 * 4, 18 * 4),
-        (Meshing(2, 3), 17 * 6 + 2 * 2, 18 * 2),
-        (Meshing(2, 3, "triangle"), 2 * (17 * 6 + 2 * 2), 18 * 2),
+        (Discretisation(), 17 * 16 + 2 * 4, 18 * 4),
+        (Discretisation(cells=(2, 3)), 17 * 6 + 2 * 2, 18 * 2),
+        (Discretisation(cells=(2, 3), cell="triangle"), 2 * (17 * 6 + 2 * 2), 18 * 2),
     ],
 )
 def test_numbers_of_cells_and_joint_facets(ring, meshing, cells, facets):
@@ -54,14 +54,14 @@ def test_nodes_lie_on_the_circle(ring):
 
 def test_a_chorded_ring_keeps_its_own_weight():
     ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=2)
-    model = full(broken_space(mesh(ring, Meshing(2, 6))), Quadrature())
+    model = full(broken_space(mesh(ring, Discretisation(cells=(2, 6)))), Quadrature())
     assert model.body[:, 1].sum() * ring.gravity == pytest.approx(ring.weight, rel=1e-10)
 
 
 def test_file_and_back(ring, tmp_path):
     path = tmp_path / "ring.msh"
-    write_mesh(ring, path, Meshing(2, 2))
-    again, fresh = read_mesh(ring, path), mesh(ring, Meshing(2, 2))
+    write_mesh(ring, path, Discretisation(cells=(2, 2)))
+    again, fresh = read_mesh(ring, path), mesh(ring, Discretisation(cells=(2, 2)))
     assert np.array_equal(np.bincount(again.blocks), np.bincount(fresh.blocks))
     assert np.array_equal(np.bincount(again.joints[1]), np.bincount(fresh.joints[1]))
     outside = meshio.read(path)
@@ -73,7 +73,10 @@ def test_an_unstructured_block_conforms_to_its_neighbours(stack):
     """A block without corners is meshed freely, with the nodes of the joints it shares."""
     top = stack.blocks[2]
     free = Block((*top.outline, (0.0, 2.5)), top.material, top.name, part=top.part)
-    made = mesh(replace(stack, blocks=(*stack.blocks[:2], free)), Meshing(4, 4, "triangle"))
+    made = mesh(
+        replace(stack, blocks=(*stack.blocks[:2], free)),
+        Discretisation(cells=(4, 4), cell="triangle"),
+    )
     assert np.bincount(made.joints[1]).tolist() == [4, 4]
     weight = full(broken_space(made), Quadrature()).body[:, 1].sum() * 9.81
     assert weight == pytest.approx(20e3 * 2.25, rel=1e-10)
@@ -81,7 +84,7 @@ def test_an_unstructured_block_conforms_to_its_neighbours(stack):
 
 def test_the_mesh_of_another_structure_is_refused(ring, stack, tmp_path):
     path = tmp_path / "ring.msh"
-    write_mesh(ring, path, Meshing(1, 1))
+    write_mesh(ring, path, Discretisation(cells=(1, 1)))
     with pytest.raises(MeshError, match="of another structure"):
         read_mesh(stack, path)
     narrower = circular_arch(radius=2.95, thickness=0.50, embrace=159.0, voussoirs=17)
@@ -89,24 +92,14 @@ def test_the_mesh_of_another_structure_is_refused(ring, stack, tmp_path):
         read_mesh(narrower, path)
 
 
-@pytest.mark.parametrize(
-    ("make", "error", "says"),
-    [
-        (lambda: Meshing(0, 4), InvalidInput, "cells through = 0"),
-        (lambda: Meshing(4, 2.5), InvalidInput, "cells along = 2.5"),
-        (lambda: Meshing(cell="hexagon"), InvalidInput, "'hexagon' is not known"),
-        (lambda: Meshing(coarse=0.0), InvalidInput, "coarse = 0.0 m"),
-        (lambda: read_mesh(None, "none.msh"), InvalidInput, "no mesh file none.msh"),
-    ],
-)
-def test_refusals(make, error, says):
-    with pytest.raises(error, match=says):
-        make()
+def test_a_file_that_is_not_there(ring):
+    with pytest.raises(InvalidInput, match=r"no mesh file none\.msh"):
+        read_mesh(ring, "none.msh")
 
 
 def test_a_face_of_several_chords_gets_a_cell_for_each():
     ring = circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
-    assert len(mesh(ring, Meshing(2, 2)).blocks) == 3 * 8 + 2 * 2
+    assert len(mesh(ring, Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2
 
 
 def test_a_file_that_is_no_mesh(stack, tmp_path):
@@ -114,11 +107,6 @@ def test_a_file_that_is_no_mesh(stack, tmp_path):
     path.write_text("not a mesh")
     with pytest.raises(MeshError):
         read_mesh(stack, path)
-
-
-def test_degrees_beyond_two_are_refused():
-    with pytest.raises(InvalidInput, match="degree 3"):
-        broken_space(mesh(column(breadth=1.0, heights=[1.0]), Meshing(1, 1)), 3)
 
 
 def viaduct(**parts):
@@ -146,8 +134,8 @@ def one_arch(**parts):
 
 def scaled_jacobians(made):
     """Least scaled Jacobian of each cell: 1 for squares and equilateral triangles, 0 for lines."""
-    corners = full(broken_space(made), Quadrature()).shape
-    points = corners.places[np.array(corners.cells)]
+    cells = full(broken_space(made), Quadrature()).cells
+    points = cells.places[np.array(cells.polygons)]
     ahead = np.roll(points, -1, axis=1) - points
     behind = np.roll(ahead, 1, axis=1)
     turn = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
@@ -162,7 +150,7 @@ def scaled_jacobians(made):
 def test_meshes_of_bridges_are_sound(make, cell, count):
     """Sharp wedges and strips between stones included; slender triangles lie in slender stones."""
     structure = make(paving=Paving(thickness=0.2))
-    made = mesh(structure, Meshing(count, count, cell))
+    made = mesh(structure, Discretisation(cells=(count, count), cell=cell))
     quality = scaled_jacobians(made)
     stones = [b.corners is not None for b in structure.blocks]
     stones = np.array(stones)[made.blocks[np.isin(made.blocks, structure.free)]]
@@ -170,10 +158,10 @@ def test_meshes_of_bridges_are_sound(make, cell, count):
     assert quality.min() > (0.15 if cell == "quadrilateral" else 0.05)
 
 
-def outer_edges(shape, places):
+def outer_edges(cells, places):
     """Edges that only one cell has, as pairs of places (e, 2)."""
-    cells = places[np.array(shape.cells)]
-    pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    own = places[np.array(cells.polygons)]
+    pairs = np.sort(np.stack([own, np.roll(own, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, times = np.unique(pairs, axis=0, return_counts=True)
     assert times.max() == 2
     return edges[times == 1]
@@ -189,16 +177,18 @@ def test_cells_of_touching_blocks_meet(make, cell):
     structure = make()
     blocks = tuple(replace(block, material=STONE) for block in structure.blocks)
     structure = replace(structure, blocks=blocks)
-    model = full(broken_space(mesh(structure, Meshing(3, 4, cell))), Quadrature())
-    points, places = np.unique(model.shape.places.round(9), axis=0, return_inverse=True)
-    rim = outer_edges(model.shape, places.ravel())
+    model = full(
+        broken_space(mesh(structure, Discretisation(cells=(3, 4), cell=cell))), Quadrature()
+    )
+    points, places = np.unique(model.cells.places.round(9), axis=0, return_inverse=True)
+    rim = outer_edges(model.cells, places.ravel())
     length = np.linalg.norm(points[rim[:, 0]] - points[rim[:, 1]], axis=1).sum()
     free = set(structure.free)
     outlines = [structure.blocks[number].points for number in free]
     around = sum(np.linalg.norm(np.roll(p, 1, axis=0) - p, axis=1).sum() for p in outlines)
     inner = sum(joint.depth for joint in structure.joints if free.issuperset(joint.blocks))
     assert length == pytest.approx(around - 2.0 * inner, rel=1e-9)
-    stretched = model.shape.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
+    stretched = model.cells.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
     forces = np.zeros((len(points), 2))
     np.add.at(forces, places.ravel(), (model.blocks @ stretched.ravel()).reshape(-1, 2))
     inside = np.setdiff1d(np.arange(len(points)), rim)
@@ -212,7 +202,9 @@ def test_cells_of_touching_blocks_meet(make, cell):
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_supports_of_a_bridge_carry_its_weight(cell):
     structure = viaduct(paving=Paving(thickness=0.2))
-    made = full(broken_space(mesh(structure, Meshing(2, 2, cell))), Quadrature())
+    made = full(
+        broken_space(mesh(structure, Discretisation(cells=(2, 2), cell=cell))), Quadrature()
+    )
     joints, carried = dead_load(made, Newton(tolerance=1e-13)).joints, np.zeros(2)
     for k, joint in enumerate(structure.joints):
         fixed = [structure.blocks[number].fixed for number in (joint.lower, joint.higher)]
@@ -233,7 +225,7 @@ def test_soil_has_the_cells_that_its_stones_impose():
     assert len(extrados) == 20
     counts = []
     for coarse in (None, 0.3, 0.15):
-        made = mesh(structure, Meshing(4, 4, coarse=coarse))
+        made = mesh(structure, Discretisation(coarse=coarse))
         assert set(np.bincount(made.joints[1])[extrados]) == {4}
         counts.append(np.sum(made.blocks == soil))
     area = structure.blocks[soil].area
@@ -268,7 +260,7 @@ def wall_in_bond():
 @pytest.mark.parametrize("cells", [(1, 1), (4, 4), (2, 5)])
 def test_stones_in_bond_fit(cell, cells):
     """Opposite sides agree although a long side faces two short ones."""
-    made = mesh(wall_in_bond(), Meshing(*cells, cell))
+    made = mesh(wall_in_bond(), Discretisation(cells=cells, cell=cell))
     of_block = np.bincount(made.blocks)[1:]
     assert of_block.min() >= cells[0] * cells[1] * (1 if cell == "quadrilateral" else 2)
     assert scaled_jacobians(made).min() > (0.3 if cell == "quadrilateral" else 0.05)
@@ -277,8 +269,8 @@ def test_stones_in_bond_fit(cell, cells):
 def cells_on_edges(structure, meshing):
     """Middles of the edges of blocks that can move (m, 2), and the cells on each (m,)."""
     division = divided(structure, meshing)
-    own = np.unique(np.concatenate([division.outlines.around[k] for k in structure.free]))
-    middles = division.outlines.points[division.outlines.edges[own]].mean(axis=1)
+    own = np.unique(np.concatenate([division.edges.around[k] for k in structure.free]))
+    middles = division.edges.points[division.edges.ends[own]].mean(axis=1)
     return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
 
 
@@ -293,7 +285,7 @@ def test_mirror_images_are_cut_alike(make, cell, cells):
         "fill": one_arch,
         "fill on chords": lambda: one_arch(chords=3),
     }[make]()
-    middles, counts = cells_on_edges(made, Meshing(*cells, cell))
+    middles, counts = cells_on_edges(made, Discretisation(cells=cells, cell=cell))
     x = middles[:, 0]
     turned = middles * [-1.0, 1.0] + [x.min() + x.max(), 0.0]
     away = np.linalg.norm(middles[:, None] - turned, axis=2)
@@ -304,9 +296,9 @@ def test_mirror_images_are_cut_alike(make, cell, cells):
 def test_cells_forced_by_another_side_are_dealt_evenly():
     """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
     made = one_arch(chords=3)
-    division = divided(made, Meshing(2, 2))
+    division = divided(made, Discretisation(cells=(2, 2)))
     keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
-    faces = division.outlines.sides(keystone)
+    faces = division.edges.sides[keystone]
     found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
     assert sorted(found) == [[2], [2], [2, 2, 2], [2, 2, 2]]
 
@@ -316,7 +308,7 @@ def test_neighbours_that_wish_different_numbers_take_the_larger():
     low, high = box("low", 0.0, 1.0, 0.0, 1.0), box("high", 0.0, 1.0, 1.0, 2.0)
     high = replace(high, corners=(1, 2, 3, 0))
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
-    made = mesh(assembled([ground, low, high], STONE_TO_STONE), Meshing(2, 5))
+    made = mesh(assembled([ground, low, high], STONE_TO_STONE), Discretisation(cells=(2, 5)))
     assert np.bincount(made.blocks).tolist() == [5, 25, 10]
     assert np.bincount(made.joints[1]).tolist() == [5, 5]
 
@@ -324,7 +316,10 @@ def test_neighbours_that_wish_different_numbers_take_the_larger():
 def test_cells_of_a_long_stone_are_not_absurdly_long():
     """No longer than twice its thickness: ten cells in eight metres of 0.4 m."""
     ground = box("ground", 0.0, 8.0, -0.3, 0.0, fixed=True)
-    made = mesh(assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], STONE_TO_STONE), Meshing(2, 2))
+    made = mesh(
+        assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], STONE_TO_STONE),
+        Discretisation(cells=(2, 2)),
+    )
     assert np.bincount(made.joints[1]).tolist() == [10]
 
 
@@ -338,13 +333,15 @@ def test_sides_that_cannot_agree():
     stones.append(block("last", rays[3][0], rays[3][1], (3.0, 0.0), rays[0][0]))
     stones.append(block("rest", (2.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.5, 1.0), fixed=True))
     with pytest.raises(MeshError, match="leaving out their corners"):
-        mesh(assembled(stones, STONE_TO_STONE), Meshing(2, 2))
+        mesh(assembled(stones, STONE_TO_STONE), Discretisation(cells=(2, 2)))
     free = replace(stones[3], corners=None)
-    assert mesh(assembled([*stones[:3], free, stones[4]], STONE_TO_STONE), Meshing(2, 2))
+    assert mesh(
+        assembled([*stones[:3], free, stones[4]], STONE_TO_STONE), Discretisation(cells=(2, 2))
+    )
 
 
 def test_an_outline_that_crosses_itself():
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
     bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
     with pytest.raises(MeshError, match="cannot mesh block 'bow'"):
-        mesh(assembled([ground, bow], STONE_TO_STONE), Meshing(2, 2))
+        mesh(assembled([ground, bow], STONE_TO_STONE), Discretisation(cells=(2, 2)))

@@ -12,9 +12,9 @@ from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import CountedMechanism
 from archfem.history import History
+from archfem.ladder import build
 from archfem.mechanism import verified_mechanism
 from archfem.models import Prediction
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.runs import Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh

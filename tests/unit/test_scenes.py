@@ -8,8 +8,8 @@ from archfem.actions import Settlement
 from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
+from archfem.ladder import build
 from archfem.mechanism import verified_mechanism
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.resultants import joint_dataset
 from archfem.runs import Record, time_history
@@ -145,7 +145,7 @@ def test_the_opening_under_the_ring_is_empty(model):
 def test_the_automatic_magnification_shows_the_displacement(ring, model, run):
     fields = run.dataset["q"].values
     setting = Setting.of(model, fields, "displacement", None)
-    largest = max(np.abs(model.shape.displacement(q)).max() for q in fields)
+    largest = max(np.abs(model.cells.displacement(q)).max() for q in fields)
     shown = setting.magnification * largest / ring.size
     assert 0.6 * SWING < shown < 1.6 * SWING
     assert Setting.of(model, 0.0 * fields, "displacement", None).magnification == 1.0
@@ -154,9 +154,9 @@ def test_the_automatic_magnification_shows_the_displacement(ring, model, run):
 def test_colours_are_millimetres_and_megapascals(coarse):
     """The crown carries its thrust: mean stress N / A, and more of it in the least principal."""
     dead = dead_load(coarse)
-    lengths = np.linalg.norm(coarse.shape.displacement(dead.q), axis=1)
-    assert shade(coarse.shape, dead.q, "displacement") == pytest.approx(1e3 * lengths)
-    stress = shade(coarse.shape, dead.q, "stress")[coarse.shape.owner == 9]
+    lengths = np.linalg.norm(coarse.cells.displacement(dead.q), axis=1)
+    assert shade(coarse.cells, dead.q, "displacement") == pytest.approx(1e3 * lengths)
+    stress = shade(coarse.cells, dead.q, "stress")[coarse.cells.owner == 9]
     thrust = float(dead.joints["N"][8]) / (0.55 * 1.0) / 1e6
     assert stress.max() <= 1e-6
     assert stress.mean() == pytest.approx(-thrust, rel=0.05)
@@ -164,10 +164,10 @@ def test_colours_are_millimetres_and_megapascals(coarse):
 
 def test_scales_have_units_and_span_the_film(coarse):
     fields = np.array([dead_load(coarse).q])
-    scale = scale_for(coarse.shape, fields, "displacement")
+    scale = scale_for(coarse.cells, fields, "displacement")
     assert scale.label.endswith("[mm]")
-    assert scale.high == pytest.approx(shade(coarse.shape, fields[0], "displacement").max())
-    scale = scale_for(coarse.shape, fields, "stress")
+    assert scale.high == pytest.approx(shade(coarse.cells, fields[0], "displacement").max())
+    scale = scale_for(coarse.cells, fields, "stress")
     assert scale.label.endswith("[MPa]")
     assert scale.low < scale.high == 0.0
 

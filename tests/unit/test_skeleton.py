@@ -7,12 +7,12 @@ import pytest
 
 from archfem.assembly import assembled
 from archfem.errors import InvalidInput
-from archfem.ladder import envelope
 from archfem.limit import BodyForce, collapse_factor, stands
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
 from archfem.mechanism import Verifier, first_verified_mechanism, verified_mechanism
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
+from archfem.probe import peaks
 from archfem.resultants import joint_dataset
 from archfem.runs import time_history
 from archfem.shapes import arch_on_piers, circular_arch
@@ -205,5 +205,5 @@ def test_the_error_of_a_model_is_measured_on_rings_and_piers():
     model, motion = rigid(filled()), Motion(np.array([0.0, 1.0, 0.0]), dt=0.05)
     run = time_history(model, motion, dt=0.01)
     own = abs(run.joints["eccentricity"]).max("time").values
-    found = envelope(model, motion, None, 0.01)
+    found = peaks(model, motion, None, 0.01)
     assert found == pytest.approx(own[: len(piers().joints)])

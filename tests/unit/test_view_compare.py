@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from archfem.errors import InvalidInput
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh

@@ -16,8 +16,8 @@ from archfem.actions import BodyForce
 from archfem.criteria import hinged, sliding
 from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge
+from archfem.ladder import build
 from archfem.materials import Contact, Material
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.shapes import column
 from archfem.statics import equilibrium, self_weight

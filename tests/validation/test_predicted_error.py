@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archfem.discretisation import Discretisation
 from archfem.errors import InvalidInput
-from archfem.ladder import Setting, _usual_damping, build, envelope, largest_difference, strongest
+from archfem.ladder import Setting, build, choose, finest
 from archfem.materials import BACKFILL, Contact
+from archfem.modal_damping import effective_damping
 from archfem.models.build import build as plain
 from archfem.models.rigid import rigid
 from archfem.motion import Motion
+from archfem.probe import largest_difference, peaks, strongest, usual_damping
 from archfem.quadrature import Quadrature
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.shapes import Arch, Backfill, bridge, circular_arch, column
+from archfem.statics import dead_load
 from archfem.tradeoff import accuracy
 
 STIFF = Contact(1.48e10, 0.3e10)
@@ -29,8 +33,8 @@ SCENES = {
 }
 
 
-def usual_damping(structure):
-    return _usual_damping(rigid(structure, rule=Quadrature("exact")))
+def damping_of(structure):
+    return usual_damping(rigid(structure, rule=Quadrature("exact")))
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005])
@@ -47,12 +51,12 @@ def test_prediction_is_within_a_factor_of_three(scene, tolerance):
     """Predicted over actual error, the actual one over a whole motion and on a finer model."""
     structure, pga = SCENES[scene]
     motion = Motion.synthetic(duration=12.0, pga=pga, seed=1)
-    damping = usual_damping(structure)
+    damping = damping_of(structure)
     model = build(structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping)
     predicted = model.prediction
-    best = plain(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
-    reference = envelope(best, motion, damping, 0.00125)
-    actual = largest_difference(envelope(model, motion, damping, predicted.dt), reference)
+    best = build(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
+    reference = peaks(best, motion, damping, 0.00125)
+    actual = largest_difference(peaks(model, motion, damping, predicted.dt), reference)
     assert actual <= 1.5 * tolerance or not predicted.met
     assert 1.0 / 3.0 < predicted.error / actual < 3.0
 
@@ -65,6 +69,37 @@ def test_choice_climbs_as_the_tolerance_falls():
         for t in (0.05, 0.005)
     ]
     assert tried[0] == 1 < tried[1]
+
+
+@pytest.mark.parametrize("dt", [None, 0.005])
+def test_the_finest_model_is_built_once_and_asked_for_the_damping(ring, dt):
+    built, asked = [], []
+
+    def builder(structure, discretisation):
+        model = plain(structure, discretisation)
+        built.append((discretisation, model))
+        return model
+
+    def damping(model):
+        asked.append(model)
+        return Rayleigh(0.05, (8.0, 24.0))
+
+    motion = Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    choose(ring, 1e-9, motion, damping, dt, builder=builder)
+    assert [each for each, _ in built].count(finest(ring).discretisation) == 1
+    assert asked == [model for each, model in built if each == finest(ring).discretisation]
+
+
+def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
+    """A function of the model, and what it gives, are the same to the last digit."""
+    motion = Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    best = plain(ring, finest(ring).discretisation)
+    given = effective_damping(best, about=dead_load(best))
+    found = [
+        build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
+        for damping in (given, lambda model: effective_damping(model, about=dead_load(model)))
+    ]
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, float("nan")])
@@ -94,8 +129,8 @@ def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not():
     assert model.prediction.met
     assert model.prediction.dt == 0.005
     runs = [
-        envelope(each, motion, damping, 0.005)
-        for each in (model, plain(structure, quadrature="exact"))
+        peaks(each, motion, damping, 0.005)
+        for each in (model, build(structure, quadrature="exact"))
     ]
     assert 0.3 < runs[1].max() < 0.5  # the motion is severe, and no ring comes apart
     actual = largest_difference(*runs)
@@ -132,7 +167,7 @@ def test_study_of_speed_against_error(ring):
     found = accuracy(
         ring,
         motion,
-        damping=usual_damping(ring),
+        damping=damping_of(ring),
         rungs=("rigid", "faces"),
         cells=((4, 4),),
         rules=(("nodal", None), ("exact", None)),
@@ -164,5 +199,7 @@ def test_a_setting_that_fails_is_reported_as_such(ring):
 
 
 def test_labels_name_the_setting():
-    assert Setting("faces", (4, 2), "gauss", 0.005, 3).label == "faces 4×2 gauss 3 5 ms"
-    assert np.isclose(Setting({"rest": "faces"}, (4, 4), "exact", 0.001).dt, 1e-3)
+    faces = Discretisation("faces", (4, 2), quadrature="gauss", points=3)
+    assert Setting(faces, 0.005).label == "faces 4×2 gauss 3 5 ms"
+    mixed = Discretisation({"backfill": "full", "rest": "faces"}, quadrature="exact")
+    assert Setting(mixed, 0.001).label == "faces + soil 4×4 exact 1 ms"

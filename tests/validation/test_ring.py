@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archfem.ladder import build
 from archfem.materials import Contact, Material
-from archfem.models.build import build
 from archfem.shapes import circular_arch
 from archfem.statics import dead_load
 from archfem.structure import Structure
@@ -83,9 +83,9 @@ def test_rigid_is_full_projected_on_rigid_motions():
 
     ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
     full, rigid = build(ring, cells=(3, 3)), build(ring, cells=(3, 3), fidelity="rigid")
-    places = full.shape.places
+    places = full.cells.places
     owner = np.full(len(places), -1)
-    for cell, block in zip(full.shape.cells, full.shape.owner, strict=True):
+    for cell, block in zip(full.cells.polygons, full.cells.owner, strict=True):
         owner[cell] = block
     basis = np.zeros((full.size, rigid.size))
     for k, number in enumerate(ring.free):

@@ -11,7 +11,7 @@ from archfem.compiled.newmark import follow, numbers_of
 from archfem.compiled.release import release
 from archfem.errors import InvalidInput
 from archfem.joints import Facets, JointPoints, Springs
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.runs import time_history

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 
 from archfem.dynamics import Stepper
 from archfem.errors import InvalidInput
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.schemes import HHT, Newmark, Rayleigh
 from archfem.statics import dead_load, self_weight

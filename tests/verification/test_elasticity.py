@@ -9,9 +9,10 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from archfem import _fenicsx
+from archfem.discretisation import Discretisation
 from archfem.forms import Forms, plane_stress
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.mesh import Meshing, mesh
+from archfem.mesh import mesh
 from archfem.quadrature import Quadrature
 from archfem.shapes import column
 from archfem.space import broken_space, joint_operator
@@ -23,7 +24,7 @@ RULES = [Quadrature(), Quadrature("nodal"), Quadrature("gauss"), Quadrature("lob
 @pytest.mark.parametrize("degree", [1, 2])
 def test_patch(ring, cell, degree):
     """A linear displacement: constant stress, no force inside a block, none across a joint."""
-    space = broken_space(mesh(ring, Meshing(2, 3, cell)), degree)
+    space = broken_space(mesh(ring, Discretisation(cells=(2, 3), cell=cell)), degree)
     forms = Forms(space, Quadrature())
     gradient = np.array([[1.0, -2.0], [0.5, 3.0]]) * 1e-4
     u = (space.places @ gradient.T).ravel()
@@ -66,7 +67,7 @@ def _inside(space):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     """Bᵀ K_broken B = K_conforming, with B the Boolean matrix that ties nodes at one place."""
-    grid = mesh(stack, Meshing(2, 2))
+    grid = mesh(stack, Discretisation(cells=(2, 2)))
     space = broken_space(grid, degree)
     places, number = np.unique(space.places.round(9), axis=0, return_inverse=True)
     tie = sparse.csr_matrix((np.ones(len(number)), (np.arange(len(number)), number.ravel())))
@@ -94,7 +95,7 @@ def test_operator_equals_forms(ring, rule, degree, cell):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
     from archfem.models.full import full
 
-    space = broken_space(mesh(ring, Meshing(3, 2, cell)), degree)
+    space = broken_space(mesh(ring, Discretisation(cells=(3, 2), cell=cell)), degree)
     forms, model = Forms(space, rule), full(space, rule)
     random = np.random.default_rng(7)
     q = 1e-4 * random.standard_normal(model.size)  # about half of the points open
@@ -129,7 +130,9 @@ def exact(x, z, sin, cos):
 
 def jump_error(cells, degree, cell):
     """L2 error of the displacement on a mesh of so many cells a side, relative to its size."""
-    grid = mesh(column(breadth=1.0, heights=[1.0, 1.0]), Meshing(cells, cells, cell))
+    grid = mesh(
+        column(breadth=1.0, heights=[1.0, 1.0]), Discretisation(cells=(cells, cells), cell=cell)
+    )
     space = broken_space(grid, degree)
     x = ufl.SpatialCoordinate(grid.grid)
     fields = [ufl.as_vector(u) for u in exact(x[0], x[1] - 1.0, ufl.sin, ufl.cos)]

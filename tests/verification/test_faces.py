@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from archfem.assembly import assembled
+from archfem.ladder import build
 from archfem.materials import STONE, STONE_TO_STONE
-from archfem.models.build import build
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.runs import time_history
@@ -49,12 +49,12 @@ def test_joints_of_two_stones_are_spanned_those_with_soil_are_not(arch, models):
 
 def test_the_basis_holds_rigid_motions(models):
     """Of every block on its own, exactly: without them no mechanism could form."""
-    shape = models["faces"].shape
-    drawn = np.random.default_rng(1).normal(size=(shape.block.max() + 1, 3))[shape.block]
-    x, y = shape.places.T
+    cells = models["faces"].cells
+    drawn = np.random.default_rng(1).normal(size=(cells.block.max() + 1, 3))[cells.block]
+    x, y = cells.places.T
     wanted = np.stack([drawn[:, 0] - y * drawn[:, 2], drawn[:, 1] + x * drawn[:, 2]], 1).ravel()
-    q = np.linalg.lstsq(shape.lift.toarray(), wanted, rcond=None)[0]
-    assert np.abs(shape.lift @ q - wanted).max() < 1e-10 * np.abs(wanted).max()
+    q = np.linalg.lstsq(cells.lift.toarray(), wanted, rcond=None)[0]
+    assert np.abs(cells.lift @ q - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
 def test_dead_load_and_shaking_against_all_joint_nodes(arch, models):

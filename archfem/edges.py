@@ -1,4 +1,4 @@
-"""Outlines of blocks that touch, as loops of edges that the blocks share."""
+"""Edges of blocks that touch: around each block, and shared where two blocks touch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,28 +15,28 @@ Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Outlines:
+class Edges:
     """Edges between the points at which outlines bend or meet; touching blocks share them.
 
     Attributes:
-        structure: whose outlines they are.
+        structure: whose blocks they bound.
         points: where edges end (n, 2) [m].
-        loops: points around each block, anticlockwise.
-        edges: their two points, the lower number first (m, 2).
-        around: edges around each block; the k-th starts at the k-th point of the loop.
+        ends: their two points, the lower number first (m, 2).
+        boundaries: points around each block, anticlockwise.
+        around: edges around each block; the k-th starts at the k-th point of the boundary.
     """
 
     structure: Structure
     points: Array
-    loops: tuple[Numbers, ...]
-    edges: Numbers
+    ends: Numbers
+    boundaries: tuple[Numbers, ...]
     around: tuple[Numbers, ...]
 
     @cached_property
     def lengths(self) -> Array:
         """Lengths of the edges (m,) [m]."""
-        ends = self.points[self.edges]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        start, end = self.points[self.ends.T]
+        return np.linalg.norm(end - start, axis=1)
 
     @cached_property
     def structured(self) -> tuple[int, ...]:
@@ -47,22 +47,26 @@ class Outlines:
     @cached_property
     def unstructured(self) -> tuple[int, ...]:
         """Numbers of the blocks that are meshed freely."""
-        return tuple(n for n in range(len(self.loops)) if n not in set(self.structured))
+        return tuple(n for n in range(len(self.boundaries)) if n not in set(self.structured))
 
     def corners(self, number: int) -> Numbers:
         """Points at the four corners of a structured block."""
-        block, loop = self.structure.blocks[number], self.loops[number]
+        block, boundary = self.structure.blocks[number], self.boundaries[number]
         corners = block.points[list(block.corners or ())]
-        away = np.linalg.norm(self.points[loop] - corners[:, None], axis=2)
-        return loop[np.argmin(away, axis=1)]
+        away = np.linalg.norm(self.points[boundary] - corners[:, None], axis=2)
+        return boundary[np.argmin(away, axis=1)]
 
-    def sides(self, number: int) -> list[Numbers]:
-        """Edges on each of the four sides of a structured block."""
-        loop, around = self.loops[number], self.around[number]
-        starts = [int(np.flatnonzero(loop == point)[0]) for point in self.corners(number)]
+    @cached_property
+    def sides(self) -> dict[int, list[Numbers]]:
+        """Edges on each of the four sides of each structured block, by its number."""
+        return {number: self._sides(number) for number in self.structured}
+
+    def _sides(self, number: int) -> list[Numbers]:
+        boundary, around = self.boundaries[number], self.around[number]
+        starts = [int(np.flatnonzero(boundary == point)[0]) for point in self.corners(number)]
         turned = np.roll(around, -starts[0])
-        ends = [(start - starts[0]) % len(loop) for start in starts] + [len(loop)]
-        return [turned[a:b] for a, b in pairwise(ends)]
+        stops = [(start - starts[0]) % len(boundary) for start in starts] + [len(boundary)]
+        return [turned[a:b] for a, b in pairwise(stops)]
 
     @cached_property
     def joints(self) -> tuple[Numbers, ...]:
@@ -71,7 +75,7 @@ class Outlines:
         found = []
         for joint in self.structure.joints:
             shared = np.intersect1d(self.around[joint.lower], self.around[joint.higher])
-            relative = self.points[self.edges[shared]] - joint.ends[0]
+            relative = self.points[self.ends[shared]] - joint.ends[0]
             along = relative @ joint.tangent
             off = relative @ np.array([-joint.tangent[1], joint.tangent[0]])
             within = (np.abs(off) <= near) & (along > -near) & (along < joint.depth + near)
@@ -79,7 +83,7 @@ class Outlines:
         return tuple(found)
 
 
-def outlines_of(structure: Structure, chords: Sequence[int]) -> Outlines:
+def edges_of(structure: Structure, chords: Sequence[int]) -> Edges:
     """Find the edges of a structure's blocks.
 
     Args:
@@ -95,9 +99,9 @@ def outlines_of(structure: Structure, chords: Sequence[int]) -> Outlines:
     starts = np.cumsum([0, *map(len, drawn)])
     loops = tuple(_with_points_on_edges(number[a:b], points, near) for a, b in pairwise(starts))
     pairs = [np.sort(np.stack([loop, np.roll(loop, -1)], axis=1), axis=1) for loop in loops]
-    edges, of_pair = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
+    ends, of_pair = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
     around = np.split(of_pair.ravel(), np.cumsum([len(loop) for loop in loops])[:-1])
-    return Outlines(structure, points, loops, edges, tuple(around))
+    return Edges(structure, points, ends, loops, tuple(around))
 
 
 def _with_points_on_edges(loop: Numbers, points: Array, near: float) -> Numbers:

@@ -11,28 +11,28 @@ from archfem.structure import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Cells:
     """Polygons that cover the blocks, and how they move.
 
     Attributes:
         places: points at rest (m, 2) [m].
         block: number of the block each point belongs to (m,).
-        cells: polygons, each the numbers of its corners in order.
+        polygons: each the numbers of its corners in order.
         lift: displacements of the points, x and y in turn, from coordinates (2 m, n).
         stress: mean stress of each polygon, (σ_xx, σ_yy, σ_xy) in turn, from coordinates
-            (3 n_cells, n) [Pa]; None where blocks are rigid.
+            (3 n_polygons, n) [Pa]; None where blocks are rigid.
     """
 
     places: Array
     block: NDArray[np.intp]
-    cells: tuple[NDArray[np.intp], ...]
+    polygons: tuple[NDArray[np.intp], ...]
     lift: sparse.csr_matrix
     stress: sparse.csr_matrix | None = None
 
     @cached_property
     def owner(self) -> NDArray[np.intp]:
-        """Block of each polygon (n_cells,)."""
-        return self.block[[cell[0] for cell in self.cells]]
+        """Block of each polygon (n_polygons,)."""
+        return self.block[[cell[0] for cell in self.polygons]]
 
     def displacement(self, q: Array) -> Array:
         """Displacement of every point (m, 2) [m]."""
@@ -41,8 +41,8 @@ class Shape:
     @cached_property
     def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Edges of all polygons (e, 2) and their blocks (e,)."""
-        edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.cells])
-        return edges, np.repeat(self.owner, [len(cell) for cell in self.cells])
+        edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.polygons])
+        return edges, np.repeat(self.owner, [len(cell) for cell in self.polygons])
 
     @cached_property
     def rims(self) -> NDArray[np.intp]:
