@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
+from archfem.arguments import real
 from archfem.errors import InvalidInput, MeshError
 from archfem.outlines import Numbers, Outlines, outlines_of
 from archfem.structure import Array, Structure
@@ -64,7 +65,7 @@ class Meshing:
                 raise InvalidInput(f"cells {key} = {count!r}: give a whole number, 1 to 1000")
         if self.cell not in CELLS:
             raise InvalidInput(f"cell '{self.cell}' is not known: use one of {CELLS}")
-        if self.coarse is not None and not self.coarse > 0.0:
+        if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
             raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
 
 

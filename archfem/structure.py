@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.arguments import real
 from archfem.errors import InvalidStructure
 from archfem.materials import Contact, Material
 from archfem.units import G
@@ -191,11 +192,11 @@ class Structure:
 
     def __post_init__(self) -> None:
         """Refuse what does not hang together."""
-        if not 0.0 < self.width < 1e4:
+        if not 0.0 < real(self.width, "width [m]") < 1e4:
             raise InvalidStructure(
                 f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
             )
-        if not 0.0 < self.gravity < 1e3:
+        if not 0.0 < real(self.gravity, "gravity [m/s²]") < 1e3:
             raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]

@@ -4,11 +4,12 @@ Everything above (structure, mesh, forms) exists to produce a `Model`; everythin
 dynamics, modal analysis) consumes one and never asks how it came about.
 """
 
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from scipy import sparse
 
 from archfem.actions import Action, Settlement
+from archfem.errors import InvalidInput
 from archfem.models.shape import Shape
 from archfem.structure import Array, Structure
 
@@ -62,3 +63,18 @@ class Model(Protocol):
 
     def load(self, action: Action) -> Array:
         """Generalised forces of an action (n,)."""
+
+
+def check_model(model: Any) -> None:
+    """Refuse what is no model, such as the structure of which one is to be built.
+
+    Args:
+        model: what was given for one.
+
+    Raises:
+        InvalidInput: it does not answer what a model answers.
+    """
+    if not hasattr(model, "tangent") or not hasattr(model, "supports"):
+        raise InvalidInput(
+            f"model is a {type(model).__name__}: build one, e.g. build(structure, fidelity='rigid')"
+        )

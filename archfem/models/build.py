@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 
+from archfem.arguments import row, whole
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.reduce import modal, reduced
@@ -56,8 +57,9 @@ def build(
         MeshError: the blocks cannot be cut as asked.
     """
     rule = Quadrature(quadrature, points)
-    if len(tuple(cells)) != 2:
-        raise InvalidInput(f"cells {cells!r}: give two numbers, through the thickness and along")
+    row(cells, "cells through the thickness and along each block", 2)
+    for count in cells:
+        whole(count, f"a number of cells {cells!r}")
     if isinstance(fidelity, str) and fidelity not in FIDELITIES:
         raise InvalidInput(f"fidelity '{fidelity}' is not known: use one of {FIDELITIES}")
     if rule.rule == "exact" and (degree != 1 or fidelity == "monolithic"):
