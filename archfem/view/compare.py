@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.criteria import HINGE
+from archfem.criteria import Criteria
 from archfem.history import History
 from archfem.structure import Structure
 from archfem.view.envelopes import draw_faces
@@ -47,16 +47,15 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     return figure
 
 
-def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = HINGE) -> Figure:
+def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     """Draw mobilised friction and eccentricity of one joint over time, a column for each run.
 
-    Red lines are the limits: the coefficient of friction, and |e| of a hinge. Lines are interrupted
-    while the joint is open.
+    Red lines are the limits by the run's criteria: the coefficient of friction, and |e| of a hinge.
+    Lines are interrupted while the joint is open.
 
     Args:
         runs: what to call each run, and the run.
         joint: its name, or its number.
-        limit: of |e| for a hinge [-].
 
     Raises:
         InvalidInput: a run has no such joint.
@@ -67,7 +66,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = 
         own = run.joint(joint)
         _friction(cast(Axes, column[0]), own)
         dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
-        draw_faces(column[1], limit)
+        draw_faces(column[1], run.criteria.hinge)
         column[1].plot(own["time"], own["eccentricity"], color=LINES[0], lw=0.6)
         column[1].set_ylim(-0.56, 0.56)
         column[0].set_title(f"{label}: {own['name'].values!s}", fontsize=NORMAL, color=INK)
@@ -80,7 +79,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = 
 def _friction(axes: Axes, joint: xr.Dataset) -> None:
     """Draw the mobilised friction with its sense, between its limits."""
     dress(axes, "", "V / N [-]")
-    limit = float(joint["friction_limit"])
+    limit = float(Criteria.of(joint).coefficients(joint["friction_limit"].values))
     for side in (-1.0, 1.0):
         axes.axhline(side * limit, color=RED, lw=0.8, ls="--")
     axes.plot(

@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from archfem.criteria import HINGE
+from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.skeleton import yielding_blocks
@@ -48,7 +48,7 @@ def draw_structure(
     structure: Structure,
     joints: xr.Dataset | None = None,
     *,
-    limit: float = HINGE,
+    criteria: Criteria | None = None,
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the blocks and, where given, what their joints do at one instant.
@@ -60,7 +60,7 @@ def draw_structure(
     Args:
         structure: what stands.
         joints: its joints at one instant, as made by `joint_dataset`.
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail; by default those by which the joints were judged already.
         axes: where to draw; by default a new figure.
 
     Raises:
@@ -72,22 +72,21 @@ def draw_structure(
     draw_blocks(axes, structure)
     if joints is not None:
         _check_instant(structure, joints)
-        _marks(axes, joint_marks(structure, joints, limit=limit))
+        _marks(axes, joint_marks(structure, flagged(joints, criteria)))
         legend(axes)
     axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
     axes.autoscale_view()
     return cast(Figure, axes.figure)
 
 
-def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = HINGE) -> Figure:
+def draw_joint_histories(run: History, joints: Sequence[int]) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
-    Lines are interrupted while a joint is open.
+    Lines are interrupted while a joint is open; limits are by the run's criteria.
 
     Args:
         run: what happened.
         joints: numbers of the joints.
-        limit: of |e| for a hinge [-].
 
     Raises:
         InvalidInput: there is no such joint.
@@ -102,7 +101,7 @@ def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = 
         above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96)}
         panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, **above)
     for (left, right), number in zip(panels[1:], joints, strict=True):
-        _eccentricity(left, run.joints.sel(joint=number), limit)
+        _eccentricity(left, run.joints.sel(joint=number))
         _friction(right, run.joints.sel(joint=number))
     for axes in panels[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
@@ -199,11 +198,11 @@ def _ground(axes: Axes, run: History) -> None:
     axes.set_xlim(run.time[0], run.time[-1])
 
 
-def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
+def _eccentricity(axes: Axes, joint: xr.Dataset) -> None:
     """Draw where the thrust crosses a joint, against its faces."""
     name = "\n".join(wrap(str(joint["name"].values), LETTERS))
     dress(axes, "", f"{name}\nM / (N h) [-]")
-    draw_faces(axes, limit)
+    draw_faces(axes, Criteria.of(joint).hinge)
     axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
@@ -211,7 +210,7 @@ def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
 def _friction(axes: Axes, joint: xr.Dataset) -> None:
     """Draw mobilised friction against its limit."""
     dress(axes, "", "|V| / N [-]")
-    limit = float(joint["friction_limit"])
+    limit = float(Criteria.of(joint).coefficients(joint["friction_limit"].values))
     axes.axhspan(limit, LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
     axes.axhline(limit, color=SLIP, lw=0.9, ls="--")
     axes.plot(joint["time"], joint["friction"], color=LINES[0], lw=0.6)

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 from tqdm import tqdm
 
-from archfem.criteria import hinged
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
-from archfem.roles import judged_parts
 from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
@@ -76,6 +75,7 @@ def picture(
     magnification: float | None = None,
     colour: str = "displacement",
     size: tuple[int, int] = (1280, 720),
+    criteria: Criteria | None = None,
 ) -> Image:
     """Take one picture of a structure at rest or in motion.
 
@@ -85,6 +85,7 @@ def picture(
         magnification: of displacements [-]; by default a round number that shows them well.
         colour: "displacement" or, for blocks that are not rigid, "stress".
         size: width and height, even numbers [pixels].
+        criteria: what makes a joint fail; by default the usual ones.
 
     Returns:
         The picture (height, width, 3), red, green and blue from 0 to 255.
@@ -95,7 +96,7 @@ def picture(
     _check_picture(model, colour, magnification, size)
     _check_size(model, len(q))
     setting = Setting.of(model, q[None], colour, magnification)
-    joints = joint_dataset(model.structure, model.resultants(q))
+    joints = joint_dataset(model.structure, model.resultants(q), criteria=criteria)
     shift = _shift(setting, joint_ends(model), q)
     page = Page(setting, size)
     with Stage(setting, page.room) as stage:
@@ -140,8 +141,7 @@ def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
 
 def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
     """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
-    parts = joints["part"].values.astype(str)
-    side = hinged(joints).transpose("time", "joint").values * np.isin(parts, judged_parts(parts))
+    side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
 

@@ -8,7 +8,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from archfem.case import Case
-from archfem.criteria import hinged, opened, sliding
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
@@ -73,7 +72,7 @@ def units(axes):
 
 def test_each_hinge_is_a_circle_at_the_face_in_contact(ring, joints):
     circles = drawn(draw_structure(ring, joints), "hinges").get_xydata()
-    assert len(circles) == int((hinged(joints) != 0).sum()) == 3
+    assert len(circles) == int((joints["hinge"] != 0).sum()) == 3
     ends = [
         ring.joints[n].extrados if e > 0 else ring.joints[n].intrados for n, e in HINGES.items()
     ]
@@ -91,9 +90,9 @@ def test_thrust_line_is_drawn_where_it_is_and_interrupted_at_open_joints(ring, j
 
 def test_sliding_and_open_joints_have_their_own_marks(ring, joints):
     figure = draw_structure(ring, joints)
-    assert len(drawn(figure, "slips").get_paths()) == 2 * int(sliding(joints).sum()) == 4
+    assert len(drawn(figure, "slips").get_paths()) == 2 * int(joints["slide"].sum()) == 4
     gaps = drawn(figure, "gaps").get_xydata().reshape(-1, 3, 2)[:, :2]
-    assert int(opened(joints).sum()) == len(gaps) == 2
+    assert int(joints["open"].sum()) == len(gaps) == 2
     assert gaps == pytest.approx(np.array([ring.joints[number].ends for number in APART]))
 
 
