@@ -48,7 +48,7 @@ class Record:
         for key in ("every", "fields_every"):
             value = getattr(self, key)
             if key == "every" or value is not None:
-                whole(value, f"record {key}, to keep every 1st, 2nd, … step,")
+                whole(value, f"record {key}")
 
 
 _KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {

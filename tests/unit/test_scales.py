@@ -8,7 +8,7 @@ import pytest
 
 from archfem import scales
 from archfem.counted import Mechanism
-from archfem.criteria import HINGE
+from archfem.criteria import HINGE, Criteria
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import Ending
 from archfem.models.rigid import rigid
@@ -96,6 +96,18 @@ def test_search_closes_in_on_every_threshold(on_piers, monkeypatch):
         assert found[name].lower < threshold <= found[name].upper
         assert found[name].ratio <= 1.02 * ROUND_OFF
     assert len(found.trials) <= 10 + 5 * 4  # ladder, and ln(√2) / ln(1.02) halved to 1 for each
+
+
+def test_every_run_of_a_search_has_the_criteria(on_piers, monkeypatch):
+    pretend(monkeypatch, dict.fromkeys(DEFINITIONS, beyond(1.0)))
+    made_up, seen = scales.time_history, []
+    monkeypatch.setattr(
+        scales, "time_history", lambda *a, **given: seen.append(given) or made_up(*a, **given)
+    )
+    ours = Criteria(hinge=0.4, failures=60)
+    found = mechanism_scales(on_piers, UNIT, start=object(), criteria=ours)
+    assert all(given["criteria"] == ours for given in seen)
+    assert found.asked == ("verified",)  # there are no sixty joints
 
 
 def test_what_fails_nowhere_or_everywhere_is_said(on_piers, monkeypatch):

@@ -139,6 +139,10 @@ def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):
     finer = kept(path, "text", {"precision": 0.05, "between": [0.2, 2.0]})
     assert (set(finer.runs), finer.scales) == ({"a", "b"}, {})
     assert kept(path, "another text", None) is None
+    found = json.loads(path.read_text())
+    del found["runs"]["a"]["ended"]  # as an earlier version wrote it
+    path.write_text(json.dumps(found))
+    assert kept(path, "text", None) is None
     assert kept(tmp_path / "none.json", "text", None) is None
 
 
