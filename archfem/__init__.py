@@ -24,6 +24,7 @@ from archfem.codes import Eurocode8 as Eurocode8
 from archfem.codes import TableSpectrum as TableSpectrum
 from archfem.codes import Tbec2018 as Tbec2018
 from archfem.counted import Mechanism as Mechanism
+from archfem.criteria import Criteria as Criteria
 from archfem.errors import ArchfemError as ArchfemError
 from archfem.errors import DidNotConverge as DidNotConverge
 from archfem.errors import InvalidInput as InvalidInput

@@ -1,9 +1,11 @@
 """What acts on a structure besides its own weight."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from archfem.arguments import real, reals, whole
 from archfem.errors import InvalidInput
 from archfem.structure import Array, Structure
 
@@ -20,6 +22,11 @@ class BodyForce:
     horizontal: float
     vertical: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse what are no multiples of g."""
+        real(self.horizontal, "body force, horizontal [g]")
+        real(self.vertical, "body force, vertical [g]")
+
 
 @dataclass(frozen=True)
 class PointLoad:
@@ -32,6 +39,11 @@ class PointLoad:
 
     x: float
     force: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no place or no force."""
+        real(self.x, "point load, x [m]")
+        object.__setattr__(self, "force", reals(self.force, "point load, force (x, y) [N]", 2))
 
     def place(self, structure: Structure) -> tuple[int, Array]:
         """Number of the loaded block and the loaded point (2,) [m].
@@ -67,6 +79,13 @@ class Settlement:
     block: int | str
     motion: tuple[float, float, float]
 
+    def __post_init__(self) -> None:
+        """Refuse what is no motion, or of no block."""
+        if not isinstance(self.block, str):
+            whole(self.block, "settlement, block", least=0)
+        motion = reals(self.motion, "settlement, motion (x, y, turn) [m, m, rad]", 3)
+        object.__setattr__(self, "motion", motion)
+
     def place(self, structure: Structure) -> int:
         """Number of the block that settles.
 
@@ -89,6 +108,24 @@ class Settlement:
 
 
 Action = BodyForce | PointLoad
+
+
+def loads(given: Action | Sequence[Action]) -> list[Action]:
+    """One action, or several that grow together, as a list.
+
+    Args:
+        given: a `BodyForce`, a `PointLoad`, or some of them.
+
+    Raises:
+        InvalidInput: something else is among them, or there is none.
+    """
+    several = given if isinstance(given, list | tuple) else [given]
+    if not several or not all(isinstance(each, BodyForce | PointLoad) for each in several):
+        raise InvalidInput(
+            f"load {given!r} is none: give BodyForce(horizontal), PointLoad(x, (0, -1)), or a list "
+            "of them; a Settlement comes alone"
+        )
+    return list(several)
 
 
 def _highest(outline: Array, x: float) -> float | None:

@@ -98,6 +98,7 @@ def shaken(
                 every=output.get("every", 1), fields_every=output.get("fields_every", animated)
             ),
             until=CountedMechanism() if case.analysis.get("halt", False) else None,
+            criteria=case.criteria,
         )
     except DidNotConverge as error:
         if error.history is not None:
@@ -117,14 +118,10 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
     """
     try:
         run = History.read(path, case.structure)
+        whole = run.ended.by_itself
     except InvalidInput:
         return None
-    if not complete(run) or run.dataset.attrs.get("case") != case.text():
+    if not whole or run.dataset.attrs.get("case") != case.text():
         return None
     before, now = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
-
-
-def complete(run: History) -> bool:
-    """Whether a run came to the end of its motion or to its event, and was not broken off."""
-    return not run.outcome.startswith(("interrupted", "failed"))

@@ -14,6 +14,7 @@ import tomli_w
 
 from archfem import ground
 from archfem.codes import DesignSpectrum
+from archfem.criteria import Criteria
 from archfem.discretisation import Discretisation
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.motion import Motion
@@ -35,6 +36,7 @@ MODEL = {
 }
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
+CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
 OUTPUT = {
     "every": int,
     "fields_every": int,
@@ -51,6 +53,7 @@ SECTIONS = (
     "motion",
     "suite",
     "analysis",
+    "criteria",
     "output",
 )
 
@@ -66,6 +69,7 @@ class Case:
         motion: what the file says of one ground motion, or None.
         suite: what it says of a suite of them, or None; without either there is dead load alone.
         analysis: what it says of the time history.
+        criteria: what makes a joint fail, and how many failed joints make a mechanism.
         output: what it says of what to keep and draw.
         settings: the whole case as it was understood, to be written again.
         folder: where relative file names start.
@@ -77,6 +81,7 @@ class Case:
     motion: dict[str, Any] | None
     suite: dict[str, Any] | None
     analysis: dict[str, Any]
+    criteria: Criteria
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
@@ -126,6 +131,7 @@ class Case:
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
             analysis=analysis,
+            criteria=Criteria(**checked(settings.get("criteria", {}), CRITERIA, "criteria")),
             output=checked(settings.get("output", {}), OUTPUT, "output"),
             settings=dict(settings),
             folder=folder,

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from archfem.arguments import real
 from archfem.errors import InvalidInput
 from archfem.oscillator import check
 
@@ -63,6 +64,8 @@ class Tbec2018:
     site: str
 
     def __post_init__(self) -> None:
+        real(self.ss, "map value S_S [g]")
+        real(self.s1, "map value S_1 [g]")
         if not (0.0 < self.ss < np.inf and 0.0 < self.s1 < np.inf):
             raise InvalidInput(f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are > 0")
         if self.site == "ZF":
@@ -145,7 +148,7 @@ class Eurocode8:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.ag < np.inf:
+        if not real(self.ag, "design ground acceleration [g]") > 0.0:
             raise InvalidInput(f"design ground acceleration {self.ag!r} g: expected more than 0")
         if self.type not in _GROUND or self.ground not in _GROUND[1]:
             raise InvalidInput(

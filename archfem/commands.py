@@ -144,7 +144,7 @@ def run(given: argparse.Namespace) -> None:
 
 def _run_suite(case: Case, dead: "Equilibrium", damping: Rayleigh | None, folder: Path) -> None:
     """Run all pairs of a suite, each to its own folder; those finished before are kept."""
-    from archfem.analysis import complete
+    from archfem.history import Ending
     from archfem.summary import pair_table
     from archfem.view.results import write_envelopes, write_suite
 
@@ -156,16 +156,16 @@ def _run_suite(case: Case, dead: "Equilibrium", damping: Rayleigh | None, folder
         alone, own = case.alone(motion.name), folder / motion.name
         run = _run_pair(alone, motion, dead, damping, folder=own)
         runs[motion.name] = run
-        if run.outcome.startswith("interrupted"):
+        if run.ended is Ending.INTERRUPTED:
             break
     table = pair_table(runs)
     (folder / "suite.txt").write_text(table + "\n", encoding="utf-8")
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{table}")
     _tell_written(write_envelopes(runs, dead, folder))
-    if run.outcome.startswith("interrupted"):
+    if run.ended is Ending.INTERRUPTED:
         print("run the same command again to go on with the pairs that are left", file=sys.stderr)
         raise KeyboardInterrupt
-    broken = [name for name, run in runs.items() if not complete(run)]
+    broken = [name for name, run in runs.items() if not run.ended.by_itself]
     if broken:
         raise DidNotConverge(
             f"{len(broken)} of {len(runs)} pairs have no equilibrium at some step: "

@@ -7,11 +7,8 @@ from itertools import combinations
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import HINGE, failed, roles_of
+from archfem.criteria import Criteria, failed, flagged, roles_of
 from archfem.roles import judged_parts
-
-FAILURES = 4
-"""Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
 
 KINDS = ("local", "semi-global", "global")
 """Classes of mechanisms, smallest first."""
@@ -51,10 +48,7 @@ def mechanism_kind(roles: Collection[str]) -> str:
 
 
 def counted_mechanism(
-    joints: xr.Dataset,
-    limit: float = HINGE,
-    failures: int = FAILURES,
-    kinds: Sequence[str] = KINDS,
+    joints: xr.Dataset, criteria: Criteria | None = None, *, kinds: Sequence[str] = KINDS
 ) -> Mechanism | None:
     """Find the first instant at which enough joints have failed at once.
 
@@ -65,14 +59,15 @@ def counted_mechanism(
 
     Args:
         joints: over joint, or over time and joint; those of `judged` are counted.
-        limit: of |e| for a hinge [-].
-        failures: how many make a mechanism.
+        criteria: what makes a joint fail, and how many make a mechanism; by default those by which
+            the joints were judged already.
         kinds: classes to look for.
 
     Returns:
         The mechanism, or None.
     """
-    flags = failed(joints, limit)
+    joints = flagged(joints, criteria)
+    flags, failures = failed(joints), Criteria.of(joints).failures
     if "time" not in flags.coords:
         flags = flags.assign_coords(time=np.nan)
     if "time" not in flags.dims:
@@ -97,21 +92,25 @@ def counted_mechanism(
     return None
 
 
-def counted_mechanisms(joints: xr.Dataset, limit: float = HINGE) -> dict[str, Mechanism | None]:
+def counted_mechanisms(
+    joints: xr.Dataset, criteria: Criteria | None = None
+) -> dict[str, Mechanism | None]:
     """Find the first mechanism by each of the definitions in use that count joints.
 
     "Any four joints" are of rings and piers, anywhere; "four in a ring" of one ring, whatever else
-    fails; "ring and pier" four of one ring and one pier together, at least one of each.
+    fails; "ring and pier" four of one ring and one pier together, at least one of each. Four are
+    as many as the criteria say.
 
     Args:
         joints: over joint, or over time and joint.
-        limit: of |e| for a hinge [-].
+        criteria: by default those by which the joints were judged already.
     """
+    joints = flagged(joints, criteria)
     rings = joints["role"].values.astype(str) == "ring"
     return {
-        "any four joints": counted_mechanism(joints, limit),
-        "four in a ring": counted_mechanism(joints.isel(joint=rings), limit, kinds=("local",)),
-        "ring and pier": counted_mechanism(joints, limit, kinds=("semi-global",)),
+        "any four joints": counted_mechanism(joints),
+        "four in a ring": counted_mechanism(joints.isel(joint=rings), kinds=("local",)),
+        "ring and pier": counted_mechanism(joints, kinds=("semi-global",)),
     }
 
 

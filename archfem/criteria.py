@@ -1,43 +1,148 @@
-"""When a joint has failed: hinging, sliding, opening."""
+"""When a joint has failed: hinging, sliding, opening; and by which criteria."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from archfem.arguments import instance, real, whole
+from archfem.errors import InvalidInput
 from archfem.roles import judged_parts
 
 HINGE = 0.46
 """|e| from which a joint counts as hinged, 8 % short of its edge: Demirel and Aldemir (2021)."""
 
+FAILURES = 4
+"""Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
+
 USED_UP = 1e-6
 """Friction left, relative to its limit, below which it is used up: round-off decides nothing there.
 Well above that of programmes and equilibria (1e-9), well below what friction is known to."""
 
+PREFIX = "criteria_"
+"""Of the attributes of a dataset that tell by which criteria its joints were judged."""
 
-def hinged(joints: xr.Dataset, limit: float = HINGE) -> xr.DataArray:
-    """Side on which each joint hinges: 1 extrados, -1 intrados (where it stays closed), 0 none.
+
+@dataclass(frozen=True, kw_only=True)
+class Criteria:
+    """What makes a joint fail, and how many failed joints make a mechanism.
+
+    Criteria judge what was computed and change no force: a joint of a model slides, or does not,
+    by its own law. A run carries its criteria, and all that is said of it obeys them.
+
+    Attributes:
+        hinge: |e| from which a joint counts as hinged, up to 0.5, its edge [-].
+        failures: joints of rings and piers that, failed at once, count as a mechanism.
+        friction: |V| / N from which every joint counts as sliding [-]; None takes the coefficient
+            of friction of each joint's own contact.
+    """
+
+    hinge: float = HINGE
+    failures: int = FAILURES
+    friction: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse limits that no joint, or every joint, would pass."""
+        if not 0.0 < real(self.hinge, "criteria hinge [-]") <= 0.5:
+            raise InvalidInput(
+                f"criteria hinge = {self.hinge!r}: |e| of a hinge is above 0 and at most 0.5, the "
+                f"edge of the joint; {HINGE} is usual"
+            )
+        whole(self.failures, "criteria failures")
+        if self.friction is not None:
+            real(self.friction, "criteria friction [-]", least=0.0)
+
+    @classmethod
+    def of(cls, joints: xr.Dataset) -> "Criteria":
+        """Criteria by which joints were judged; the usual ones where they do not tell."""
+        kinds = {"hinge": float, "failures": int, "friction": float}
+        told = {key: joints.attrs.get(PREFIX + key) for key in kinds}
+        return cls(**{key: kinds[key](value) for key, value in told.items() if value is not None})
+
+    @property
+    def attributes(self) -> dict[str, float | int]:
+        """The criteria as attributes of a dataset; without friction where it is the joints' own."""
+        return {PREFIX + key: value for key, value in asdict(self).items() if value is not None}
+
+    def coefficients(self, own: Any) -> Any:
+        """Coefficients of friction by which joints are judged, given the joints' own [-]."""
+        return own if self.friction is None else np.full_like(own, self.friction)
+
+
+def chosen(criteria: Criteria | None, **single: Any) -> Criteria | None:
+    """Criteria that were given as a whole, or by single values beside the usual others.
 
     Args:
-        joints: with `eccentricity`.
-        limit: of |e| [-].
+        criteria: or None.
+        single: fields of `Criteria`; None where it was not given.
+
+    Raises:
+        InvalidInput: both were given.
     """
-    e = joints["eccentricity"]
-    side = xr.where(abs(e) >= limit, np.sign(e), 0.0).astype(np.int8)
-    return side.rename("hinged")
+    if criteria is not None:
+        instance(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
+    given = {key: value for key, value in single.items() if value is not None}
+    if given and criteria is not None:
+        raise InvalidInput(f"give {given} in criteria=Criteria(…), or without criteria; not both")
+    return Criteria(**given) if given else criteria
 
 
-def sliding(joints: xr.Dataset) -> xr.DataArray:
-    """Whether the mobilised friction |V| / N of each joint has reached its coefficient μ."""
-    return (joints["friction"] >= (1.0 - USED_UP) * joints["friction_limit"]).rename("sliding")
+def failing(
+    eccentricity: NDArray[np.float64],
+    friction: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    hinge: float,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which joints hinge, and which slide; an open joint, whose e is undefined, does neither.
+
+    Args:
+        eccentricity: M / (N h) (…, n_joints) [-].
+        friction: mobilised, |V| / N (…, n_joints) [-].
+        coefficients: of friction (n_joints,) [-].
+        hinge: |e| from which a joint hinges [-].
+    """
+    return np.abs(eccentricity) >= hinge, friction >= (1.0 - USED_UP) * coefficients
 
 
-def opened(joints: xr.Dataset) -> xr.DataArray:
-    """Whether each joint has come apart over its whole depth: no compression left."""
-    return (joints["N"] <= 0.0).rename("opened")
+def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
+    """Joints with flags of failure, by criteria that the dataset then carries as attributes.
+
+    Flags are `hinge`, the face on which a joint hinges (1 extrados, -1 intrados, where it stays
+    closed; 0 none), `slide`, whether the mobilised friction has reached its coefficient, `open`,
+    whether it has come apart over its whole depth, and the coordinate `judged`, whether its
+    failure counts, as `judged_parts` says.
+
+    Args:
+        joints: N, eccentricity and friction, as made by `joint_dataset`.
+        criteria: by default those which the joints were judged by already, or the usual ones.
+    """
+    if criteria is None and "hinge" in joints:
+        return joints
+    criteria = chosen(criteria) or Criteria.of(joints)
+    ordered = joints[["N", "eccentricity", "friction"]].transpose(
+        ..., "joint", missing_dims="ignore"
+    )
+    dims, e = ordered["eccentricity"].dims, ordered["eccentricity"].values
+    coefficients = criteria.coefficients(joints["friction_limit"].values)
+    hinges, slides = failing(e, ordered["friction"].values, coefficients, criteria.hinge)
+    side = np.where(hinges, np.sign(e), 0.0).astype(np.int8)
+    result = joints.assign(
+        hinge=(dims, side, {"long_name": "face on which it hinges, 1 extrados, -1 intrados"}),
+        slide=(dims, slides, {"long_name": "whether its friction is used up"}),
+        open=(dims, ordered["N"].values <= 0.0, {"long_name": "whether it has come apart"}),
+    )
+    counts = np.isin(joints["part"].values.astype(str), judged_parts(roles_of(joints)))
+    result.coords["judged"] = (joints["part"].dims, counts)
+    others = {key: value for key, value in joints.attrs.items() if not key.startswith(PREFIX)}
+    result.attrs = others | criteria.attributes
+    return result
 
 
-def failed(joints: xr.Dataset, limit: float = HINGE) -> xr.DataArray:
-    """Whether each joint hinges, slides or has come apart."""
-    return ((hinged(joints, limit) != 0) | sliding(joints) | opened(joints)).rename("failed")
+def failed(joints: xr.Dataset) -> xr.DataArray:
+    """Whether each joint hinges, slides or has come apart, by the flags that it carries."""
+    return ((joints["hinge"] != 0) | joints["slide"] | joints["open"]).rename("failed")
 
 
 def first_time(flags: xr.DataArray) -> xr.DataArray:
@@ -80,11 +185,12 @@ def roles_of(joints: xr.Dataset) -> dict[str, str]:
     Args:
         joints: as made by `joint_dataset`, with `part` and `role`.
     """
-    parts, roles = (joints[key].values.astype(str).tolist() for key in ("part", "role"))
+    parts, roles = (
+        np.atleast_1d(joints[key].values).astype(str).tolist() for key in ("part", "role")
+    )
     return dict(zip(parts, roles, strict=True))
 
 
 def judged(joints: xr.Dataset) -> xr.Dataset:
-    """Those joints that are judged, as `judged_parts` says; they keep their numbers."""
-    part = joints["part"].values.astype(str)
-    return joints.isel(joint=np.isin(part, judged_parts(roles_of(joints))))
+    """Those joints that are judged, by the flag that they carry; they keep their numbers."""
+    return joints.isel(joint=joints["judged"].values)

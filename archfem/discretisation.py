@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
+from archfem.arguments import real, row, whole
 from archfem.errors import InvalidInput
 from archfem.quadrature import Quadrature
 
@@ -16,6 +15,9 @@ FIDELITIES = (*RUNGS, "monolithic")
 
 SHAPES = ("quadrilateral", "triangle")
 """Of cells."""
+
+MOST = 1000
+"""Cells across a block, either way, beyond which nobody means it."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Discretisation:
         object.__setattr__(self, "cells", _two(self.cells))
         if self.cell not in SHAPES:
             raise InvalidInput(f"cell '{self.cell}' is not known: use one of {SHAPES}")
-        if self.coarse is not None and not self.coarse > 0.0:
+        if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
             raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
         if self.degree not in (1, 2):
             raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")
@@ -105,9 +107,8 @@ def _check_fidelity(fidelity: object) -> None:
 
 def _two(cells: object) -> tuple[int, int]:
     """Two whole numbers."""
-    if not isinstance(cells, tuple | list | np.ndarray) or len(cells) != 2:
-        raise InvalidInput(f"cells {cells!r}: give two numbers, through the thickness and along")
-    for key, count in zip(("through", "along"), cells, strict=True):
-        if not (isinstance(count, int | np.integer) and 1 <= count <= 1000):
-            raise InvalidInput(f"cells {key} = {count!r}: give a whole number, 1 to 1000")
-    return int(cells[0]), int(cells[1])
+    through, along = row(cells, "cells through the thickness and along each block", 2)
+    for key, count in (("through", through), ("along", along)):
+        if whole(count, f"cells {key}") > MOST:
+            raise InvalidInput(f"cells {key} = {count!r}: give at most {MOST}")
+    return int(through), int(along)

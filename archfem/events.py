@@ -1,20 +1,45 @@
-"""Events that end a time history: enough joints have failed, or the blocks can move."""
+"""Events that end a time history: enough joints have failed, or the blocks can move.
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+An event says what to look for. Each run has a fresh watch of its own made by it, so that one event
+serves any number of runs.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import InitVar, dataclass
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
-from archfem.counted import FAILURES, KINDS, counted_mechanism, counted_mechanisms
-from archfem.criteria import HINGE, USED_UP
+from archfem.counted import KINDS, counted_mechanism, counted_mechanisms
+from archfem.criteria import Criteria, chosen, failing
+from archfem.errors import InvalidInput
 from archfem.mechanism import Verifier
-from archfem.resultants import joint_dataset
+from archfem.resultants import joint_dataset, ratios
 from archfem.structure import Array, Structure
 
-Event = Callable[[Structure, Array], str | None]
+Watch = Callable[[Array], str | None]
 """Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
+
+
+@runtime_checkable
+class Event(Protocol):
+    """What may end a run.
+
+    Attributes:
+        criteria: what makes a joint fail, or None for those of the run.
+    """
+
+    @property
+    def criteria(self) -> Criteria | None:
+        """What makes a joint fail, or None for those of the run."""
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch a run of a structure, by its criteria."""
+
+
+Until = Event | Callable[[Structure, Array], str | None]
+"""An event, or a function of the structure and N, V, M of a step that does as a `Watch` does."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,142 +49,219 @@ class CountedMechanism:
     Its words say whether the blocks can also move.
 
     Attributes:
-        limit: of |e| for a hinge [-].
-        failures: how many make a mechanism.
+        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
+            run. Given here and not to the run, they become those of the run.
         kinds: classes that end the run, of "local", "semi-global" and "global".
+
+    Args:
+        criteria: as above.
+        kinds: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+        failures: how many make a mechanism, instead of criteria.
+
+    Raises:
+        InvalidInput: a class is not known, or a value cannot be meant.
     """
 
-    limit: float = HINGE
-    failures: int = FAILURES
+    criteria: Criteria | None = None
     kinds: tuple[str, ...] = KINDS
-    _watches: dict[int, "_Watch"] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    limit: InitVar[float | None] = None
+    failures: InitVar[int | None] = None
 
-    def __call__(self, structure: Structure, resultants: Array) -> str | None:
-        """Say which joints have failed, or None."""
-        watch = _watch(self._watches, structure)
-        state = watch.state(resultants, watch.judged, self.limit)
-        if np.count_nonzero(state) < self.failures or state.tobytes() in watch.idle:
-            return None
-        joints = joint_dataset(structure, resultants)
-        found = counted_mechanism(joints, self.limit, self.failures, self.kinds)
-        if found is None:
-            watch.idle.add(state.tobytes())
-            return None
-        motion = watch.verifier.verified(joints, self.limit)
-        return f"a mechanism: joints {found.joints} of the {found.part}; {motion}"
+    def __post_init__(self, limit: float | None, failures: int | None) -> None:
+        own = chosen(self.criteria, hinge=limit, failures=failures)
+        object.__setattr__(self, "criteria", own)
+        _check_kinds(self.kinds)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say which joints have failed, or None."""
+        verifier = Verifier(structure)
+        glance = _Glance(structure, criteria, np.flatnonzero(structure.judged).tolist())
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, criteria.failures)
+            found = None if joints is None else counted_mechanism(joints, kinds=self.kinds)
+            if joints is None or found is None:
+                return None
+            motion = verifier.verified(joints)
+            return f"a mechanism: joints {found.joints} of the {found.part}; {motion}"
+
+        return look
 
 
 @dataclass(frozen=True, kw_only=True)
 class MovingMechanism:
     """Event: the failed joints, and they alone, permit a motion of the blocks.
 
-    Its words say whether the count of failures agrees. States that recur are looked at once.
+    Its words say whether the count of failures agrees.
 
     Attributes:
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail; None for those of the run. Given here and not to the
+            run, they become those of the run.
         kinds: classes that end the run, of "local", "semi-global" and "global".
+
+    Args:
+        criteria: as above.
+        kinds: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+
+    Raises:
+        InvalidInput: a class is not known, or a value cannot be meant.
     """
 
-    limit: float = HINGE
+    criteria: Criteria | None = None
     kinds: tuple[str, ...] = KINDS
-    _watches: dict[int, "_Watch"] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    limit: InitVar[float | None] = None
 
-    def __call__(self, structure: Structure, resultants: Array) -> str | None:
-        """Say which joints permit which motion, or None."""
-        watch = _watch(self._watches, structure)
-        state = watch.state(resultants, watch.skeleton, self.limit)
-        if not state.any() or state.tobytes() in watch.idle:
-            return None
-        found = watch.verifier.moving(joint_dataset(structure, resultants), self.limit)
-        if found is None or found.kind not in self.kinds:
-            watch.idle.add(state.tobytes())
-            return None
-        return f"a mechanism that moves: joints {found.moved.joints}; {found}"
+    def __post_init__(self, limit: float | None) -> None:
+        own = chosen(self.criteria, hinge=limit)
+        object.__setattr__(self, "criteria", own)
+        _check_kinds(self.kinds)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say which joints permit which motion, or None."""
+        verifier = Verifier(structure)
+        glance = _Glance(structure, criteria, verifier.skeleton.joints)
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, 1)
+            found = None if joints is None else verifier.moving(joints)
+            if found is None or found.kind not in self.kinds:
+                return None
+            return f"a mechanism that moves: joints {found.moved.joints}; {found}"
+
+        return look
 
 
 @dataclass(frozen=True, kw_only=True)
 class EveryMechanism:
-    """Event: a mechanism by each definition has been met, at one step or another.
+    """Event: a mechanism by each definition has been met, at one step of the run or another.
 
-    Definitions that the structure has no joints for are not waited for. It remembers what it has
-    met, and so serves one run.
+    Definitions that the structure has no joints for are not waited for.
 
     Attributes:
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
+            run. Given here and not to the run, they become those of the run.
+
+    Args:
+        criteria: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+
+    Raises:
+        InvalidInput: a value cannot be meant.
     """
 
-    limit: float = HINGE
-    _met: set[str] = field(default_factory=set, init=False, repr=False, compare=False)
-    _watches: dict[int, "_Watch"] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    criteria: Criteria | None = None
+    limit: InitVar[float | None] = None
 
-    def __call__(self, structure: Structure, resultants: Array) -> str | None:
-        """Say that all have been met, or None."""
-        watch = _watch(self._watches, structure)
-        state = np.concatenate(
-            [watch.state(resultants, each, self.limit) for each in (watch.judged, watch.skeleton)]
+    def __post_init__(self, limit: float | None) -> None:
+        own = chosen(self.criteria, hinge=limit)
+        object.__setattr__(self, "criteria", own)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say that all have been met, or None."""
+        verifier = Verifier(structure)
+        concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
+        glance = _Glance(structure, criteria, sorted(concerned))
+        wanted = {"verified", *possible_counts(structure, criteria)}
+        met: set[str] = set()
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, 1)
+            if joints is None:
+                return None
+            met.update(name for name, found in counted_mechanisms(joints).items() if found)
+            if "verified" not in met and verifier.moving(joints) is not None:
+                met.add("verified")
+            return "a mechanism by each definition" if met >= wanted else None
+
+        return look
+
+
+def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
+    """Criteria of a run and of the event that may end it, which are the same.
+
+    Args:
+        criteria: given to the run, or None.
+        until: the event, or None.
+
+    Returns:
+        Those given to the run, or else to the event, or else the usual ones.
+
+    Raises:
+        InvalidInput: both were given, and differ: what ends the run would be no mechanism of it.
+    """
+    own = until.criteria if isinstance(until, Event) else None
+    if criteria is not None and own is not None and criteria != own:
+        raise InvalidInput(
+            f"the run is judged by {criteria}, and its event by {own}: give criteria to the run "
+            "alone, which its event then obeys"
         )
-        if not state.any() or state.tobytes() in watch.idle:
-            return None
-        watch.idle.add(state.tobytes())
-        joints = joint_dataset(structure, resultants)
-        counted = counted_mechanisms(joints, self.limit)
-        self._met.update(name for name, found in counted.items() if found is not None)
-        if "verified" not in self._met and watch.verifier.moving(joints, self.limit) is not None:
-            self._met.add("verified")
-        return "a mechanism by each definition" if self._met >= watch.wanted else None
+    return criteria or own or Criteria()
 
 
-def possible_counts(structure: Structure) -> tuple[str, ...]:
-    """Definitions of `counted_mechanisms` that the structure has joints enough for."""
-    apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)))
+def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
+    """A fresh watch over one run.
+
+    Args:
+        until: an event, or a function of structure and resultants.
+        structure: that moves.
+        criteria: of the run.
+
+    Raises:
+        InvalidInput: it is neither.
+    """
+    if isinstance(until, type) or not (isinstance(until, Event) or callable(until)):
+        raise InvalidInput(
+            f"until = {until!r} is no event: give one, e.g. CountedMechanism(), or a function of "
+            "the structure and of N, V, M of its joints"
+        )
+    if isinstance(until, Event):
+        return until.watch(structure, criteria)
+    return lambda resultants: until(structure, resultants)
+
+
+def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:
+    """Definitions of `counted_mechanisms` that the structure has joints enough for.
+
+    Args:
+        structure: what may fail.
+        criteria: say how many joints it takes; by default the usual ones.
+    """
+    apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
     return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
 
 
-class _Watch:
-    """A quick look at the joints of one structure at every step.
+class _Glance:
+    """A quick look at some joints of a structure at every step of a run.
 
-    Attributes:
-        verifier: of mechanisms of the structure.
-        judged: numbers of the joints that are judged.
-        skeleton: numbers of the joints that can be part of a mechanism.
-        idle: states of joints that are known to be no event, so that nobody looks twice.
+    Labels, which take long, are given only to states of joints that have not been seen before.
     """
 
-    def __init__(self, structure: Structure) -> None:
-        joints = structure.joints
-        self.verifier = Verifier(structure)
-        self.judged = np.flatnonzero(structure.judged)
-        self.skeleton = np.array(self.verifier.skeleton.joints)
-        self.idle: set[bytes] = set()
-        self._structure = structure
-        self._depth = np.array([joint.depth for joint in joints])
-        self._friction = np.array([joint.contact.friction for joint in joints])
+    def __init__(self, structure: Structure, criteria: Criteria, numbers: Sequence[int]) -> None:
+        self._structure, self._criteria = structure, criteria
+        self._numbers = np.array(numbers, dtype=np.intp)
+        self._depth = structure.depths[self._numbers]
+        self._coefficients = criteria.coefficients(structure.friction[self._numbers])
+        self._seen: set[bytes] = set()
 
-    @cached_property
-    def wanted(self) -> set[str]:
-        """Definitions of a mechanism that the structure has joints enough for."""
-        return {"verified", *possible_counts(self._structure)}
-
-    def state(
-        self, resultants: Array, numbers: NDArray[np.int64], limit: float
-    ) -> NDArray[np.int8]:
-        """How joints hinge and slide, one number a joint; zero where it does neither."""
-        normal, shear, moment = resultants[numbers].T
-        hinges = np.abs(moment) >= limit * normal * self._depth[numbers]
-        slides = np.abs(shear) >= (1.0 - USED_UP) * self._friction[numbers] * normal
-        ways = np.where(hinges, np.sign(moment), 0.0)
-        ways += np.where(slides, 4.0 * (2.0 + np.sign(shear)), 0.0)
-        return np.where(normal > 0.0, ways, 100.0).astype(np.int8)
+    def __call__(self, resultants: Array, least: int) -> xr.Dataset | None:
+        """All joints, labelled, where so many of those looked at fail in a way not yet seen."""
+        own = resultants[self._numbers]
+        e, friction = ratios(own, self._depth)
+        hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
+        apart = own[:, 0] <= 0.0
+        if np.count_nonzero(hinges | slides | apart) < least:
+            return None
+        senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)
+        key = np.stack([*senses, slides, apart]).astype(np.int8).tobytes()
+        if key in self._seen:
+            return None
+        self._seen.add(key)
+        return joint_dataset(self._structure, resultants, criteria=self._criteria)
 
 
-def _watch(watches: dict[int, _Watch], structure: Structure) -> _Watch:
-    """The watch over a structure, which is set up once."""
-    if id(structure) not in watches:
-        watches[id(structure)] = _Watch(structure)
-    return watches[id(structure)]
+def _check_kinds(kinds: Any) -> None:
+    """Refuse classes that no mechanism has."""
+    if not isinstance(kinds, list | tuple) or not kinds or not all(each in KINDS for each in kinds):
+        raise InvalidInput(f"kinds = {kinds!r}: give some of {KINDS}, as a tuple")

@@ -11,7 +11,7 @@ import xarray as xr
 
 from archfem.criteria import judged
 from archfem.files import in_one_stroke
-from archfem.history import History
+from archfem.history import Ending, History
 from archfem.tables import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
@@ -66,6 +66,7 @@ def of_run(run: History) -> dict[str, Any]:
             definition: None if found is None else {"kind": found.kind, "time": found.time}
             for definition, found in first_mechanisms(run).items()
         },
+        "ended": run.ended,
         "outcome": run.outcome,
     }
 
@@ -79,6 +80,8 @@ def by_part(values: xr.DataArray) -> dict[str, float]:
 def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | None:
     """Read what an earlier command found of the same case, without factors searched for otherwise.
 
+    What an earlier version wrote, which kept only words of how runs ended, is not taken.
+
     Args:
         path: of the file that `write` has written.
         case: as text.
@@ -88,9 +91,11 @@ def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | N
         found = Finding(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
+    if found.case != case or not all("ended" in run for run in found.runs.values()):
+        return None
     if search is not None and found.search not in (None, search):
         found.scales = {}
-    return found if found.case == case else None
+    return found
 
 
 def write(finding: Finding, path: Path) -> None:
@@ -135,7 +140,7 @@ def _broken(findings: Mapping[str, Finding]) -> list[str]:
     """A line for each case with runs that broke off, as one text or none."""
     lines = []
     for name, finding in findings.items():
-        failed = [run["outcome"].startswith("failed") for run in finding.runs.values()]
+        failed = [run["ended"] == Ending.FAILED for run in finding.runs.values()]
         if any(failed):
             lines.append(f"{name}: {sum(failed)} of {len(failed)} runs broke off")
     return ["\n".join(lines)] if lines else []

@@ -1,6 +1,7 @@
 """What was recorded of a time history, and its file."""
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.counted import Mechanism, counted_mechanism
+from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.files import in_one_stroke
 from archfem.mechanism import (
@@ -24,13 +26,35 @@ SIGNS = (
 )
 
 
+class Ending(StrEnum):
+    """How a run ended.
+
+    Attributes:
+        FINISHED: at the end of its motion.
+        EVENT: by the event that it was to run until.
+        INTERRUPTED: by Ctrl-C.
+        FAILED: at a step without equilibrium.
+    """
+
+    FINISHED = "finished"
+    EVENT = "event"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"
+
+    @property
+    def by_itself(self) -> bool:
+        """Whether the run came to its end, and was not broken off."""
+        return self in (Ending.FINISHED, Ending.EVENT)
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """The record of one run.
 
     Attributes:
-        dataset: everything that was recorded, with units, signs, versions and, where one was
-            given, the case. Resultants are over (time, joint), fields over (frame, coordinate).
+        dataset: everything that was recorded, with units, signs, versions, the criteria by which
+            joints are judged and, where one was given, the case. Resultants and flags are over
+            (time, joint), fields over (frame, coordinate).
         structure: what was shaken; the file does not hold it. Without it motions of the blocks
             are unknown.
     """
@@ -40,9 +64,22 @@ class History:
 
     @property
     def joints(self) -> xr.Dataset:
-        """N, V, M, eccentricity and friction over time and joint."""
+        """N, V, M, eccentricity, friction and flags of failure over time and joint."""
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
-        return self.dataset[names]
+        return flagged(self.dataset[names])
+
+    @property
+    def criteria(self) -> Criteria:
+        """What makes a joint fail, and how many failed joints make a mechanism."""
+        return Criteria.of(self.dataset)
+
+    def judged_by(self, criteria: Criteria) -> "History":
+        """The same run, judged by other criteria.
+
+        Args:
+            criteria: instead of its own. What ended the run stays as it was.
+        """
+        return History(flagged(self.dataset, criteria), self.structure)
 
     @property
     def time(self) -> np.ndarray:
@@ -53,6 +90,20 @@ class History:
     def outcome(self) -> str:
         """How the run ended, in words."""
         return str(self.dataset.attrs["outcome"])
+
+    @property
+    def ended(self) -> Ending:
+        """How the run ended.
+
+        Raises:
+            InvalidInput: it was written by a version that kept words alone.
+        """
+        if "ended" not in self.dataset.attrs:
+            raise InvalidInput(
+                "this history tells only in words how its run ended, as earlier versions wrote it: "
+                f"'{self.outcome}'; run it again"
+            )
+        return Ending(self.dataset.attrs["ended"])
 
     @cached_property
     def mechanism(self) -> Mechanism | None:

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from scipy import sparse
 
-from archfem.actions import BodyForce, PointLoad, Settlement
+from archfem.actions import BodyForce, PointLoad, Settlement, loads
+from archfem.arguments import instance, real
 from archfem.errors import InvalidInput
 from archfem.programme import Optimum, Programme, friction_limits, no_limits
 from archfem.resultants import joint_dataset
@@ -149,8 +150,8 @@ def collapse_factor(
         asked, scale = _settled(dead, support), dead.blocks.force
         ends = Outcome.SETTLES, Outcome.LOCKS
     else:
-        actions = [live] if isinstance(live, BodyForce | PointLoad) else live
-        asked, scale, ends = _loaded(dead, actions), -1.0, (Outcome.COLLAPSES, Outcome.UNBOUNDED)
+        asked, scale = _loaded(dead, loads(live)), -1.0
+        ends = Outcome.COLLAPSES, Outcome.UNBOUNDED
     found = asked.solve()
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
@@ -190,7 +191,7 @@ def _checked(friction: str | None, strength: float | None) -> None:
     """Refuse options that mean nothing."""
     if friction not in FRICTION:
         raise InvalidInput(f"friction {friction!r} is not known: use one of {FRICTION}")
-    if strength is not None and not strength > 0.0:
+    if strength is not None and not real(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
 
 
@@ -207,6 +208,7 @@ def _check_stiff(structure: Structure) -> None:
 
 def _self_weight(structure: Structure, friction: str | None, strength: float | None) -> Programme:
     """Programme whose load is the self-weight, with nothing asked of it."""
+    instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
     _checked(friction, strength)
     _check_stiff(structure)
     blocks = RigidBlocks(structure)

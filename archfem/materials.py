@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from archfem.arguments import real
 from archfem.errors import InvalidInput
 from archfem.units import GPa, MPa, kN
 
@@ -32,6 +33,10 @@ class Material:
     def __post_init__(self) -> None:
         """Refuse what cannot be a material, or can only be a wrong unit."""
         of = f"of '{self.name}'"
+        for key in ("young", "poisson", "unit_weight"):
+            real(getattr(self, key), f"{key} {of}")
+        if self.strength is not None:
+            real(self.strength, f"strength {of}")
         _require(
             1e3 <= self.young <= 1e13,
             f"young {self.young:.3g} Pa {of} is not between 1 kPa and 10 TPa",
@@ -72,6 +77,8 @@ class Contact:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a contact, or can only be a wrong unit."""
+        for key in ("normal_stiffness", "shear_stiffness", "friction"):
+            real(getattr(self, key), f"{key} of '{self.name}'")
         for key in ("normal_stiffness", "shear_stiffness"):
             value = getattr(self, key)
             _require(

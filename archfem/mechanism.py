@@ -8,8 +8,9 @@ import xarray as xr
 from scipy import sparse
 from scipy.optimize import linprog
 
+from archfem.arguments import instance
 from archfem.counted import Mechanism, counted_mechanism, mechanism_kind
-from archfem.criteria import HINGE, hinged, opened, sliding
+from archfem.criteria import Criteria, chosen, flagged
 from archfem.errors import DidNotConverge
 from archfem.resultants import check_instant
 from archfem.rigid_blocks import RigidBlocks
@@ -57,7 +58,11 @@ class VerifiedMechanism:
 
 
 def verified_mechanism(
-    structure: Structure, joints: xr.Dataset, limit: float = HINGE
+    structure: Structure,
+    joints: xr.Dataset,
+    criteria: Criteria | None = None,
+    *,
+    limit: float | None = None,
 ) -> VerifiedMechanism:
     """Look for a rigid-block motion that the joints failed at one instant permit.
 
@@ -75,39 +80,43 @@ def verified_mechanism(
     Args:
         structure: whose blocks move.
         joints: as made by `joint_dataset`, at one instant.
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail; by default those by which the joints were judged already.
+        limit: of |e| for a hinge, beside the usual criteria [-].
 
     Returns:
         The motion and its class, beside the count.
 
     Raises:
-        InvalidInput: `joints` has several instants, or those of another structure.
+        InvalidInput: `joints` has several instants, or those of another structure; both criteria
+            and a limit were given.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279: a mechanism needs hinges on alternating
         faces, not only four of them.
     """
-    return Verifier(structure).verified(joints, limit)
+    instance(structure, Structure, "structure", "give that whose joints these are")
+    instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
+    return Verifier(structure).verified(flagged(joints, chosen(criteria, hinge=limit)))
 
 
 def first_verified_mechanism(
-    structure: Structure, joints: xr.Dataset, limit: float = HINGE
+    structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
 ) -> VerifiedMechanism | None:
     """Find the first instant of a time history at which the failed joints permit a motion.
 
     Args:
         structure: whose blocks move; of its rings and piers, one at least must.
         joints: over time and joint.
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail; by default those by which the joints were judged already.
     """
-    verifier = Verifier(structure)
+    verifier, joints = Verifier(structure), flagged(joints, criteria)
     idle: set[bytes] = set()
-    free = verifier.freedoms(joints.transpose("time", "joint"), limit)
+    free = verifier.freedoms(joints.transpose("time", "joint"))
     for instant in np.flatnonzero(free.any(axis=1)):
         state = free[instant].tobytes()
         if state in idle:
             continue
-        found = verifier.moving(joints.isel(time=int(instant)), limit)
+        found = verifier.moving(joints.isel(time=int(instant)))
         if found is not None:
             return found
         idle.add(state)
@@ -145,10 +154,10 @@ class Verifier:
         """Tells at once of most states that they permit no motion of the judged parts."""
         return Screen(self.blocks, self.parts)
 
-    def verified(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism:
+    def verified(self, joints: xr.Dataset) -> VerifiedMechanism:
         """Look for a motion at one instant, as `verified_mechanism` does."""
         check_instant(self.structure, joints)
-        scaled = _largest_motion(self.blocks, self.freedoms(joints, limit))
+        scaled = _largest_motion(self.blocks, self.freedoms(joints))
         gaps = (self.blocks.kinematics @ (self.blocks.coordinates * scaled)).reshape(3, -1)
         working = np.flatnonzero(np.abs(gaps).max(axis=0) > MOVING)
         motion = self.blocks.motion(scaled)
@@ -163,22 +172,21 @@ class Verifier:
             float(joints["time"]) if "time" in joints.coords else None,
             tuple(self.skeleton.blocks[k] for k in moving),
         )
-        counted = counted_mechanism(joints, limit)
+        counted = counted_mechanism(joints)
         return VerifiedMechanism(moved, counted, self.skeleton.in_whole(motion))
 
-    def moving(self, joints: xr.Dataset, limit: float = HINGE) -> VerifiedMechanism | None:
+    def moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
         """The same, or None at once where rings and piers cannot move."""
-        if not self.screen.permit(self.freedoms(joints, limit)):
+        if not self.screen.permit(self.freedoms(joints)):
             return None
-        found = self.verified(joints, limit)
+        found = self.verified(joints)
         return None if found.kind == "none" else found
 
-    def freedoms(self, joints: xr.Dataset, limit: float = HINGE) -> Array:
+    def freedoms(self, joints: xr.Dataset) -> Array:
         """What each joint of the skeleton may do: open at its two ends, and slip.
 
         Args:
-            joints: of the whole structure, as made by `joint_dataset`.
-            limit: of |e| for a hinge [-].
+            joints: of the whole structure, as made by `joint_dataset`, with their flags.
 
         Returns:
             (…, 3 n_joints), intrados ends first, then extrados ends, then slips: 1 where an end
@@ -186,8 +194,8 @@ class Verifier:
             either sense will do.
         """
         joints = joints.isel(joint=list(self.skeleton.joints))
-        side, apart = hinged(joints, limit).values, opened(joints).values
-        sense, slides = np.sign(joints["V"].values), sliding(joints).values
+        side, apart = joints["hinge"].values, joints["open"].values
+        sense, slides = np.sign(joints["V"].values), joints["slide"].values
         either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
         slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
         return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)

@@ -7,8 +7,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from archfem.arguments import instance, whole
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.models import Model
+from archfem.models import Model, check_model
 from archfem.statics import Equilibrium
 from archfem.structure import Array
 from archfem.tables import aligned
@@ -85,7 +86,10 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     """
     from archfem.eigen import lowest  # SLEPc is needed from here on only
 
-    if not 1 <= count <= model.size:
+    check_model(model)
+    if about is not None:
+        instance(about, Equilibrium, "about", "give dead_load(model), or None")
+    if not 1 <= whole(count, "number of modes") <= model.size:
         raise InvalidInput(
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )

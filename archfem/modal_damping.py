@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archfem.arguments import real
 from archfem.errors import InvalidInput
 from archfem.modal import Modes, modes
-from archfem.models import Model
+from archfem.models import Model, check_model
 from archfem.schemes import EFFECTIVE, Rayleigh
 from archfem.statics import Equilibrium
 
@@ -87,7 +88,8 @@ def effective_range(
         InvalidInput: the share is not one, or a single mode has it.
         DidNotConverge: the structure is a mechanism in that state, or modes were not found.
     """
-    if not FIRST_SHARE < share < 1.0:
+    check_model(model)
+    if not FIRST_SHARE < real(share, "share of the mass [-]") < 1.0:
         raise InvalidInput(
             f"share {share} of the mass is not between {FIRST_SHARE} and 1: 90 % is 0.9"
         )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from archfem import signals
+from archfem.arguments import instance, real, whole
 from archfem.errors import InvalidInput
 from archfem.records.channel import Channel
 from archfem.records.read import read_channels
@@ -50,6 +51,7 @@ class Motion:
     def __post_init__(self) -> None:
         if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
             raise InvalidInput(f"dt {self.dt!r} s: the time between samples is a positive number")
+        instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
@@ -134,13 +136,15 @@ class Motion:
             dt: time between samples [s].
             vertical_ratio: vertical peak by horizontal peak; 0 leaves the vertical out.
         """
+        given = {"duration [s]": duration, "pga [m/s²]": pga, "dt [s]": dt}
+        for key, value in (given | {"vertical_ratio [-]": vertical_ratio}).items():
+            real(value, f"synthetic motion, {key}")
         if not (duration >= 50 * dt > 0.0 and pga > 0.0 and vertical_ratio >= 0.0):
             raise InvalidInput(
                 f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
                 f"{vertical_ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
             )
-        if seed < 0:
-            raise InvalidInput(f"synthetic motion of seed {seed}: seeds are 0, 1, 2, …")
+        whole(seed, "seed of a synthetic motion", least=0)
         random = np.random.default_rng(seed)
         count = round(duration / dt) + 1
         level = pga * enveloped_noise(count, dt, random=random)

@@ -13,7 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from archfem._petsc import PETSc
-from archfem.errors import DidNotConverge
+from archfem.arguments import instance, real
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.structure import Array
 
 Residual = Callable[[Array], Array]
@@ -46,6 +47,12 @@ class Newton:
 
     tolerance: float = 1e-10
     petsc: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse what no solve could reach, and options without names."""
+        if not 0.0 < real(self.tolerance, "tolerance of a solve [-]") < 1.0:
+            raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
+        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"pc_type": "cholesky"}')
 
 
 @dataclass(frozen=True)

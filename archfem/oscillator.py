@@ -4,6 +4,7 @@ import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import linalg
 
+from archfem.arguments import real
 from archfem.errors import InvalidInput
 
 SAMPLES_PER_PERIOD = 40
@@ -93,7 +94,7 @@ def check(periods: np.ndarray, damping: float) -> None:
     """Refuse periods and damping ratios no oscillator has."""
     if not (np.all(np.isfinite(periods)) and np.all(np.asarray(periods) >= 0.0)):
         raise InvalidInput("periods of a spectrum: expected finite values from 0 s upwards")
-    if not 0.0 <= damping < 1.0:
+    if not 0.0 <= real(damping, "damping ratio [-]") < 1.0:
         raise InvalidInput(f"damping ratio {damping!r}: expected from 0 to below 1 (5 % is 0.05)")
 
 

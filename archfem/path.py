@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem.actions import BodyForce, PointLoad, Settlement
-from archfem.criteria import hinged
+from archfem.criteria import Criteria
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
 from archfem.newton import Solver, magnitude
@@ -247,8 +247,15 @@ class SupportPath:
 Path = LoadPath | SupportPath
 
 
-def follow(path: Path, control: str, stop: Stop) -> str:
-    """Add states until a rule ends it, and say which."""
+def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
+    """Add states until a rule ends it, and say which.
+
+    Args:
+        path: that begins with the dead load.
+        control: "displacement", "arc length" or "force".
+        stop: the rules.
+        criteria: what makes a joint hinge.
+    """
     distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
     while True:
@@ -260,12 +267,12 @@ def follow(path: Path, control: str, stop: Stop) -> str:
         last = np.array([path.displacements[-2:], path.factors[-2:]])
         moved = np.diff(last)[:, 0] / np.array(path.unit)
         direction = moved / np.linalg.norm(moved)
-        if reason := _finished(path, stop, moved):
+        if reason := _finished(path, stop, criteria, moved):
             return reason
         distance *= GROWTH
 
 
-def _finished(path: Path, stop: Stop, moved: Array) -> str | None:
+def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:
     """The rule that is met, in words, or None."""
     slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
     if slope <= stop.slope:
@@ -273,8 +280,8 @@ def _finished(path: Path, stop: Stop, moved: Array) -> str | None:
     if reached >= stop.displacement * path.model.structure.size:
         return f"the load moved by {reached:.3g} m"
     if stop.hinges is not None:
-        joints = joint_dataset(path.model.structure, path.resisted[-1])
-        count = int((hinged(joints) != 0).sum())
+        joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
+        count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
     return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None

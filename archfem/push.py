@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from archfem.actions import BodyForce, PointLoad, Settlement
-from archfem.criteria import HINGE, hinged
+from archfem.actions import BodyForce, PointLoad, Settlement, loads
+from archfem.arguments import instance
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
-from archfem.models import Model
+from archfem.models import Model, check_model
 from archfem.path import LoadPath, Path, Stop, SupportPath, follow
 from archfem.resultants import joint_dataset
 from archfem.statics import Equilibrium, dead_load
@@ -61,6 +62,7 @@ def pushover(
     control: str = "displacement",
     start: Equilibrium | None = None,
     stop: Stop | None = None,
+    criteria: Criteria | None = None,
 ) -> Pushover:
     """Let a load grow over the dead load, and follow the equilibrium.
 
@@ -89,6 +91,7 @@ def pushover(
         control: "displacement", "arc length" or "force".
         start: the dead load's equilibrium, found first if not given.
         stop: when to end.
+        criteria: what makes a joint hinge; by default the usual ones.
 
     Raises:
         InvalidInput: control is unknown, or not by displacement for a settlement; the load misses
@@ -98,8 +101,12 @@ def pushover(
     References:
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
+    check_model(model)
     if control not in CONTROLS:
         raise InvalidInput(f"control {control!r} is not known: use one of {CONTROLS}")
+    for value, kind in ((start, Equilibrium), (stop, Stop), (criteria, Criteria)):
+        if value is not None:
+            instance(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
     begin = start or dead_load(model)
     path: Path
     if isinstance(load, Settlement):
@@ -107,15 +114,17 @@ def pushover(
             raise InvalidInput(f"a settlement is a displacement: control {control!r} has no force")
         path = SupportPath.of(model, load, begin)
     else:
-        actions = [load] if isinstance(load, BodyForce | PointLoad) else list(load)
+        actions = loads(load)
         path = LoadPath.of(model, actions, begin)
-    return _read(path, follow(path, control, stop or Stop()))
+    criteria = criteria or Criteria()
+    return _read(path, criteria, follow(path, control, stop or Stop(), criteria))
 
 
-def _read(path: Path, outcome: str) -> Pushover:
+def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     """Label what was found."""
     count, factors = len(path.states), np.array(path.factors)
-    joints = joint_dataset(path.model.structure, path.resultants, np.arange(count, dtype=float))
+    steps = np.arange(count, dtype=float)
+    joints = joint_dataset(path.model.structure, path.resultants, steps, criteria)
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {
@@ -129,19 +138,16 @@ def _read(path: Path, outcome: str) -> Pushover:
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 
-def hinge_order(
-    joints: xr.Dataset, limit: float = HINGE
-) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
+def hinge_order(joints: xr.Dataset) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
     """Sort joints by the step at which they first hinge; in a step, those nearer the edge first.
 
     Args:
         joints: over step and joint, as of a `Pushover`.
-        limit: of |e| for a hinge [-].
 
     Returns:
         Joints with the face that stays in contact, and the steps.
     """
-    side = hinged(joints, limit).transpose("step", "joint").values
+    side = joints["hinge"].transpose("step", "joint").values
     first = np.argmax(side != 0, axis=0)
     e = np.abs(joints["eccentricity"].transpose("step", "joint").values)
     order = sorted(np.flatnonzero(side.any(axis=0)), key=lambda j: (first[j], -e[first[j], j]))

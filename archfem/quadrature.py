@@ -6,6 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from archfem.arguments import whole
 from archfem.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -32,14 +33,14 @@ class Quadrature:
 
     def __post_init__(self) -> None:
         """Refuse unknown rules and impossible numbers of points."""
-        if self.rule not in RULES:
-            raise InvalidInput(f"quadrature '{self.rule}' is not known: use one of {RULES}")
+        if not isinstance(self.rule, str) or self.rule not in RULES:
+            raise InvalidInput(f"quadrature {self.rule!r} is not known: use one of {RULES}")
         if self.rule in ("nodal", "exact") and self.points is not None:
             raise InvalidInput(
                 f"{self.rule} quadrature has points of its own, not {self.points}: leave points out"
             )
         least = 1 if self.rule == "gauss" else 2
-        if self.points is not None and not least <= self.points <= 64:
+        if self.points is not None and not least <= whole(self.points, "quadrature points") <= 64:
             raise InvalidInput(
                 f"{self.points} {self.rule} points on a facet: give between {least} and 64"
             )

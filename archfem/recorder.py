@@ -5,8 +5,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
+from archfem.criteria import Criteria
 from archfem.guard import Guard
-from archfem.history import SIGNS, History
+from archfem.history import SIGNS, Ending, History
 from archfem.models import Model
 from archfem.motion import Motion
 from archfem.resultants import joint_dataset
@@ -30,6 +31,7 @@ class Recorder:
         dt: time step that was asked for [s].
         every: the joints' resultants are kept at every n-th step.
         fields_every: coordinates are kept at every n-th step; None keeps none.
+        criteria: by which joints are judged.
         guard: watches over what is recorded.
         halved: steps that had to be halved.
         fallback: steps that a compiled stepper left to SNES.
@@ -40,6 +42,7 @@ class Recorder:
     dt: float
     every: int
     fields_every: int | None
+    criteria: Criteria
     guard: Guard
     times: list[float] = field(default_factory=list)
     resultants: list[Array] = field(default_factory=list)
@@ -51,8 +54,14 @@ class Recorder:
     _iterations: int = 0
     _smallest: float = np.inf
 
-    def add(self, first: int, batch: Batch) -> None:
+    def add(self, first: int, batch: Batch, *, last: bool = False) -> None:
         """Keep of a batch, whose steps count from `first`, what was asked for.
+
+        Args:
+            first: number of its first step.
+            batch: steps that follow those kept so far.
+            last: whether an event ends the run with it; its last resultants are then kept anyhow,
+                since they are what ended it.
 
         Raises:
             DidNotConverge: the guard is certain that what was kept is wrong.
@@ -63,7 +72,7 @@ class Recorder:
         for k, number in enumerate(range(first, first + len(batch.times))):
             self._iterations += int(batch.iterations[k])
             self._smallest = min(self._smallest, float(batch.smallest[k]))
-            if number % self.every == 0:
+            if number % self.every == 0 or (last and k == len(batch.times) - 1):
                 self.times.append(batch.times[k])
                 self.resultants.append(batch.resultants[k])
                 self.effort.append((self._iterations, self._smallest, float(drift[k])))
@@ -73,10 +82,17 @@ class Recorder:
                 self.fields.append(batch.state(k).q)
         self.guard.judge()
 
-    def history(self, motion: Motion, state: State, outcome: str) -> History:
-        """Everything as one dataset."""
-        times = np.array(self.times)
-        dataset = joint_dataset(self.model.structure, np.array(self.resultants), times)
+    def history(self, motion: Motion, state: State, ended: Ending, outcome: str) -> History:
+        """Everything as one dataset.
+
+        Args:
+            motion: of the ground.
+            state: in which the run ended.
+            ended: how it did.
+            outcome: the same in words.
+        """
+        times, resultants = np.array(self.times), np.array(self.resultants)
+        dataset = joint_dataset(self.model.structure, resultants, times, self.criteria)
         ground = motion.at(times)
         dataset["ground"] = (
             ("time", "axis"),
@@ -93,9 +109,10 @@ class Recorder:
             dataset["q"] = (("frame", "coordinate"), np.array(self.fields))
         for name in ("q", "velocity", "acceleration"):
             dataset[f"last_{name}"] = ("coordinate", getattr(state, name))
-        dataset.attrs = {
+        dataset.attrs |= {
             "title": f"time history of {self.model.structure.name} under {motion.name or 'motion'}",
             "outcome": outcome,
+            "ended": str(ended),
             "fidelity": self.model.fidelity,
             "method": self.method,
             "last_time": state.time,

@@ -7,6 +7,8 @@ where the higher block is pushed toward the extrados by its slip.
 import numpy as np
 import xarray as xr
 
+from archfem.arguments import instance
+from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.naming import number_of
 from archfem.structure import Array, Structure
@@ -20,8 +22,28 @@ UNITS = {
 }
 
 
-def joint_dataset(structure: Structure, resultants: Array, time: Array | None = None) -> xr.Dataset:
-    """Label resultants and derive eccentricity and mobilised friction from them.
+def ratios(resultants: Array, depth: Array) -> tuple[Array, Array]:
+    """Eccentricity and mobilised friction of joints; undefined (NaN) where they are open.
+
+    Args:
+        resultants: N, V, M for the whole width (…, n_joints, 3) [N, N, N m].
+        depth: of the joints (n_joints,) [m].
+
+    Returns:
+        M / (N h) and |V| / N (…, n_joints) [-].
+    """
+    normal, shear, moment = np.moveaxis(resultants, -1, 0)
+    pressed = np.where(normal > 0.0, normal, np.nan)
+    return moment / (pressed * depth), np.abs(shear) / pressed
+
+
+def joint_dataset(
+    structure: Structure,
+    resultants: Array,
+    time: Array | None = None,
+    criteria: Criteria | None = None,
+) -> xr.Dataset:
+    """Label resultants, and derive eccentricity, mobilised friction and flags of failure from them.
 
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
     without compression is open: its eccentricity and friction are undefined (NaN).
@@ -31,23 +53,18 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
         resultants: N, V, M for the whole width, (n_joints, 3) or (steps, n_joints, 3)
             [N, N, N m].
         time: of the steps (steps,) [s], for the second shape.
+        criteria: by which joints fail; by default the usual ones.
 
     Returns:
-        Variables N, V, M, eccentricity and friction over joint, or over time and joint, with
-        the joints' names, parts, roles, depths and friction limits as coordinates.
+        Variables N, V, M, eccentricity and friction, and the flags of `flagged`, over joint, or
+        over time and joint, with the joints' names, parts, roles, depths and friction limits as
+        coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
-    normal, shear, moment = np.moveaxis(resultants, -1, 0)
     depth = structure.depths
-    closed = normal > 0.0
-    safe = np.where(closed, normal, 1.0)
-    values = {
-        "N": normal,
-        "V": shear,
-        "M": moment,
-        "eccentricity": np.where(closed, moment / (safe * depth), np.nan),
-        "friction": np.where(closed, np.abs(shear) / safe, np.nan),
-    }
+    eccentricity, friction = ratios(resultants, depth)
+    values = dict(zip("NVM", np.moveaxis(resultants, -1, 0), strict=True))
+    values |= {"eccentricity": eccentricity, "friction": friction}
     variables = {
         key: (dims, value, {"units": UNITS[key][0], "long_name": UNITS[key][1]})
         for key, value in values.items()
@@ -62,7 +79,7 @@ def joint_dataset(structure: Structure, resultants: Array, time: Array | None = 
     }
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
-    return xr.Dataset(variables, coordinates)
+    return flagged(xr.Dataset(variables, coordinates), criteria)
 
 
 def check_instant(structure: Structure, joints: xr.Dataset) -> None:
@@ -106,6 +123,8 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     Returns:
         (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
     """
+    instance(structure, Structure, "structure", "give that whose joints these are")
+    instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     middle, along = (
         xr.DataArray(each, {"axis": ["x", "y"]}, ("joint", "axis"))
         for each in (structure.middles, structure.tangents * structure.depths[:, None])

@@ -2,21 +2,24 @@
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from archfem.arguments import instance, real, whole
+from archfem.criteria import Criteria
 from archfem.dynamics import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.events import Event
+from archfem.events import Until, Watch, agreed, begun
 from archfem.guard import Guard
-from archfem.history import History
-from archfem.models import Model
+from archfem.history import Ending, History
+from archfem.models import Model, check_model
 from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.recorder import Recorder
-from archfem.schemes import Rayleigh, Scheme
+from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
 from archfem.statics import Equilibrium, dead_load
 from archfem.steppers import AnyStepper, stepper_for
 
@@ -43,8 +46,19 @@ class Record:
         """Refuse steps below one."""
         for key in ("every", "fields_every"):
             value = getattr(self, key)
-            if value is not None and value < 1:
-                raise InvalidInput(f"record {key} = {value}: keep every 1st, 2nd, … step")
+            if key == "every" or value is not None:
+                whole(value, f"record {key}")
+
+
+_KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
+    "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
+    "damping": ((Rayleigh,), "damping", "give Rayleigh(0.05, (8.0, 16.0)), or None"),
+    "scheme": ((Newmark, HHT), "scheme", "give Newmark() or HHT()"),
+    "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
+    "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
+    "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
+}
+"""Classes of arguments, what to call them, and what to give."""
 
 
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
@@ -56,7 +70,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     damping: Rayleigh | None = None,
     scheme: Scheme | None = None,
     record: Record | None = None,
-    until: Event | None = None,
+    until: Until | None = None,
+    criteria: Criteria | None = None,
     newton: Newton | None = None,
     method: str = "auto",
 ) -> History:
@@ -76,7 +91,11 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         damping: None is undamped.
         scheme: `Newmark` (average acceleration, the default) or `HHT`.
         record: what is kept; by default the resultants of every step.
-        until: event that ends the run; by default only the end of the motion does.
+        until: event that ends the run, or a function of the structure and N, V, M of its joints
+            (n_joints, 3) [N, N, N m] that gives words to end it; by default only the end of the
+            motion does.
+        criteria: what makes a joint fail, and how many failed joints make a mechanism; the history
+            carries them. By default those of the event, or else the usual ones.
         newton: settings of the solves.
         method: "snes" solves each step through PETSc. Three compiled methods give the same history
             many times faster: "contact" works in the modes of the closed structure, "chain" on
@@ -84,43 +103,64 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
             the open joint points alone. "auto" takes the fastest that applies.
 
     Returns:
-        The history; its `outcome` says how the run ended.
+        The history; its `ended` and, in words, its `outcome` say how the run ended.
 
     Raises:
-        InvalidInput: dt cannot be meant.
+        InvalidInput: an argument cannot be meant, or run and event have different criteria.
         DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
     """
-    if dt is None:
-        dt = model.prediction.dt if model.prediction else STEP
-    if not 0.0 < dt <= 0.1:
-        raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
+    check_model(model)
+    instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    _check_kinds(start=start, damping=damping, scheme=scheme, record=record)
+    _check_kinds(criteria=criteria, newton=newton)
+    dt = _step(model, dt)
+    criteria = agreed(criteria, until)
+    watch = None if until is None else begun(until, model.structure, criteria)
     stepper = stepper_for(method, model, motion, damping=damping, scheme=scheme, newton=newton)
     if not isinstance(start, State):
         start = stepper.at_rest((start or dead_load(model, newton)).q)
     first = _first(stepper, start, dt)
-    recorder = _recorder(stepper, first, dt, record or Record())
-    number, state, outcome = 0, start, "reached the end of the motion"
+    recorder = _recorder(stepper, first, dt, record or Record(), criteria)
+    taken, state = 0, start
+    ended, outcome = Ending.FINISHED, "reached the end of the motion"
     try:
         recorder.add(0, first)
         # Steps are too small for threads, which only get in each other's way.
         with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
             for batch in stepper.batches(start, dt, motion.duration):
-                reason, size = _reason(until, model, batch)
+                reason, size = _reason(watch, batch)
                 batch = batch.cut(size)
                 state = batch.state(size - 1)
-                recorder.add(number + 1, batch)
-                number += size
+                recorder.add(taken + 1, batch, last=reason is not None)
+                taken += size
                 bar.update(size)
-                if reason:
-                    outcome = f"ended at {state.time:.4g} s by {reason}"
+                if reason is not None:
+                    ended, outcome = Ending.EVENT, f"ended at {state.time:.4g} s by {reason}"
                     break
     except KeyboardInterrupt:
-        outcome = f"interrupted at {state.time:.4g} s"
+        ended, outcome = Ending.INTERRUPTED, f"interrupted at {state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
     except DidNotConverge as error:
-        error.history = recorder.history(motion, state, f"failed at {state.time:.4g} s: {error}")
+        words = f"failed at {state.time:.4g} s: {error}"
+        error.history = recorder.history(motion, state, Ending.FAILED, words)
         raise
-    return recorder.history(motion, state, outcome)
+    return recorder.history(motion, state, ended, outcome)
+
+
+def _step(model: Model, dt: float | None) -> float:
+    """The time step that was asked for, or that for which the model was chosen [s]."""
+    if dt is None:
+        return model.prediction.dt if model.prediction else STEP
+    if not 0.0 < real(dt, "dt [s]") <= 0.1:
+        raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
+    return dt
+
+
+def _check_kinds(**given: Any) -> None:
+    """Refuse arguments of the wrong class; None leaves each to its default."""
+    for name, value in given.items():
+        if value is not None:
+            instance(value, *_KINDS[name])
 
 
 def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
@@ -136,10 +176,12 @@ def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
     )
 
 
-def _recorder(stepper: AnyStepper, first: Batch, dt: float, record: Record) -> Recorder:
+def _recorder(
+    stepper: AnyStepper, first: Batch, dt: float, record: Record, criteria: Criteria
+) -> Recorder:
     """An empty recorder with a guard over it."""
-    guard = Guard(stepper.model, first)
-    return Recorder(stepper.model, stepper.name, dt, record.every, record.fields_every, guard)
+    kept, guard = (record.every, record.fields_every), Guard(stepper.model, first)
+    return Recorder(stepper.model, stepper.name, dt, *kept, criteria, guard)
 
 
 def _bar(start: State, motion: Motion, dt: float) -> tqdm:
@@ -147,11 +189,11 @@ def _bar(start: State, motion: Motion, dt: float) -> tqdm:
     return tqdm(total=steps, unit="step", disable=None, leave=False)
 
 
-def _reason(until: Event | None, model: Model, batch: Batch) -> tuple[str | None, int]:
+def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:
     """Why the run ends within a batch, if it does, and after how many of its steps."""
-    if until is not None:
+    if watch is not None:
         for k, resultants in enumerate(batch.resultants):
-            if reason := until(model.structure, resultants):
+            if reason := watch(resultants):
                 return reason, k + 1
     return None, len(batch.times)
 

@@ -9,9 +9,10 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem.counted import Mechanism
-from archfem.criteria import HINGE
+from archfem.criteria import Criteria
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import EveryMechanism, possible_counts
+from archfem.history import Ending
 from archfem.models import Model
 from archfem.motion import LARGEST_PEAK, Motion
 from archfem.runs import time_history
@@ -36,22 +37,24 @@ class ScaledRun:
     Attributes:
         scale: factor on the motion [-].
         found: the first mechanism by each definition, or None.
-        outcome: how the run ended.
+        ended: how the run ended.
+        outcome: the same in words.
     """
 
     scale: float
     found: dict[str, Mechanism | None]
+    ended: Ending
     outcome: str
 
     @property
     def interrupted(self) -> bool:
         """Whether Ctrl-C ended the run, which then tells only what it met."""
-        return self.outcome.startswith("interrupted")
+        return self.ended is Ending.INTERRUPTED
 
     @property
     def broken(self) -> bool:
         """Whether a step had no equilibrium, which counts as failed."""
-        return self.outcome.startswith("failed")
+        return self.ended is Ending.FAILED
 
     def fails(self, definition: str) -> bool:
         """Whether a mechanism was met, or the run broke off."""
@@ -152,7 +155,7 @@ def mechanism_scales(
     start: Equilibrium | None = None,
     damping: Rayleigh | None = None,
     dt: float | None = None,
-    limit: float = HINGE,
+    criteria: Criteria | None = None,
     precision: float = 0.05,
     between: tuple[float, float] = (0.05, 5.0),
 ) -> MechanismScales:
@@ -169,7 +172,7 @@ def mechanism_scales(
         start: the dead load, found first where it is not given.
         damping: as for `time_history`.
         dt: time step [s], likewise.
-        limit: of |e| for a hinge [-].
+        criteria: as for `time_history`.
         precision: relative width of the last brackets [-].
         between: least and largest scale tried [-]; no ground motion may exceed 5 g.
 
@@ -201,15 +204,16 @@ def mechanism_scales(
                 start=start,
                 damping=damping,
                 dt=dt,
-                until=EveryMechanism(limit=limit),
+                until=EveryMechanism(),
+                criteria=criteria,
             )
         except DidNotConverge as error:
             if error.history is None:
                 raise
             run = error.history
-        return ScaledRun(scale, first_mechanisms(run, limit), run.outcome)
+        return ScaledRun(scale, first_mechanisms(run), run.ended, run.outcome)
 
-    asked = (*possible_counts(model.structure), "verified")
+    asked = (*possible_counts(model.structure, criteria), "verified")
     return _searched(
         MechanismScales(asked), trial, precision, (least, max(least, min(largest, most)))
     )

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import pi
 
+from archfem.arguments import real, reals
 from archfem.errors import InvalidInput
 
 JOINTS = ("closed", "initial", "none")
@@ -32,15 +33,15 @@ class Rayleigh:
 
     def __post_init__(self) -> None:
         """Refuse negative damping, frequencies out of order and unknown words."""
-        low, high = self.frequencies
-        if not 0.0 <= self.ratio < 1.0:
+        low, high = reals(self.frequencies, "damping frequencies [Hz]", 2)
+        if not 0.0 <= real(self.ratio, "damping ratio [-]") < 1.0:
             raise InvalidInput(f"damping ratio {self.ratio} is not between 0 and 1: 5 % is 0.05")
         if not 0.0 < low < high:
             raise InvalidInput(
                 f"damping frequencies {self.frequencies} Hz: give two, the lower one first"
             )
-        if self.joints not in JOINTS:
-            raise InvalidInput(f"damping joints = '{self.joints}': use one of {JOINTS}")
+        if not isinstance(self.joints, str) or self.joints not in JOINTS:
+            raise InvalidInput(f"damping joints = {self.joints!r}: use one of {JOINTS}")
 
     @property
     def mass(self) -> float:
@@ -71,7 +72,7 @@ class EffectiveRayleigh:
     def __post_init__(self) -> None:
         """Refuse what could not become damping."""
         self.between((1.0, 2.0))
-        if not 0.0 < self.share < 1.0:
+        if not 0.0 < real(self.share, "damping share [-]") < 1.0:
             raise InvalidInput(f"share {self.share} of the mass is not between 0 and 1")
 
     def between(self, frequencies: tuple[float, float]) -> Rayleigh:
@@ -97,6 +98,8 @@ class Newmark:
 
     def __post_init__(self) -> None:
         """Refuse schemes that are explicit or grow by themselves."""
+        real(self.beta, "Newmark beta [-]")
+        real(self.gamma, "Newmark gamma [-]")
         if not (self.gamma >= 0.5 and self.beta >= 0.25 * (0.5 + self.gamma) ** 2 - 1e-12):
             raise InvalidInput(
                 f"Newmark with beta {self.beta}, gamma {self.gamma} is not stable at every step: "
@@ -119,7 +122,7 @@ class HHT:
 
     def __post_init__(self) -> None:
         """Refuse values outside the range of stability."""
-        if not -1.0 / 3.0 - 1e-12 <= self.alpha <= 0.0:
+        if not -1.0 / 3.0 - 1e-12 <= real(self.alpha, "HHT alpha [-]") <= 0.0:
             raise InvalidInput(f"HHT alpha {self.alpha} is not between -1/3 and 0")
 
     @property

@@ -3,6 +3,7 @@
 import numpy as np
 
 from archfem import oscillator
+from archfem.arguments import instance
 from archfem.errors import InvalidInput
 from archfem.motion import Motion
 
@@ -36,7 +37,11 @@ def response_spectrum(
         Nigam, Jennings, Calculation of response spectra from strong-motion earthquake records,
         BSSA 59 (1969). Chopra, Dynamics of structures, section 6.6.
     """
-    natural = np.asarray(periods, dtype=float)
+    instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    try:
+        natural = np.asarray(periods, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"periods {periods!r} s are no numbers") from error
     samples = motion.component(component)
     peaks = oscillator.peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
     return np.abs(peaks).reshape(natural.shape)

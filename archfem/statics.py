@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from archfem.actions import BodyForce
+from archfem.arguments import instance
 from archfem.errors import DidNotConverge
-from archfem.models import Model
+from archfem.models import Model, check_model
 from archfem.newton import Newton, Solved, Solver, magnitude
 from archfem.resultants import joint_dataset, one_joint
 from archfem.structure import Array
@@ -60,9 +61,11 @@ def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
         newton: settings of the solves.
 
     Raises:
+        InvalidInput: the model is none.
         DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
             equilibrium found on the way, under part of the weight.
     """
+    check_model(model)
     return equilibrium(model, self_weight(model), newton)
 
 
@@ -79,6 +82,8 @@ def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equi
     Raises:
         DidNotConverge: there is none; `last` is the last one on the way.
     """
+    if newton is not None:
+        instance(newton, Newton, "newton", "give Newton(tolerance=…)")
     solver = Solver(model.size, newton)
     before = model.moved(np.zeros_like(model.supports))
     rest = Equilibrium(before, np.zeros(model.size), 0, 0)

@@ -7,7 +7,6 @@ the edge stress from them, hold that of the joints where damping is "closed".
 import numpy as np
 import xarray as xr
 
-from archfem.criteria import HINGE
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.stress import at_corners, check_state, principal_values
@@ -155,17 +154,16 @@ def use_sentence(use: xr.Dataset) -> str:
     )
 
 
-def utilisation_sentence(structure: Structure, joints: xr.Dataset, limit: float = HINGE) -> str:
+def utilisation_sentence(structure: Structure, joints: xr.Dataset) -> str:
     """The largest use of strength over a run, in words, by joints that do not hinge just then.
 
     A hinge rests on a strip whose width N and e do not tell.
 
     Args:
         structure: whose joints they are.
-        joints: over time and joint.
-        limit: of |e| for a hinge [-].
+        joints: over time and joint, with their flags.
     """
-    use = utilisation(structure, joints).where(abs(joints["eccentricity"]) < limit)
+    use = utilisation(structure, joints).where((joints["hinge"] == 0) & ~joints["open"])
     if not use.notnull().any():
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
     step, number = np.unravel_index(np.nanargmax(use.values), use.shape)

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.arguments import real
 from archfem.errors import InvalidStructure
 from archfem.geometry import area_of_polygon, area_of_sector, side_of_line
 from archfem.materials import Contact, Material
@@ -183,11 +184,11 @@ class Structure:
         """Fill in roles, and refuse what does not hang together."""
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
-        if not 0.0 < self.width < 1e4:
+        if not 0.0 < real(self.width, "width [m]") < 1e4:
             raise InvalidStructure(
                 f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
             )
-        if not 0.0 < self.gravity < 1e3:
+        if not 0.0 < real(self.gravity, "gravity [m/s²]") < 1e3:
             raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]

@@ -13,6 +13,7 @@ from archfem.case import Case
 from archfem.criteria import judged, roles_of
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.findings import Finding, by_part, kept, of_run, write
+from archfem.history import Ending
 from archfem.modal import modes
 from archfem.motion import Motion
 from archfem.scales import mechanism_scales
@@ -170,7 +171,7 @@ def _run(case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None
             raise
         logger.warning("%s, %s: %s", case.title, motion.name, error)
         run = error.history
-    if run.outcome.startswith("interrupted"):
+    if run.ended is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return of_run(run)
 
@@ -199,6 +200,7 @@ def _scales(
         start=dead,
         damping=damping,
         dt=case.analysis.get("dt"),
+        criteria=case.criteria,
         **options,
     )
     if found.interrupted:

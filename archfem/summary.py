@@ -6,17 +6,8 @@ import numpy as np
 import xarray as xr
 
 from archfem.counted import Mechanism
-from archfem.criteria import (
-    HINGE,
-    envelope,
-    first_time,
-    hinged,
-    judged,
-    longest_duration,
-    opened,
-    sliding,
-)
-from archfem.history import History
+from archfem.criteria import envelope, first_time, judged, longest_duration
+from archfem.history import Ending, History
 from archfem.matching import Match
 from archfem.measures import measures
 from archfem.motion import Motion
@@ -26,30 +17,28 @@ from archfem.units import STANDARD_GRAVITY
 SHOWN = 8
 """Names in a list, beyond which those in the middle are left out."""
 
+ENDS = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
+"""Words for how a run ended, other than its own."""
+
 LOOSE = 100.0
 """Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
 
 
-def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None, limit: float = HINGE) -> str:
+def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
     """One line a joint: envelope, and when and how long it hinged, slid and was open.
 
     Only joints that are `judged` have a line.
 
     Args:
-        joints: over time and joint.
+        joints: over time and joint, with their flags.
         dead: over joint, under dead load alone.
-        limit: of |e| for a hinge [-].
     """
     joints = judged(joints)
     rest = np.full(joints.sizes["joint"], np.nan)
     if dead is not None:
         rest = judged(dead)["eccentricity"].values
     span = envelope(joints)
-    flags = {
-        "hinge": hinged(joints, limit) != 0,
-        "slide": sliding(joints),
-        "open": opened(joints),
-    }
+    flags = {"hinge": joints["hinge"] != 0, "slide": joints["slide"], "open": joints["open"]}
     times = {
         key: list(zip(first_time(flag).values, longest_duration(flag).values, strict=True))
         for key, flag in flags.items()
@@ -79,7 +68,7 @@ def pair_table(runs: Mapping[str, History]) -> str:
     for name, run in runs.items():
         joints = judged(run.joints)
         size = abs(joints["eccentricity"])
-        apart = opened(joints).any("time")
+        apart = joints["open"].any("time")
         worst = size.max("time").where(~apart, 0.5)
         found = run.mechanism
         moved = run.verified.moved if run.structure is not None and run.verified else None
@@ -96,7 +85,7 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 *_class_and_time(found),
                 " ".join(map(str, found.joints)) if found else "-",
                 *(("unknown", "-") if run.structure is None else _class_and_time(moved)),
-                f"{run.outcome.split()[0]} {run.time[-1]:.2f} s",
+                f"{ENDS.get(run.ended, run.ended)} {run.time[-1]:.2f} s",
             ]
         )
     return aligned(head, rows)
@@ -106,7 +95,8 @@ def verdict(run: History) -> str:
     """What a run's mechanisms are: a line for the first by count, one for the first verified."""
     found = run.mechanism
     if found is None:
-        lines = ["no mechanism by count: never four failed joints at once in rings and piers"]
+        count = run.criteria.failures
+        lines = [f"no mechanism by count: never {count} failed joints at once in rings and piers"]
     else:
         lines = [f"by count: {_told(found, run)}"]
     if run.structure is None:

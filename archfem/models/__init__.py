@@ -5,11 +5,12 @@ dynamics, modal analysis) consumes one by what is declared here, on whatever run
 """
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from scipy import sparse
 
 from archfem.actions import Action, Settlement
+from archfem.errors import InvalidInput
 from archfem.joints import JointOperator
 from archfem.models.cells import Cells
 from archfem.structure import Array, Structure
@@ -95,3 +96,18 @@ class Model(Protocol):
 
     def load(self, action: Action) -> Array:
         """Generalised forces of an action (n,)."""
+
+
+def check_model(model: Any) -> None:
+    """Refuse what is no model, such as the structure of which one is to be built.
+
+    Args:
+        model: what was given for one.
+
+    Raises:
+        InvalidInput: it does not answer what a model answers.
+    """
+    if not hasattr(model, "tangent") or not hasattr(model, "supports"):
+        raise InvalidInput(
+            f"model is a {type(model).__name__}: build one, e.g. build(structure, fidelity='rigid')"
+        )

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from archfem.arguments import real
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
 from archfem.structure import Point
@@ -193,7 +194,7 @@ class Paving:
 def _check_positive(part: Any, *keys: str) -> None:
     """Refuse lengths that cannot be meant."""
     for key in keys:
-        value = getattr(part, key)
+        value = real(getattr(part, key), f"'{part.name}', {key} [m]")
         if not 0.0 < value < 1e3:
             raise InvalidStructure(
                 f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
@@ -203,6 +204,6 @@ def _check_positive(part: Any, *keys: str) -> None:
 def _check_not_negative(part: Any, *keys: str) -> None:
     """Refuse lengths that can be 0 but no less."""
     for key in keys:
-        value = getattr(part, key)
+        value = real(getattr(part, key), f"'{part.name}', {key} [m]")
         if not 0.0 <= value < 1e3:
             raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")

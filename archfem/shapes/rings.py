@@ -7,6 +7,7 @@ from math import asin, degrees, radians
 
 import numpy as np
 
+from archfem.arguments import real, reals
 from archfem.errors import InvalidStructure
 from archfem.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.structure import Block, Joint, Point, Structure
@@ -50,6 +51,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     Raises:
         InvalidStructure: the lengths do not make a ring.
     """
+    real(thickness, "thickness [m]")
     radius, embrace = _circle(radius, embrace, span, rise, thickness)
     if not 0.0 < thickness < 2.0 * radius:
         raise InvalidStructure(
@@ -59,7 +61,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
     pieces = 1 if chords is None else chords
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if count < 1 or count != int(count):
+        if real(count, key) < 1 or count != int(count):
             raise InvalidStructure(f"{key} {count} is not a whole number of 1 or more")
     turn = embrace / voussoirs / pieces
     if turn > 120.0:
@@ -108,7 +110,8 @@ def column(
     Raises:
         InvalidStructure: a length is not positive.
     """
-    if breadth <= 0.0 or not heights or min(heights) <= 0.0:
+    heights = reals(heights, "heights of the blocks [m]")
+    if real(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:
         raise InvalidStructure(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
@@ -171,7 +174,8 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     ring = circular_arch(
         radius=radius, thickness=thickness, embrace=180.0, voussoirs=voussoirs, chords=chords
     )
-    if not thickness <= pier_breadth < 2.0 * radius:
+    courses = reals(courses, "heights of the courses [m]")
+    if not thickness <= real(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
         raise InvalidStructure(
             f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
             f"{thickness:.3g} m and twice its radius {radius:.3g} m"
@@ -223,6 +227,10 @@ def _circle(
     thickness: float,
 ) -> tuple[float, float]:
     """Radius of the centre line and embrace, from whichever pair was given."""
+    given = {"radius [m]": radius, "embrace [°]": embrace, "span [m]": span, "rise [m]": rise}
+    for name, value in given.items():
+        if value is not None:
+            real(value, name)
     if radius is not None and embrace is not None and span is None and rise is None:
         return radius, embrace
     if span is None or rise is None or radius is not None or embrace is not None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from archfem.criteria import HINGE, envelope, opened, roles_of
+from archfem.criteria import Criteria, envelope, roles_of
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.roles import judged_parts
@@ -32,20 +32,19 @@ def draw_envelope(
     runs: Mapping[str, History],
     *,
     dead: xr.Dataset | None = None,
-    limit: float = HINGE,
     dotted: Collection[str] = (),
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the least and largest eccentricity of each joint over runs, against the faces.
 
     Each ring and pier has a panel of its own, in which its joints count from 0. Crosses above the
-    upper face mark joints that came apart at some time.
+    upper face mark joints that came apart at some time. Where runs have different criteria, the
+    least |e| of a hinge is shown.
 
     Args:
         runs: what to call each run, and the run; those of different structures share the panels
             of parts of one name.
         dead: joints under dead load, drawn dotted.
-        limit: of |e| for a hinge [-].
         dotted: names of the runs that are drawn dotted and not filled.
         axes: where to draw, for a single ring or pier; by default a new figure.
 
@@ -53,13 +52,13 @@ def draw_envelope(
         InvalidInput: there is no run, or too many to tell apart; axes were given for several
             parts.
     """
-    shown = _panels({label: run.joints for label, run in runs.items()}, limit, axes)
+    shown = _panels({label: run.joints for label, run in runs.items()}, axes)
     apart = 0
     for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
         for part, panel in shown.items():
             own = _of_part(run.joints, part)
             draw_band(panel, own, label, colour, shade=SHADE * (label not in dotted) / len(runs))
-            crosses = np.flatnonzero(opened(own).any("time"))
+            crosses = np.flatnonzero(own["open"].any("time").values)
             height = np.full(len(crosses), 0.56 + STEP * row)
             panel.plot(crosses, height, "x", ms=4, color=colour)
             apart += len(crosses)
@@ -74,16 +73,13 @@ def draw_envelope(
     return _explained(shown)
 
 
-def draw_eccentricity(
-    states: Mapping[str, xr.Dataset], *, limit: float = HINGE, dotted: Collection[str] = ()
-) -> Figure:
+def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[str] = ()) -> Figure:
     """Draw the eccentricity of each joint at one instant of each of several structures.
 
     Each ring and pier has a panel of its own, as by `draw_envelope`.
 
     Args:
         states: what to call each state, and its joints at one instant, for example dead load.
-        limit: of |e| for a hinge [-].
         dotted: names of the states that are drawn dotted.
 
     Raises:
@@ -92,7 +88,7 @@ def draw_eccentricity(
     several = [label for label, joints in states.items() if joints["N"].dims != ("joint",)]
     if several:
         raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
-    shown = _panels(states, limit, None)
+    shown = _panels(states, None)
     for (label, joints), colour in zip(states.items(), LINES, strict=False):
         line = ":" if label in dotted else "-"
         style: dict[str, Any] = {"color": colour, "lw": 1.4, "marker": "o", "ms": 2.8}
@@ -126,12 +122,17 @@ def draw_band(
     axes.plot(number, span["lowest"], **style)
 
 
-def draw_faces(axes: Axes, limit: float = HINGE) -> None:
-    """Draw the faces of the joints, and where a joint counts as hinged."""
+def draw_faces(axes: Axes, hinge: float) -> None:
+    """Draw the faces of the joints, and where a joint counts as hinged.
+
+    Args:
+        axes: where to draw, eccentricity upwards.
+        hinge: |e| from which it does [-].
+    """
     for side in (-1.0, 1.0):
-        axes.axhspan(side * limit, side * 0.5, color=RED, alpha=0.12, lw=0)
+        axes.axhspan(side * hinge, side * 0.5, color=RED, alpha=0.12, lw=0)
         axes.axhline(side * 0.5, color=EDGE, lw=1.2)
-        axes.axhline(side * limit, color=RED, lw=0.7, ls="--")
+        axes.axhline(side * hinge, color=RED, lw=0.7, ls="--")
     axes.axhline(0.0, color=FAINT, lw=0.5)
 
 
@@ -140,7 +141,7 @@ def _of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
     return joints.isel(joint=np.flatnonzero(joints["part"].values.astype(str) == part))
 
 
-def _panels(drawn: Mapping[str, xr.Dataset], limit: float, axes: Axes | None) -> dict[str, Axes]:
+def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:
     """A panel for each ring and pier, the rings first, with the faces of its joints."""
     if not 1 <= len(drawn) <= len(LINES):
         raise InvalidInput(f"{len(drawn)} runs in one picture: give 1 to {len(LINES)}")
@@ -160,9 +161,10 @@ def _panels(drawn: Mapping[str, xr.Dataset], limit: float, axes: Axes | None) ->
         axes.set_ylabel(LABEL)
     else:
         raise InvalidInput(f"parts {parts} do not fit one pair of axes: leave axes out")
+    hinge = min(Criteria.of(joints).hinge for joints in drawn.values())
     for part, panel in shown.items():
         dress(panel, "joint [-]", panel.get_ylabel())
-        draw_faces(panel, limit)
+        draw_faces(panel, hinge)
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
         if len(parts) > 1:
             panel.set_title(part, fontsize=NORMAL, color=INK)

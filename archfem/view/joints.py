@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.criteria import HINGE
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.view.envelopes import draw_faces
@@ -23,15 +23,14 @@ LOOSE = 2.0
 to open has any value."""
 
 
-def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = HINGE) -> Figure:
+def draw_joint_histories(run: History, joints: Sequence[int]) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
-    Lines are interrupted while a joint is open.
+    Lines are interrupted while a joint is open; limits are by the run's criteria.
 
     Args:
         run: what happened.
         joints: numbers of the joints.
-        limit: of |e| for a hinge [-].
 
     Raises:
         InvalidInput: there is no such joint.
@@ -49,7 +48,7 @@ def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = 
         own = run.joints.sel(joint=number)
         name = "\n".join(wrap(str(own["name"].values), LETTERS))
         dress(left, "", f"{name}\nM / (N h) [-]")
-        _eccentricity(left, own, limit)
+        _eccentricity(left, own)
         _mobilised(right, own)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
@@ -57,16 +56,15 @@ def draw_joint_histories(run: History, joints: Sequence[int], *, limit: float = 
     return figure
 
 
-def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = HINGE) -> Figure:
+def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     """Draw mobilised friction and eccentricity of one joint over time, a column for each run.
 
-    Red lines are the limits: the coefficient of friction, and |e| of a hinge. Lines are interrupted
-    while the joint is open.
+    Red lines are the limits by the run's criteria: the coefficient of friction, and |e| of a hinge.
+    Lines are interrupted while the joint is open.
 
     Args:
         runs: what to call each run, and the run.
         joint: its name, or its number.
-        limit: of |e| for a hinge [-].
 
     Raises:
         InvalidInput: a run has no such joint.
@@ -77,7 +75,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = 
         own = run.joint(joint)
         _signed(cast(Axes, column[0]), own)
         dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
-        _eccentricity(cast(Axes, column[1]), own, limit)
+        _eccentricity(cast(Axes, column[1]), own)
         column[0].set_title(f"{label}: {own['name'].values!s}", fontsize=NORMAL, color=INK)
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
@@ -88,7 +86,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int, *, limit: float = 
 def _signed(axes: Axes, joint: xr.Dataset) -> None:
     """Draw the mobilised friction with its sense, between its limits."""
     dress(axes, "", "V / N [-]")
-    limit = float(joint["friction_limit"])
+    limit = _coefficient(joint)
     for side in (-1.0, 1.0):
         axes.axhline(side * limit, color=RED, lw=0.8, ls="--")
     axes.plot(
@@ -121,9 +119,14 @@ def _ground(axes: Axes, run: History) -> None:
     axes.set_xlim(run.time[0], run.time[-1])
 
 
-def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
+def _coefficient(joint: xr.Dataset) -> float:
+    """Coefficient of friction by which a joint was judged [-]."""
+    return float(Criteria.of(joint).coefficients(joint["friction_limit"].values))
+
+
+def _eccentricity(axes: Axes, joint: xr.Dataset) -> None:
     """Draw where the thrust crosses a joint, against its faces."""
-    draw_faces(axes, limit)
+    draw_faces(axes, Criteria.of(joint).hinge)
     axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
@@ -131,7 +134,7 @@ def _eccentricity(axes: Axes, joint: xr.Dataset, limit: float) -> None:
 def _mobilised(axes: Axes, joint: xr.Dataset) -> None:
     """Draw mobilised friction against its limit."""
     dress(axes, "", "|V| / N [-]")
-    limit = float(joint["friction_limit"])
+    limit = _coefficient(joint)
     axes.axhspan(limit, LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
     axes.axhline(limit, color=SLIP, lw=0.9, ls="--")
     axes.plot(joint["time"], joint["friction"], color=LINES[0], lw=0.6)

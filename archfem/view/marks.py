@@ -7,7 +7,6 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.criteria import HINGE, hinged, opened, sliding
 from archfem.models import Model
 from archfem.resultants import thrust_line
 from archfem.rigid_blocks import RigidBlocks
@@ -53,30 +52,23 @@ class Marks:
     gaps: Array
 
 
-def joint_marks(
-    structure: Structure,
-    joints: xr.Dataset,
-    *,
-    shift: Array | None = None,
-    limit: float = HINGE,
-) -> Marks:
+def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None = None) -> Marks:
     """Find what to draw at the joints of rings and piers, or at all where there are neither.
 
     Args:
         structure: whose joints they are.
-        joints: as made by `joint_dataset`, at one instant.
+        joints: as made by `joint_dataset`, at one instant, with their flags.
         shift: displacements, as drawn, of both ends of each joint, intrados first
             (n_joints, 2, 2) [m]; by default none.
-        limit: of |e| for a hinge [-].
     """
     shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
     ends = structure.ends + shift
     share = 0.5 + joints["eccentricity"].values[:, None]
     carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-    shown = structure.judged
-    side = np.where(shown, hinged(joints, limit).values, 0)
+    shown = joints["judged"].values
+    side = np.where(shown, joints["hinge"].values, 0)
     failed = np.flatnonzero(side)
-    slipping = np.flatnonzero(shown & sliding(joints).values)
+    slipping = np.flatnonzero(shown & joints["slide"].values)
     arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
     thrust = np.where(shown[:, None], carried + thrust_line(structure, joints).values, np.nan)
     links = thrust[_neighbours(structure, shown)]
@@ -85,7 +77,7 @@ def joint_marks(
         links=links[np.isfinite(links).all(axis=(1, 2))],
         hinges=ends[failed, (side[failed] > 0).astype(int)],
         slips=np.array(arrows).reshape(-1, *ARROW.shape),
-        gaps=ends[shown & opened(joints).values],
+        gaps=ends[shown & joints["open"].values],
     )
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from archfem.criteria import hinged, judged, opened, sliding
+from archfem.criteria import judged
 from archfem.history import History
 from archfem.view.film import Image
 from archfem.view.shades import Scale
@@ -146,9 +146,9 @@ def _sentence(joints: xr.Dataset) -> str:
     """Time, and how many joints that are judged hinge, slide or are open."""
     joints = judged(joints)
     counts = {
-        "hinging": int((hinged(joints) != 0).sum()),
-        "sliding": int(sliding(joints).sum()),
-        "open": int(opened(joints).sum()),
+        "hinging": int((joints["hinge"] != 0).sum()),
+        "sliding": int(joints["slide"].sum()),
+        "open": int(joints["open"].sum()),
     }
     words = [f"{count} {name}" for name, count in counts.items() if count]
     if "time" in joints.coords:

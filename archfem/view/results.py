@@ -36,7 +36,9 @@ def write_dead(case: Case, dead: Equilibrium, folder: Path) -> list[Path]:
         The files, a table of stress by part among them.
     """
     model, structure = dead.model, dead.model.structure
-    files = [save(draw_structure(structure, dead.joints), folder / "dead.png")]
+    files = [
+        save(draw_structure(structure, dead.joints, criteria=case.criteria), folder / "dead.png")
+    ]
     if model.cells.stress is not None:
         files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))
         table = folder / "dead_stress.txt"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from tqdm import tqdm
 
-from archfem.criteria import hinged
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import VerifiedMechanism
@@ -75,6 +75,7 @@ def picture(
     magnification: float | None = None,
     colour: str = "displacement",
     size: tuple[int, int] = (1280, 720),
+    criteria: Criteria | None = None,
 ) -> Image:
     """Take one picture of a structure at rest or in motion.
 
@@ -84,6 +85,7 @@ def picture(
         magnification: of displacements [-]; by default a round number that shows them well.
         colour: "displacement" or, for blocks that are not rigid, "stress".
         size: width and height, even numbers [pixels].
+        criteria: what makes a joint fail; by default the usual ones.
 
     Returns:
         The picture (height, width, 3), red, green and blue from 0 to 255.
@@ -94,7 +96,7 @@ def picture(
     _check_picture(model, colour, magnification, size)
     _check_size(model, len(q))
     setting = Setting.of(model, q[None], colour, magnification)
-    joints = joint_dataset(model.structure, model.resultants(q))
+    joints = joint_dataset(model.structure, model.resultants(q), criteria=criteria)
     shift = _shift(setting, joint_ends(model), q)
     page = Page(setting, size)
     with Stage(setting, page.room) as stage:
@@ -138,7 +140,7 @@ def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
 
 def _been(joints: xr.Dataset, judged: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
-    side = hinged(joints).transpose("time", "joint").values * judged
+    side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
 

@@ -10,7 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from archfem.criteria import HINGE
+from archfem.criteria import Criteria, flagged
 from archfem.resultants import check_instant
 from archfem.softness import yielding_blocks
 from archfem.structure import Array, Structure
@@ -39,7 +39,7 @@ def draw_structure(
     structure: Structure,
     joints: xr.Dataset | None = None,
     *,
-    limit: float = HINGE,
+    criteria: Criteria | None = None,
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the blocks and, where given, what their joints do at one instant.
@@ -51,7 +51,7 @@ def draw_structure(
     Args:
         structure: what stands.
         joints: its joints at one instant, as made by `joint_dataset`.
-        limit: of |e| for a hinge [-].
+        criteria: what makes a joint fail; by default those by which the joints were judged already.
         axes: where to draw; by default a new figure.
 
     Raises:
@@ -63,7 +63,7 @@ def draw_structure(
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
-        _marks(axes, joint_marks(structure, joints, limit=limit))
+        _marks(axes, joint_marks(structure, flagged(joints, criteria)))
         legend(axes)
     axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
     axes.autoscale_view()

@@ -3,7 +3,6 @@
 import numpy as np
 
 import archfem as af
-from archfem.criteria import sliding as sliding_joints
 from archfem.newton import Newton
 from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, ring, shaken
 
@@ -43,7 +42,7 @@ def slippery():
         shaken(af.build(ring(contact=joints(friction=mu)), fidelity="rigid"), quake(1.0))
         for mu in (0.01, 0.6)
     )
-    sliding = sliding_joints(low.joints).any("time").values
+    sliding = low.joints["slide"].any("time").values
     found = answer(low, off(low, high), 1e-12, f"; {sliding.sum()} of 18 joints flagged")
     return Found(found.outcome, found.right and bool(sliding.all()), found.error, low)
 

@@ -310,7 +310,10 @@ def test_gravity_width_and_material_are_passed_on():
         (lambda: Sidewall(**WALL | {"above": -0.1}), "'sidewall': above -0.1 m is not from 0"),
         (lambda: Sidewall(**WALL, setback=-0.1), "'sidewall': setback -0.1 m is not from 0"),
         (lambda: Backfill(cover=0.4, erosion=-0.1), "'backfill': erosion -0.1 m is not from 0"),
-        (lambda: Backfill(cover=float("nan")), "'backfill': cover nan m is not from 0"),
+        (
+            lambda: Backfill(cover=float("nan")),
+            "'backfill', cover [m] = nan is not a finite number",
+        ),
         (lambda: Backfill(cover=0.4, hump=-1.0), "'backfill': hump -1 m is not from 0"),
         (lambda: Backfill(cover=0.4, spandrels=-1.0), "'backfill': spandrels -1 m is not from 0"),
         (lambda: Paving(thickness=0.0), "'paving': thickness 0 m"),

@@ -8,8 +8,9 @@ import pytest
 
 from archfem.case import Case
 from archfem.cli import main
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.history import History
+from archfem.history import Ending, History
 from archfem.schemes import HHT
 from archfem.units import in_unit
 
@@ -81,6 +82,10 @@ def test_changes_from_the_command_line():
         ("analysis.damping={ratio=0.05}", "give a ratio and two frequencies"),
         ("analysis.scheme=euler", "use 'newmark', or 'hht'"),
         ("analysis.halt=maybe", "not true or false"),
+        ("criteria.hinge=0.7", "criteria hinge = 0.7: .* at most 0.5"),
+        ("criteria.limit=0.4", "unknown key 'criteria.limit'"),
+        ("criteria.failures=4.0", "criteria.failures = 4.0 is not a whole number"),
+        ("criteria=0.4", r"criteria = 0.4 is not a table: write \[criteria\]"),
         ("structure=3", "structure = 3 is not a table"),
         ("nonsense", "write section.key=value"),
         ("title.x=3", "title is not a table"),
@@ -162,6 +167,26 @@ def test_run_command(tmp_path, capsys):
     assert run.time[-1] == pytest.approx(2.0)
     assert Case.of(tomllib.loads(run.dataset.attrs["case"])).model["fidelity"] == "rigid"
     assert "joint 17" in capsys.readouterr().out
+
+
+def test_criteria_of_a_case_are_obeyed(tmp_path, capsys):
+    """Four joints reach |e| = 0.38 at once, and never 0.46."""
+    changes = ["model.fidelity=rigid", "motion.end=4", "analysis.halt=true"]
+    changes += ["output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert main(["run", str(RING), "--out", str(tmp_path / "usual"), *given]) == 0
+    assert "no mechanism by count: never 4 failed joints" in capsys.readouterr().out
+    loose = ["--set", "criteria.hinge=0.38"]
+    assert main(["run", str(RING), "--out", str(tmp_path / "loose"), *given, *loose]) == 0
+    run = History.read(tmp_path / "loose" / "history.nc")
+    assert run.criteria == Criteria(hinge=0.38)
+    assert run.ended is Ending.EVENT
+    assert run.mechanism.time == run.time[-1]
+    assert (
+        f"by count: local mechanism of arch at {run.mechanism.time:.3f}" in capsys.readouterr().out
+    )
+    assert Case.read(tmp_path / "loose" / "case.toml").criteria == run.criteria
+    assert Case.read(RING).criteria == Criteria()
 
 
 def test_run_of_a_ring_that_falls(tmp_path, capsys):

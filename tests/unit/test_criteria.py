@@ -8,15 +8,15 @@ import xarray as xr
 
 from archfem.counted import counted_mechanism, counted_mechanisms
 from archfem.criteria import (
+    Criteria,
     envelope,
     failed,
     first_time,
-    hinged,
+    flagged,
     judged,
     longest_duration,
-    opened,
-    sliding,
 )
+from archfem.errors import InvalidInput
 from archfem.materials import STONE_TO_STONE
 from archfem.mechanism import verified_mechanism
 from archfem.resultants import joint_dataset, thrust_line
@@ -49,11 +49,13 @@ def test_eccentricity_and_friction(joints):
 
 
 def test_flags(joints):
-    assert hinged(joints)[1, 3] == -1
-    assert hinged(joints)[2, 14] == 1
-    assert hinged(joints)[4, 14] == 0
-    assert sliding(joints).sum() == 3
-    assert opened(joints).sum() == 1
+    assert joints["hinge"][1, 3] == -1
+    assert joints["hinge"][2, 14] == 1
+    assert joints["hinge"][4, 14] == 0
+    assert joints["slide"].sum() == 3
+    assert joints["open"].sum() == 1
+    assert joints["judged"].all()
+    assert [joints[name].dtype for name in ("hinge", "slide", "open")] == [np.int8, bool, bool]
     assert failed(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
 
 
@@ -61,9 +63,9 @@ def test_flags(joints):
 def test_friction_at_its_limit_is_used_up_whatever_the_round_off(ring, share):
     normal = 1000.0 * 1.1 ** np.arange(18)  # V / N is then μ only to a few digits of the last
     resultants = np.stack([normal, 0.6 * share * normal, np.zeros(18)], axis=1)
-    assert sliding(joint_dataset(ring, resultants)).all()
+    assert joint_dataset(ring, resultants)["slide"].all()
     resultants[:, 1] *= 1.0 - 1e-5
-    assert not sliding(joint_dataset(ring, resultants)).any()
+    assert not joint_dataset(ring, resultants)["slide"].any()
 
 
 def test_a_joint_without_friction_slides_either_way():
@@ -75,12 +77,12 @@ def test_a_joint_without_friction_slides_either_way():
 
 
 def test_first_times_and_durations(joints):
-    first, longest = first_time(sliding(joints)), longest_duration(sliding(joints))
+    first, longest = first_time(joints["slide"]), longest_duration(joints["slide"])
     assert float(first[7]) == pytest.approx(0.2)
     assert float(longest[7]) == pytest.approx(0.3)
     assert np.isnan(first[0])
     assert float(longest[0]) == 0.0
-    assert float(longest_duration(hinged(joints) != 0)[3]) == pytest.approx(0.2)
+    assert float(longest_duration(joints["hinge"] != 0)[3]) == pytest.approx(0.2)
 
 
 def test_envelope(joints):
@@ -125,7 +127,7 @@ def joints_of(failing):
     friction = np.zeros((len(failing), 20))
     for instant, joints in enumerate(failing):
         friction[instant, list(joints)] = 0.6
-    return xr.Dataset(
+    joints = xr.Dataset(
         {
             "N": (("time", "joint"), np.ones_like(friction)),
             "eccentricity": (("time", "joint"), np.zeros_like(friction)),
@@ -139,6 +141,7 @@ def joints_of(failing):
             "friction_limit": ("joint", np.full(20, 0.6)),
         },
     )
+    return flagged(joints)
 
 
 def test_definitions_of_a_counted_mechanism():
@@ -171,7 +174,7 @@ def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
     assert judged(joints)["joint"].values.tolist() == list(range(14))
     turned = judged(joints.isel(joint=slice(None, None, -1)))
     assert turned["joint"].values.tolist() == list(range(13, -1, -1))
-    soil = joints.isel(joint=slice(14, None))
+    soil = flagged(joints.isel(joint=slice(14, None)), Criteria())
     assert judged(soil).identical(soil)  # there is nothing else to judge
     assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
     assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
@@ -189,3 +192,42 @@ def test_table_holds_judged_joints_only():
     lines = joint_table(joints, joints.isel(time=0)).splitlines()
     assert len(lines) == 15
     assert "joint 15" not in "".join(lines)
+
+
+def test_limits_are_those_of_the_criteria(joints):
+    wide = flagged(joints, Criteria(hinge=0.475))
+    assert wide["hinge"][1, 3] == -1
+    assert wide["hinge"][2, 14] == 0  # at 0.47
+    assert counted_mechanism(wide) is None
+    assert counted_mechanism(joints, Criteria(failures=5)) is None
+    assert counted_mechanism(joints, Criteria(hinge=0.475, failures=3)).joints == (3, 7, 11)
+
+
+def test_friction_of_the_criteria_stands_for_that_of_every_joint(joints):
+    assert flagged(joints, Criteria(friction=0.75))["slide"].sum() == 0
+    assert flagged(joints, Criteria(friction=0.7))["slide"].sum() == 3
+    assert flagged(joints, Criteria(friction=0.0))["slide"].sum() == 5 * 18 - 1  # one is open
+
+
+def test_joints_tell_by_which_criteria_they_were_judged(joints):
+    ours = Criteria(hinge=0.4, failures=3, friction=0.5)
+    judged_so = flagged(joints, ours)
+    assert Criteria.of(judged_so) == Criteria.of(judged_so.isel(time=2)) == ours
+    assert flagged(judged_so) is judged_so
+    again = flagged(judged_so, Criteria())
+    assert again.identical(joints)
+    assert "criteria_friction" not in again.attrs
+
+
+@pytest.mark.parametrize("hinge", [0.0, -0.46, 0.51, np.nan, np.inf, "0.46", None, True])
+def test_a_hinge_lies_within_its_joint(hinge):
+    with pytest.raises(InvalidInput, match="criteria hinge"):
+        Criteria(hinge=hinge)
+
+
+@pytest.mark.parametrize(
+    "given", [{"failures": 0}, {"failures": 4.0}, {"friction": -0.1}, {"friction": "none"}]
+)
+def test_criteria_that_cannot_be_meant(given):
+    with pytest.raises(InvalidInput, match=f"criteria {next(iter(given))}"):
+        Criteria(**given)

@@ -6,6 +6,7 @@ import xarray as xr
 
 from archfem.actions import BodyForce
 from archfem.counted import counted_mechanism, mechanism_kind
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.limit import collapse_factor
 from archfem.mechanism import first_verified_mechanism, verified_mechanism
@@ -192,7 +193,7 @@ def test_count_takes_the_class_of_all_that_failed_or_the_class_asked_for():
     assert local.joints == (3, 6, 9, 12)
     assert counted_mechanism(joints.isel(time=[1])).kind == "global"
     assert counted_mechanism(joints.isel(time=2)).kind == "local"
-    assert counted_mechanism(joints, failures=7) is None
+    assert counted_mechanism(joints, Criteria(failures=7)) is None
 
 
 @pytest.mark.parametrize(

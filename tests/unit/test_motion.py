@@ -183,7 +183,7 @@ def test_synthetic_motion_repeats_and_ends_at_rest():
         assert first.displacement(component)[-1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InvalidInput, match="50 samples or more"):
         Motion.synthetic(duration=0.1)
-    with pytest.raises(InvalidInput, match="seed -1"):
+    with pytest.raises(InvalidInput, match="seed of a synthetic motion = -1"):
         Motion.synthetic(seed=-1)
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from archfem.case import Case
-from archfem.criteria import hinged, opened, sliding
+from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.resultants import joint_dataset, thrust_line
@@ -73,11 +73,25 @@ def units(axes):
 
 def test_each_hinge_is_a_circle_at_the_face_in_contact(ring, joints):
     circles = drawn(draw_structure(ring, joints), "hinges").get_xydata()
-    assert len(circles) == int((hinged(joints) != 0).sum()) == 3
+    assert len(circles) == int((joints["hinge"] != 0).sum()) == 3
     ends = [
         ring.joints[n].extrados if e > 0 else ring.joints[n].intrados for n, e in HINGES.items()
     ]
     assert circles == pytest.approx(np.array(ends))
+
+
+def test_hinges_are_drawn_by_the_criteria_given_or_carried(ring, joints, run):
+    sharp = Criteria(hinge=0.47, friction=2.0)
+    for figure in (
+        draw_structure(ring, joints, criteria=sharp),
+        draw_structure(ring, flagged(joints, sharp)),
+    ):
+        assert len(drawn(figure, "hinges").get_xydata()) == 2
+        assert drawn(figure, "slips") is None
+    axes = draw_joint_histories(run.judged_by(sharp), [0]).axes
+    heights = {float(line.get_ydata()[0]) for each in axes for line in each.lines[:8]}
+    assert {0.47, 2.0} <= heights
+    assert not {0.46, 0.6} & heights
 
 
 def test_thrust_line_is_drawn_where_it_is_and_interrupted_at_open_joints(ring, joints):
@@ -91,9 +105,9 @@ def test_thrust_line_is_drawn_where_it_is_and_interrupted_at_open_joints(ring, j
 
 def test_sliding_and_open_joints_have_their_own_marks(ring, joints):
     figure = draw_structure(ring, joints)
-    assert len(drawn(figure, "slips").get_paths()) == 2 * int(sliding(joints).sum()) == 4
+    assert len(drawn(figure, "slips").get_paths()) == 2 * int(joints["slide"].sum()) == 4
     gaps = drawn(figure, "gaps").get_xydata().reshape(-1, 3, 2)[:, :2]
-    assert int(opened(joints).sum()) == len(gaps) == 2
+    assert int(joints["open"].sum()) == len(gaps) == 2
     assert gaps == pytest.approx(np.array([ring.joints[number].ends for number in APART]))
 
 

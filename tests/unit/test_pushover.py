@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from archfem.actions import BodyForce, PointLoad, Settlement
+from archfem.criteria import Criteria
 from archfem.errors import DidNotConverge
 from archfem.ladder import build
 from archfem.limit import collapse_factor
@@ -142,6 +143,10 @@ def test_other_rules_stop_it():
     by_hinges = pushover(rigid(RING), BodyForce(1.0), stop=Stop(hinges=2))
     assert 2 <= len(by_hinges.hinges) < 4
     assert "joints hinge" in by_hinges.outcome
+    early = Criteria(hinge=0.3)
+    sooner = pushover(rigid(RING), BodyForce(1.0), stop=Stop(hinges=2), criteria=early)
+    assert sooner.factor < by_hinges.factor
+    assert Criteria.of(sooner.joints) == early
     by_steps = pushover(rigid(RING), BodyForce(1.0), stop=Stop(steps=5))
     assert by_steps.curve.sizes["step"] == 6
     assert "5 steps" in by_steps.outcome

@@ -10,7 +10,7 @@ import pytest
 from archfem.assembly import assembled
 from archfem.case import Case
 from archfem.counted import counted_mechanisms
-from archfem.criteria import judged, roles_of
+from archfem.criteria import Criteria, judged, roles_of
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.events import CountedMechanism, EveryMechanism, MovingMechanism
 from archfem.findings import of_run
@@ -133,8 +133,9 @@ def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
 def test_events_go_by_roles(event):
     endings = []
     for names in NAMES.values():
-        made, watch = viaduct(*names), event()
-        ends = [watch(made, resultants) is not None for resultants in quake(made)]
+        made = viaduct(*names)
+        watch = event().watch(made, Criteria())
+        ends = [watch(resultants) is not None for resultants in quake(made)]
         endings.append(ends.index(True))
     assert len(set(endings)) == 1
 
@@ -145,7 +146,7 @@ def test_all_else_goes_by_roles_too():
     for names in NAMES.values():
         made = viaduct(*names)
         joints = joint_dataset(made, quake(made), np.arange(6.0))
-        run = History(joints.assign_attrs(outcome="reached the end of the motion"), made)
+        run = History(joints.assign_attrs(ended="finished", outcome="reached the end"), made)
         panels = [axes.get_title() for axes in draw_envelope({"run": run}).axes]
         assert panels == list(names)
         found = of_run(run)

@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from archfem.criteria import Criteria
 from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.events import CountedMechanism
-from archfem.history import History
+from archfem.events import CountedMechanism, EveryMechanism, MovingMechanism
+from archfem.history import Ending, History
 from archfem.ladder import build
-from archfem.mechanism import verified_mechanism
+from archfem.mechanism import first_verified_mechanism, verified_mechanism
 from archfem.models import Prediction
 from archfem.motion import Motion
 from archfem.runs import Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.statics import dead_load
-from archfem.summary import pair_table, verdict
+from archfem.summary import joint_table, pair_table, verdict
+from archfem.verdicts import first_mechanisms
 
 DAMPING = Rayleigh(0.05, (8.0, 16.0))
 
@@ -56,6 +58,7 @@ def test_what_is_recorded(run, model, motion):
     assert run.dataset["q"].shape == (13, model.size)
     assert run.dataset["ground"].values == pytest.approx(motion.at(run.time))
     assert run.outcome == "reached the end of the motion"
+    assert run.ended is Ending.FINISHED
     assert "archfem" in run.dataset.attrs["versions"]
     assert "extrados" in run.dataset.attrs["signs"]
 
@@ -82,6 +85,102 @@ def test_an_event_ends_the_run(run, model, motion):
     assert halted.time[-1] == pytest.approx(run.mechanism.time)
     assert "a mechanism: joints" in halted.outcome
     assert halted.mechanism == run.mechanism
+
+
+LOOSE = Criteria(hinge=0.38)
+
+
+@pytest.fixture(scope="module")
+def weak(motion):
+    """A motion under which joints hinge by |e| of 0.38, and never four by 0.46."""
+    return motion.scaled(0.6)
+
+
+@pytest.mark.parametrize("event", [CountedMechanism(limit=0.38), CountedMechanism(criteria=LOOSE)])
+def test_criteria_of_the_event_are_those_of_the_run(model, weak, event):
+    assert time_history(model, weak, damping=DAMPING).mechanism is None
+    halted = time_history(model, weak, damping=DAMPING, until=event)
+    assert halted.ended is Ending.EVENT
+    assert halted.criteria == LOOSE
+    assert halted.mechanism.time == halted.time[-1]
+
+
+@pytest.mark.parametrize("event", [CountedMechanism(), MovingMechanism()])
+def test_an_event_obeys_the_criteria_of_the_run(model, motion, event):
+    criteria = Criteria(hinge=0.42, friction=0.4)
+    whole = time_history(model, motion, damping=DAMPING, criteria=criteria)
+    halted = time_history(model, motion, damping=DAMPING, criteria=criteria, until=event)
+    found = whole.mechanism if event == CountedMechanism() else whole.verified.moved
+    assert halted.time[-1] == found.time
+    ended_by = halted.mechanism if event == CountedMechanism() else halted.verified.moved
+    assert ended_by == found
+
+
+def test_criteria_of_run_and_event_must_be_the_same(model, motion):
+    given = {"damping": DAMPING, "criteria": Criteria(hinge=0.4)}
+    with pytest.raises(InvalidInput, match=r"hinge=0\.4.*hinge=0\.38.*to the run alone"):
+        time_history(model, motion, until=CountedMechanism(limit=0.38), **given)
+    short = motion.cut(0.0, 0.5)
+    same = time_history(model, short, until=CountedMechanism(limit=0.4), **given)
+    assert same.criteria == given["criteria"]
+
+
+@pytest.mark.parametrize("every", [1, 7, 100])
+def test_the_step_that_ends_a_run_is_kept(model, motion, every):
+    record = Record(every=every)
+    halted = time_history(
+        model, motion, damping=DAMPING, record=record, until=CountedMechanism(), dt=0.0049
+    )
+    assert halted.mechanism.time == halted.time[-1] == halted.dataset.attrs["last_time"]
+
+
+@pytest.mark.parametrize("event", [EveryMechanism(), CountedMechanism(), MovingMechanism()])
+def test_an_event_begins_afresh_in_each_run(model, motion, event):
+    first, second = (time_history(model, motion, damping=DAMPING, until=event) for _ in range(2))
+    assert first.ended is second.ended is Ending.EVENT
+    assert first.outcome == second.outcome
+    assert first.time[-1] == second.time[-1]
+
+
+def test_everything_said_of_a_run_obeys_its_criteria(run, model, tmp_path):
+    loose = run.judged_by(Criteria(hinge=0.3, failures=5))
+    assert loose.mechanism.time < run.mechanism.time
+    assert len(loose.mechanism.joints) >= 5
+    assert loose.verified.moved.time < run.verified.moved.time
+    found = first_mechanisms(loose)
+    assert found == first_mechanisms(run, loose.criteria)
+    assert found["any four joints"] == replace(loose.mechanism, blocks=())
+    assert joint_table(loose.joints) != joint_table(run.joints)
+    again = History.read(loose.save(tmp_path / "run.nc"), model.structure)
+    assert again.criteria == loose.criteria
+    assert again.mechanism == loose.mechanism
+    assert run.criteria == Criteria()
+    calm = loose.judged_by(Criteria(failures=18))
+    assert verdict(calm).startswith("no mechanism by count: never 18 failed joints at once")
+
+
+def test_flags_are_in_the_file_for_plain_xarray(run, tmp_path):
+    with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
+        assert plain["slide"].dtype == plain["open"].dtype == plain["judged"].dtype == bool
+        assert plain["hinge"].dtype == np.int8
+        assert plain["hinge"].equals(run.joints["hinge"])
+        assert plain.attrs["criteria_hinge"] == 0.46
+        assert plain.attrs["ended"] == "finished"
+
+
+def test_a_file_of_an_earlier_version(run, tmp_path):
+    """It is judged by the usual criteria, and tells only in words how its run ended."""
+    old = run.dataset.drop_vars(["hinge", "slide", "open", "judged"])
+    old.attrs = {
+        key: value
+        for key, value in old.attrs.items()
+        if key != "ended" and not key.startswith("criteria_")
+    }
+    read = History.read(History(old).save(tmp_path / "old.nc"), run.structure)
+    assert read.mechanism == run.mechanism
+    assert first_verified_mechanism(run.structure, read.joints).moved == run.verified.moved
+    with pytest.raises(InvalidInput, match=r"only in words .* 'reached the end of the motion'"):
+        _ = read.ended
 
 
 def test_a_run_goes_on_where_it_stopped(run, model, motion):
@@ -208,6 +307,8 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
     finally:
         signal.signal(signal.SIGINT, before)
     assert "interrupted at" in run.outcome
+    assert run.ended is Ending.INTERRUPTED
+    assert not run.ended.by_itself
     assert 0.5 < run.time[-1] < 1.6
     assert run.joints["N"].notnull().all()
 
@@ -226,6 +327,7 @@ def test_a_failure_carries_the_history(model, motion, monkeypatch):
     assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
     assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
     assert "failed at" in caught.value.history.outcome
+    assert caught.value.history.ended is Ending.FAILED
 
 
 def test_a_step_that_fails_is_halved(model, motion, monkeypatch):

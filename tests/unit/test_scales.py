@@ -8,8 +8,9 @@ import pytest
 
 from archfem import scales
 from archfem.counted import Mechanism
-from archfem.criteria import HINGE
+from archfem.criteria import HINGE, Criteria
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.history import Ending
 from archfem.models.rigid import rigid
 from archfem.motion import LARGEST_PEAK, Motion
 from archfem.runs import time_history
@@ -66,13 +67,13 @@ def test_bounds_are_those_of_whole_runs(on_piers):
     assert found["any four joints"].upper <= min(found[name].upper for name in DEFINITIONS[:3])
 
 
-def pretend(monkeypatch, fails, outcome=lambda scale: "reached the end of the motion"):
+def pretend(monkeypatch, fails, ended=lambda scale: Ending.FINISHED):
     """Runs that fail by a rule of the scale alone."""
 
     def run(model, motion, **_):
-        return SimpleNamespace(scale=motion.pga, outcome=outcome(motion.pga))
+        return SimpleNamespace(scale=motion.pga, ended=ended(motion.pga), outcome="in words")
 
-    def met(run, limit):
+    def met(run):
         hit = Mechanism("local", "arch", (0,), 1.0)
         return {name: hit if fails[name](run.scale) else None for name in DEFINITIONS}
 
@@ -95,6 +96,18 @@ def test_search_closes_in_on_every_threshold(on_piers, monkeypatch):
         assert found[name].lower < threshold <= found[name].upper
         assert found[name].ratio <= 1.02 * ROUND_OFF
     assert len(found.trials) <= 10 + 5 * 4  # ladder, and ln(√2) / ln(1.02) halved to 1 for each
+
+
+def test_every_run_of_a_search_has_the_criteria(on_piers, monkeypatch):
+    pretend(monkeypatch, dict.fromkeys(DEFINITIONS, beyond(1.0)))
+    made_up, seen = scales.time_history, []
+    monkeypatch.setattr(
+        scales, "time_history", lambda *a, **given: seen.append(given) or made_up(*a, **given)
+    )
+    ours = Criteria(hinge=0.4, failures=60)
+    found = mechanism_scales(on_piers, UNIT, start=object(), criteria=ours)
+    assert all(given["criteria"] == ours for given in seen)
+    assert found.asked == ("verified",)  # there are no sixty joints
 
 
 def test_what_fails_nowhere_or_everywhere_is_said(on_piers, monkeypatch):
@@ -132,7 +145,9 @@ def test_a_run_without_equilibrium_counts_as_failed(on_piers, monkeypatch):
 
     def failing(model, motion, **given):
         if motion.pga >= 1.3:
-            history = SimpleNamespace(scale=motion.pga, outcome="failed at 0.3 s: no equilibrium")
+            history = SimpleNamespace(
+                scale=motion.pga, ended=Ending.FAILED, outcome="failed at 0.3 s"
+            )
             raise DidNotConverge("no equilibrium", history=history)
         return made_up(model, motion, **given)
 
@@ -140,14 +155,14 @@ def test_a_run_without_equilibrium_counts_as_failed(on_piers, monkeypatch):
     found = mechanism_scales(on_piers, UNIT, start=object())
     for name in DEFINITIONS:
         assert found[name].lower < 1.3 <= found[name].upper
-    assert found.table().count("failed at 0.3 s: no equilibrium") == len(DEFINITIONS)
+    assert found.table().count("failed at 0.3 s") == len(DEFINITIONS)
 
 
 def test_ctrl_c_keeps_what_is_known(on_piers, monkeypatch):
     pretend(
         monkeypatch,
         {name: beyond(2.5) for name in DEFINITIONS},
-        lambda scale: "interrupted at 0.1 s" if scale > 1.9 else "reached the end of the motion",
+        lambda scale: Ending.INTERRUPTED if scale > 1.9 else Ending.FINISHED,
     )
     found = mechanism_scales(on_piers, UNIT, start=object())
     assert [trial.scale for trial in found.trials] == pytest.approx([1.0, 2.0**0.5, 2.0])
@@ -157,8 +172,10 @@ def test_ctrl_c_keeps_what_is_known(on_piers, monkeypatch):
 
 def test_hand_made_trials():
     hit = Mechanism("local", "arch", (1, 2, 3, 4), 1.5)
-    trials = [ScaledRun(scale, {"verified": hit if scale in (2.0, 4.0) else None}, "reached")
-              for scale in (1.0, 2.0, 3.0, 4.0)]  # fmt: skip
+    met = {scale: hit if scale in (2.0, 4.0) else None for scale in (1.0, 2.0, 3.0, 4.0)}
+    trials = [
+        ScaledRun(scale, {"verified": found}, Ending.FINISHED, "") for scale, found in met.items()
+    ]
     found = MechanismScales(("verified",), tuple(trials))["verified"]
     assert (found.lower, found.upper, found.above) == (1.0, 2.0, (3.0,))
     assert found.trial.found["verified"] is hit

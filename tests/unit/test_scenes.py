@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from archfem.actions import Settlement
-from archfem.criteria import hinged
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.ladder import build
@@ -115,7 +114,7 @@ def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
 def test_hinges_are_red_where_there_are_some(model, run):
     """At rest no pixel is red; with hinges, about as many discs' worth as the criteria count."""
     fields, times = run.dataset["q"].values, run.dataset["frame_time"].values
-    count = (hinged(run.joints) != 0).sum("joint").sel(time=times, method="nearest").values
+    count = (run.joints["hinge"] != 0).sum("joint").sel(time=times, method="nearest").values
     last = int(np.argmax(count))
     assert count[last] >= 4
     assert reds(picture(model, fields[0], size=SIZE)) == 0

@@ -116,6 +116,7 @@ def finding(**given):
         "eccentricity": {"arch": 0.4},
         "friction": {"arch": float("inf")},
         "mechanisms": dict.fromkeys(DEFINITIONS),
+        "ended": "finished",
         "outcome": "reached the end of the motion",
     }
     every = {
@@ -148,11 +149,15 @@ def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):
     finer = kept(path, "text", {"precision": 0.05, "between": [0.2, 2.0]})
     assert (set(finer.runs), finer.scales) == ({"a", "b"}, {})
     assert kept(path, "another text", None) is None
+    found = json.loads(path.read_text())
+    del found["runs"]["a"]["ended"]  # as an earlier version wrote it
+    path.write_text(json.dumps(found))
+    assert kept(path, "text", None) is None
     assert kept(tmp_path / "none.json", "text", None) is None
 
 
 def test_a_table_counts_the_pairs_asked_for_and_runs_that_broke_off():
-    broken = finding().runs["a"] | {"outcome": "failed at 0.4 s: no equilibrium"}
+    broken = finding().runs["a"] | {"ended": "failed", "outcome": "failed at 0.4 s: …"}
     found = finding(runs={"a": finding().runs["a"], "b": broken})
     assert "ring: 1 of 2 runs broke off" in study_table({"ring": found})
     assert "broke off" not in study_table({"ring": found.of_pairs(["a"])})
@@ -166,7 +171,7 @@ def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, during):
     def interrupted(*given, until=None, **more):
         history = whole(*given, until=until, **more)
         if (until is None) == (during == "run"):
-            history.dataset.attrs["outcome"] = "interrupted at 0.1 s"
+            history.dataset.attrs["ended"] = "interrupted"
         return history
 
     place = {"run": "archfem.analysis", "search": "archfem.scales"}[during]

@@ -13,7 +13,7 @@ from archfem.cli import INTERRUPTED, main
 from archfem.codes import Eurocode8, TableSpectrum, Tbec2018
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.ground import ground_suite, suite_settings
-from archfem.history import History
+from archfem.history import Ending, History
 from archfem.view import results
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
@@ -197,7 +197,7 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys, 
     def broken_off(case, motion, *given):
         history = whole(case, motion, *given)
         if motion.name == "second":
-            history.dataset.attrs["outcome"] = "interrupted at 0.5 s"
+            history.dataset.attrs["ended"] = "interrupted"
         return history
 
     monkeypatch.setattr(analysis, "shaken", broken_off)
@@ -216,7 +216,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys, monkey
     def failing(case, motion, *given):
         history = whole(case, motion, *given)
         if motion.name == "first":
-            history.dataset.attrs["outcome"] = "failed at 0.5 s: no equilibrium"
+            history.dataset.attrs["ended"] = "failed"
             raise DidNotConverge("no equilibrium", history=history)
         return history
 
@@ -228,7 +228,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys, monkey
     assert re.search(r"^second .* reached ", table, re.MULTILINE)
     path = small.parent / "out" / "first" / "history.nc"
     case = Case.read(small).alone("first")
-    assert History.read(path).outcome.startswith("failed")
+    assert History.read(path).ended is Ending.FAILED
     assert analysis.finished(path, case, case.ground_suite().motions[0]) is None
 
 
