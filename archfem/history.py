@@ -66,7 +66,7 @@ class History:
     def joints(self) -> xr.Dataset:
         """N, V, M, eccentricity, friction and flags of failure over time and joint."""
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
-        return flagged(self.dataset[names])
+        return self.dataset[names]
 
     @property
     def criteria(self) -> Criteria:
@@ -160,7 +160,7 @@ class History:
 
     @classmethod
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
-        """Read a file written by `save`.
+        """Read a file written by `save`; one of an earlier version is judged by the usual criteria.
 
         Args:
             path: the file.
@@ -185,4 +185,4 @@ class History:
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
             )
-        return cls(dataset, structure)
+        return cls(dataset if "hinge" in dataset else flagged(dataset, Criteria()), structure)

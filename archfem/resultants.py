@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arguments import instance
-from archfem.criteria import Criteria, flagged
+from archfem.criteria import Criteria, counting, flags
 from archfem.structure import Array, Structure
 
 UNITS = {
@@ -54,29 +54,33 @@ def joint_dataset(
         criteria: by which joints fail; by default the usual ones.
 
     Returns:
-        Variables N, V, M, eccentricity and friction, and the flags of `flagged`, over joint, or
-        over time and joint, with the joints' names, parts, depths and friction limits as
-        coordinates, and the criteria as attributes.
+        Variables N, V, M, eccentricity and friction, and `flags` of failure, over joint, or over
+        time and joint, with the joints' names, parts, depths and friction limits, and whether they
+        are judged, as coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth = np.array([joint.depth for joint in structure.joints])
-    eccentricity, friction = ratios(resultants, depth)
-    values = dict(zip("NVM", np.moveaxis(resultants, -1, 0), strict=True))
-    values |= {"eccentricity": eccentricity, "friction": friction}
+    own = np.array([joint.contact.friction for joint in structure.joints])
+    parts, criteria = [joint.part for joint in structure.joints], criteria or Criteria()
+    found = ratios(resultants, depth)
+    values = zip(UNITS.items(), (*np.moveaxis(resultants, -1, 0), *found), strict=True)
     variables = {
-        key: (dims, value, {"units": UNITS[key][0], "long_name": UNITS[key][1]})
-        for key, value in values.items()
+        key: (dims, value, {"units": units, "long_name": words})
+        for (key, (units, words)), value in values
     }
+    coefficients = criteria.coefficients(own)
+    variables |= flags(dims, resultants[..., 0], found, coefficients, criteria.hinge)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
-        "part": ("joint", [joint.part for joint in structure.joints]),
+        "part": ("joint", parts),
+        "judged": ("joint", counting(parts)),
         "depth": ("joint", depth, {"units": "m"}),
-        "friction_limit": ("joint", [joint.contact.friction for joint in structure.joints]),
+        "friction_limit": ("joint", own),
     }
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
-    return flagged(xr.Dataset(variables, coordinates), criteria)
+    return xr.Dataset(variables, coordinates, criteria.attributes)
 
 
 def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
