@@ -1,5 +1,6 @@
 """When a joint has failed: hinging, sliding, opening; and by which criteria."""
 
+from collections.abc import Hashable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -106,33 +107,52 @@ def failing(
     return np.abs(eccentricity) >= hinge, friction >= (1.0 - USED_UP) * coefficients
 
 
-def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
-    """Joints with flags of failure, by criteria that the dataset then carries as attributes.
+def flags(
+    dims: tuple[Hashable, ...],
+    normal: NDArray[np.float64],
+    ratios: tuple[NDArray[np.float64], NDArray[np.float64]],
+    coefficients: NDArray[np.float64],
+    hinge: float,
+) -> dict[str, tuple[Any, ...]]:
+    """Flags of failure, as variables of a dataset.
 
-    Flags are `hinge`, the face on which a joint hinges (1 extrados, -1 intrados, where it stays
-    closed; 0 none), `slide`, whether the mobilised friction has reached its coefficient, `open`,
-    whether it has come apart over its whole depth, and the coordinate `judged`, whether its
-    failure counts, as `judged_parts` says.
+    `hinge` is the face on which a joint hinges (1 extrados, -1 intrados, where it stays closed; 0
+    none), `slide` says whether its mobilised friction has reached its coefficient, and `open`
+    whether it has come apart over its whole depth.
+
+    Args:
+        dims: names of the dimensions, the last that of the joints.
+        normal: N (…, n_joints) [N].
+        ratios: eccentricity and mobilised friction (…, n_joints) [-].
+        coefficients: of friction (n_joints,) [-].
+        hinge: |e| from which a joint hinges [-].
+    """
+    hinges, slides = failing(*ratios, coefficients, hinge)
+    side = np.where(hinges, np.sign(ratios[0]), 0.0).astype(np.int8)
+    return {
+        "hinge": (dims, side, {"long_name": "face on which it hinges, 1 extrados, -1 intrados"}),
+        "slide": (dims, slides, {"long_name": "whether its friction is used up"}),
+        "open": (dims, normal <= 0.0, {"long_name": "whether it has come apart"}),
+    }
+
+
+def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
+    """Joints with the flags of other criteria, which the dataset then carries as attributes.
 
     Args:
         joints: N, eccentricity and friction, as made by `joint_dataset`.
-        criteria: by default those which the joints were judged by already, or the usual ones.
+        criteria: by default those by which the joints were judged already.
     """
-    if criteria is None and "hinge" in joints:
+    if criteria is None:
         return joints
-    criteria = chosen(criteria) or Criteria.of(joints)
-    ordered = joints[["N", "eccentricity", "friction"]].transpose(
-        ..., "joint", missing_dims="ignore"
+    instance(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
+    normal, e, friction = (
+        joints[name].transpose(..., "joint", missing_dims="ignore")
+        for name in ("N", "eccentricity", "friction")
     )
-    dims, e = ordered["eccentricity"].dims, ordered["eccentricity"].values
     coefficients = criteria.coefficients(joints["friction_limit"].values)
-    hinges, slides = failing(e, ordered["friction"].values, coefficients, criteria.hinge)
-    side = np.where(hinges, np.sign(e), 0.0).astype(np.int8)
-    result = joints.assign(
-        hinge=(dims, side, {"long_name": "face on which it hinges, 1 extrados, -1 intrados"}),
-        slide=(dims, slides, {"long_name": "whether its friction is used up"}),
-        open=(dims, ordered["N"].values <= 0.0, {"long_name": "whether it has come apart"}),
-    )
+    ratios = e.values, friction.values
+    result = joints.assign(flags(e.dims, normal.values, ratios, coefficients, criteria.hinge))
     counts = np.isin(joints["part"].values.astype(str), judged_parts(roles_of(joints)))
     result.coords["judged"] = (joints["part"].dims, counts)
     others = {key: value for key, value in joints.attrs.items() if not key.startswith(PREFIX)}

@@ -66,7 +66,7 @@ class History:
     def joints(self) -> xr.Dataset:
         """N, V, M, eccentricity, friction and flags of failure over time and joint."""
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
-        return flagged(self.dataset[names])
+        return self.dataset[names]
 
     @property
     def criteria(self) -> Criteria:
@@ -152,7 +152,7 @@ class History:
 
     @classmethod
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
-        """Read a file written by `save`.
+        """Read a file written by `save`; one of an earlier version is judged by the usual criteria.
 
         Args:
             path: the file.
@@ -187,4 +187,4 @@ class History:
                 f"{path} does not tell which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        return cls(dataset, structure)
+        return cls(dataset if "hinge" in dataset else flagged(dataset, Criteria()), structure)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arguments import instance
-from archfem.criteria import Criteria, flagged
+from archfem.criteria import Criteria, flags
 from archfem.errors import InvalidInput
 from archfem.naming import number_of
 from archfem.structure import Array, Structure
@@ -56,30 +56,32 @@ def joint_dataset(
         criteria: by which joints fail; by default the usual ones.
 
     Returns:
-        Variables N, V, M, eccentricity and friction, and the flags of `flagged`, over joint, or
-        over time and joint, with the joints' names, parts, roles, depths and friction limits as
-        coordinates, and the criteria as attributes.
+        Variables N, V, M, eccentricity and friction, and `flags` of failure, over joint, or over
+        time and joint, with the joints' names, parts, roles, depths and friction limits, and
+        whether they are judged, as coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
-    depth = structure.depths
-    eccentricity, friction = ratios(resultants, depth)
-    values = dict(zip("NVM", np.moveaxis(resultants, -1, 0), strict=True))
-    values |= {"eccentricity": eccentricity, "friction": friction}
+    depth, criteria = structure.depths, criteria or Criteria()
+    found = ratios(resultants, depth)
+    values = zip(UNITS.items(), (*np.moveaxis(resultants, -1, 0), *found), strict=True)
     variables = {
-        key: (dims, value, {"units": UNITS[key][0], "long_name": UNITS[key][1]})
-        for key, value in values.items()
+        key: (dims, value, {"units": units, "long_name": words})
+        for (key, (units, words)), value in values
     }
+    coefficients = criteria.coefficients(structure.friction)
+    variables |= flags(dims, resultants[..., 0], found, coefficients, criteria.hinge)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
         "part": ("joint", [joint.part for joint in structure.joints]),
         "role": ("joint", [joint.role for joint in structure.joints]),
+        "judged": ("joint", structure.judged),
         "depth": ("joint", depth, {"units": "m"}),
         "friction_limit": ("joint", structure.friction),
     }
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
-    return flagged(xr.Dataset(variables, coordinates), criteria)
+    return xr.Dataset(variables, coordinates, criteria.attributes)
 
 
 def check_instant(structure: Structure, joints: xr.Dataset) -> None:

@@ -77,7 +77,7 @@ def test_changes_from_the_command_line():
         ("analysis.dt='5 s'", "analysis.dt = 5 s is not between"),
         ("output.free_body='vousoir 3'", "no block 'vousoir 3': .*'voussoir 3'"),
         ("model.cells=4", r"model.cells = 4 is not a list"),
-        ("model.cells=[0, 4]", "ring.toml: cells through = 0: give a whole number"),
+        ("model.cells=[0, 4]", "ring.toml: cells through = 0 is not a whole number"),
         ("model.fidelity=modal", "'modal' is no longer known, for 'faces' is faster"),
         ("analysis.damping={ratio=0.05}", "give a ratio and two frequencies"),
         ("analysis.scheme=euler", "use 'newmark', or 'hht'"),
