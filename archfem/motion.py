@@ -17,8 +17,6 @@ from archfem.synthetic import accelerogram
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = ("horizontal", "vertical", "transverse")
-LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
-"""No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +49,7 @@ class Motion:
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
-                row = signals.checked(samples, component, LARGEST_PEAK)
-                object.__setattr__(self, component, row)
+                object.__setattr__(self, component, signals.checked(samples, component))
 
     @classmethod
     def read(

@@ -10,17 +10,19 @@ from archfem.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
+LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
+"""No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""
 
-def checked(samples: Array | None, component: str, largest: float) -> Array:
-    """Return a component as its own read-only row of finite numbers.
+
+def checked(samples: Array | None, component: str) -> Array:
+    """Return a component as its own read-only row of finite numbers below 5 g.
 
     Args:
         samples: accelerations (n,) [m/s²], or what was given for them.
         component: its name, for errors.
-        largest: acceleration beyond which the unit must be wrong [m/s²].
 
     Raises:
-        InvalidInput: it is not one row of finite numbers, or exceeds the largest.
+        InvalidInput: it is not one row of finite numbers, or exceeds 5 g.
     """
     try:
         row = np.array(samples, dtype=float)
@@ -31,10 +33,10 @@ def checked(samples: Array | None, component: str, largest: float) -> Array:
             f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
         )
     peak = np.abs(row).max()
-    if peak > largest:
+    if peak > LARGEST_PEAK:
         raise InvalidInput(
-            f"{component} acceleration reaches {peak / STANDARD_GRAVITY:.3g} g, more than "
-            f"{largest / STANDARD_GRAVITY:g} g: that can only be a wrong unit (m/s² expected)"
+            f"{component} acceleration reaches {peak / STANDARD_GRAVITY:.3g} g, more than 5 g: "
+            "that can only be a wrong unit (m/s² expected)"
         )
     row.setflags(write=False)
     return row

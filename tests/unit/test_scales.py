@@ -11,11 +11,12 @@ from archfem.counted import Mechanism
 from archfem.criteria import HINGE
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.rigid import rigid
-from archfem.motion import LARGEST_PEAK, Motion
+from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.scales import MechanismScales, Trial, mechanism_scales
 from archfem.schemes import Rayleigh
 from archfem.shapes import arch_on_piers, column
+from archfem.signals import LARGEST_PEAK
 from archfem.statics import dead_load
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
