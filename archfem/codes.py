@@ -7,17 +7,25 @@ import numpy as np
 
 from archfem.arguments import real
 from archfem.errors import InvalidInput
-from archfem.oscillator import check
+from archfem.oscillator import Array, check
 
 
 class DesignSpectrum(Protocol):
     """Spectral accelerations a motion can be matched to."""
 
-    def horizontal(self, periods: float | np.ndarray) -> np.ndarray:
-        """Return horizontal spectral accelerations in the shape of the periods [g]."""
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
 
-    def vertical(self, periods: float | np.ndarray) -> np.ndarray:
-        """Return vertical spectral accelerations in the shape of the periods [g]."""
+        Args:
+            periods: natural periods, of any shape [s].
+        """
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Return vertical spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+        """
 
 
 # Site factors of TBEC-2018, tables 2.1 and 2.2: linear between the columns, constant outside.
@@ -83,17 +91,27 @@ class Tbec2018:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
         return self.s1 * float(np.interp(self.s1, _LONG, _LONG_FACTORS[self.site]))
 
-    def horizontal(self, periods: float | np.ndarray) -> np.ndarray:
-        """Return horizontal spectral accelerations in the shape of the periods [g]."""
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative or not finite.
+        """
         natural = _checked(periods, np.inf)
         start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
         return self.sds * _branches(natural, (start, end, long), lowest=0.4)
 
-    def vertical(self, periods: float | np.ndarray) -> np.ndarray:
+    def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
 
+        Args:
+            periods: natural periods, of any shape [s].
+
         Raises:
-            InvalidInput: a period beyond 3 s, where the code gives none.
+            InvalidInput: a period is negative, or beyond 3 s, where the code gives none.
         """
         natural = _checked(periods, 3.0)
         start, end = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0
@@ -157,22 +175,28 @@ class Eurocode8:
             )
         check(np.zeros(1), self.damping)
 
-    def horizontal(self, periods: float | np.ndarray) -> np.ndarray:
+    def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
 
+        Args:
+            periods: natural periods, of any shape [s].
+
         Raises:
-            InvalidInput: a period beyond 4 s, where these clauses give none.
+            InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
         soil, *corners = _GROUND[self.type][self.ground]
         top = 2.5 * self._reduction
         natural = _checked(periods, 4.0)
         return self.ag * soil * top * _branches(natural, tuple(corners), lowest=1.0 / top)
 
-    def vertical(self, periods: float | np.ndarray) -> np.ndarray:
+    def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
 
+        Args:
+            periods: natural periods, of any shape [s].
+
         Raises:
-            InvalidInput: a period beyond 4 s, where these clauses give none.
+            InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
         top = 3.0 * self._reduction
         shape = _branches(_checked(periods, 4.0), _UPRIGHT_PERIODS, lowest=1.0 / top)
@@ -196,9 +220,9 @@ class TableSpectrum:
         InvalidInput: the rows do not fit, the periods do not grow, or a value is not positive.
     """
 
-    periods: np.ndarray
-    values: np.ndarray
-    vertical_values: np.ndarray | None = None
+    periods: Array
+    values: Array
+    vertical_values: Array | None = None
 
     def __post_init__(self) -> None:
         periods = np.asarray(self.periods, dtype=float)
@@ -216,25 +240,43 @@ class TableSpectrum:
                 )
             object.__setattr__(self, name, row)
 
-    def horizontal(self, periods: float | np.ndarray) -> np.ndarray:
-        """Return horizontal spectral accelerations in the shape of the periods [g]."""
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is outside the table.
+        """
         return self._between(periods, self.values)
 
-    def vertical(self, periods: float | np.ndarray) -> np.ndarray:
-        """Return vertical spectral accelerations in the shape of the periods [g]."""
+    def vertical(self, periods: float | Array) -> Array:
+        """Return vertical spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: there is no vertical, or a period is outside the table.
+        """
         if self.vertical_values is None:
             raise InvalidInput("this spectrum table has no vertical: give vertical_values")
         return self._between(periods, self.vertical_values)
 
-    def _between(self, periods: float | np.ndarray, row: np.ndarray) -> np.ndarray:
+    def _between(self, periods: float | Array, row: Array) -> Array:
         natural = _checked(periods, self.periods[-1])
         if np.any(natural < self.periods[0]):
             raise InvalidInput(f"period below the table's first, {self.periods[0]:g} s")
         return np.interp(natural, self.periods, row)
 
 
-def _checked(periods: float | np.ndarray, longest: float) -> np.ndarray:
-    """Return periods as an array, refused where a spectrum is not defined."""
+def _checked(periods: float | Array, longest: float) -> Array:
+    """Return periods as an array, refused where a spectrum is not defined.
+
+    Raises:
+        InvalidInput: a period is negative, not finite, or beyond the longest.
+    """
     natural = np.asarray(periods, dtype=float)
     check(natural, 0.05)
     if np.any(natural > longest):
@@ -244,7 +286,7 @@ def _checked(periods: float | np.ndarray, longest: float) -> np.ndarray:
     return natural
 
 
-def _branches(periods: np.ndarray, corners: tuple[float, ...], *, lowest: float) -> np.ndarray:
+def _branches(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
     """Return the usual shape: from lowest to 1, level, falling with 1/T and then with 1/T²."""
     rise, level, fall = corners
     safe = np.maximum(periods, rise)

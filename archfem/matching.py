@@ -11,10 +11,11 @@ from archfem.codes import DesignSpectrum
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.measures import Measures, measures
 from archfem.motion import Motion
+from archfem.signals import Array
 from archfem.spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
 
-Target = Callable[[np.ndarray], np.ndarray]
+Target = Callable[[Array], Array]
 
 _CONTROLS = 100  # oscillators whose peaks are corrected, evenly spaced in log period
 _CHECKS = 150  # periods at which the misfit is taken, between the others
@@ -71,6 +72,9 @@ def matched(
         tolerance: root mean square of the relative misfit that is accepted [-]. The rounds stop at
             half of it.
 
+    Returns:
+        The matched motion with its misfits, and the measures before and after.
+
     Raises:
         InvalidInput: the band is empty, or the motion is too short or does not move.
         DidNotConverge: the tolerance was not reached; `last` is the best `Match`.
@@ -79,8 +83,7 @@ def matched(
         Al Atik, Abrahamson, An improved method for nonstationary spectral matching, Earthquake
         Spectra 26 (2010). Lilhanand, Tseng, 9th WCEE (1988).
     """
-    if not 0.0 < band[0] < band[1]:
-        raise InvalidInput(f"band from {band[0]:g} to {band[1]:g} s: expected 0 < first < second")
+    _check_band(band)
     parts = max(int(np.ceil(motion.dt * 10.0 / band[0] - 1e-9)), 1)
     changed: dict[str, Any] = {}
     for component in motion.components:
@@ -113,10 +116,32 @@ def misfit(
     band: tuple[float, float] = (0.05, 2.0),
     damping: float = 0.05,
 ) -> float:
-    """Return the root mean square of spectrum/target - 1 over a band, evenly in log period [-]."""
+    """Return the root mean square of spectrum/target - 1 over a band, evenly in log period [-].
+
+    Args:
+        motion: the ground motion.
+        spectrum: the target; its values are in g.
+        component: horizontal, vertical or transverse.
+        band: shortest and longest period [s].
+        damping: of the target spectrum [-].
+
+    Raises:
+        InvalidInput: the band is empty, or there is no such component or target.
+    """
+    _check_band(band)
     periods = np.geomspace(*band, _CHECKS)
     found = response_spectrum(motion, periods, damping, component=component)
     return _apart(found, _target(spectrum, component)(periods) * STANDARD_GRAVITY)
+
+
+def _check_band(band: tuple[float, float]) -> None:
+    """Refuse a band of periods that is empty or begins at zero.
+
+    Raises:
+        InvalidInput: it is so.
+    """
+    if not 0.0 < band[0] < band[1] < np.inf:
+        raise InvalidInput(f"band from {band[0]:g} to {band[1]:g} s: expected 0 < first < second")
 
 
 def _target(spectrum: DesignSpectrum, component: str) -> Target:
@@ -132,7 +157,7 @@ def _compared(
     band: tuple[float, float],
     damping: float,
 ) -> Match:
-    """Measure a motion before and after matching."""
+    """Return the motion after matching, measured and compared with the one before."""
     names = after.components
     return Match(
         after,
@@ -162,16 +187,17 @@ class _Goal:
         # The ground's own peak is corrected with the shortest wavelet of the band.
         self.wave_periods = np.maximum(self.periods, band[0])
 
-    def distance(self, samples: np.ndarray, dt: float, peaks: np.ndarray) -> float:
+    def distance(self, samples: Array, dt: float, peaks: Array) -> float:
         """Return how far samples with these peaks are from the goal [-]."""
         found = oscillator.peak_responses(samples, dt, self.checks, self.damping)[0]
         apart = _apart(np.abs(found), self.check_values)
         if self.periods[0] > 0.0:
             return apart
-        return max(apart, _PEAK * abs(abs(peaks[0]) / self.values[0] - 1.0))
+        peak = float(peaks[0] / self.values[0])
+        return max(apart, _PEAK * abs(abs(peak) - 1.0))
 
 
-def _rigid(target: Target) -> np.ndarray:
+def _rigid(target: Target) -> Array:
     """Return period zero, or nothing where a spectrum is not defined there."""
     try:
         target(np.zeros(1))
@@ -180,7 +206,7 @@ def _rigid(target: Target) -> np.ndarray:
     return np.zeros(1)
 
 
-def _fitted(samples: np.ndarray, dt: float, goal: _Goal) -> np.ndarray:
+def _fitted(samples: Array, dt: float, goal: _Goal) -> Array:
     """Return samples whose spectrum is near the goal."""
     current = signals.baseline_corrected(samples, dt)
     best, least = current, np.inf
@@ -198,9 +224,7 @@ def _fitted(samples: np.ndarray, dt: float, goal: _Goal) -> np.ndarray:
     return best
 
 
-def _correction(
-    peaks: np.ndarray, times: np.ndarray, goal: _Goal, *, dt: float, count: int
-) -> np.ndarray:
+def _correction(peaks: Array, times: Array, goal: _Goal, *, dt: float, count: int) -> Array:
     """Return the sum of wavelets (count,) [m/s²] that brings the peaks to the goal."""
     waves = np.stack(
         [
@@ -219,10 +243,11 @@ def _correction(
     left, scales, right = np.linalg.svd(effect)
     small = _DAMPED * scales[0]
     amplitudes = right.T @ (scales / (scales**2 + small**2) * (left.T @ wanted))
-    return amplitudes @ waves
+    added: Array = amplitudes @ waves
+    return added
 
 
-def _wavelet(period: float, centre: float, dt: float, count: int) -> np.ndarray:
+def _wavelet(period: float, centre: float, dt: float, count: int) -> Array:
     """Return a wavelet (count,) [-] of size 1 whose displacement begins and ends at zero.
 
     The displacement exp(-(t/γ)²) cos(2 π t/T), γ = 1.178 T^0.93, is brought to zero within a period
@@ -237,13 +262,14 @@ def _wavelet(period: float, centre: float, dt: float, count: int) -> np.ndarray:
     ramp = ramp**2 * (3.0 - 2.0 * ramp)
     wave = np.zeros(count)
     wave[first + 1 : last - 1] = np.diff(moved * ramp * ramp[::-1], 2)
-    return wave / np.abs(wave).max()
+    largest: float = np.abs(wave).max()
+    return wave / largest
 
 
-def _memory(period: float, time: float, damping: float, *, dt: float, count: int) -> np.ndarray:
+def _memory(period: float, time: float, damping: float, *, dt: float, count: int) -> Array:
     """Return what the acceleration at each sample adds to an oscillator's response at a time."""
     if period == 0.0:
-        return (np.arange(count) == round(time / dt)).astype(float)
+        return np.equal(np.arange(count), round(time / dt)).astype(float)
     omega = 2.0 * np.pi / period
     damped = omega * np.sqrt(1.0 - damping**2)
     ago = time - np.arange(min(int(time / dt) + 1, count)) * dt
@@ -264,5 +290,5 @@ def _lag(period: float, damping: float) -> float:
     return float(np.argmax(np.abs(response)) * dt - centre)
 
 
-def _apart(found: np.ndarray, target: np.ndarray) -> float:
+def _apart(found: Array, target: Array) -> float:
     return float(np.sqrt(np.mean((found / target - 1.0) ** 2)))

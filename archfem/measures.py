@@ -36,7 +36,14 @@ class Measures:
 
 
 def measures(motion: Motion, component: str = "horizontal") -> Measures:
-    """Measure one component of a motion; velocity and displacement as integrated, drift included.
+    """Return how strong a component is; velocity and displacement as integrated, drift included.
+
+    Args:
+        motion: the ground motion.
+        component: horizontal, vertical or transverse.
+
+    Raises:
+        InvalidInput: there is no such component.
 
     References:
         Arias, A measure of earthquake intensity (1970). Housner, Spectrum intensities of

@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 
 from archfem import signals
-from archfem.arguments import instance, real, whole
+from archfem.arguments import instance
 from archfem.errors import InvalidInput
-from archfem.records.channel import Channel
-from archfem.records.read import read_channels
-from archfem.synthetic import enveloped_noise
+from archfem.records.read import read_components
+from archfem.signals import Array
+from archfem.synthetic import accelerogram
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = ("horizontal", "vertical", "transverse")
-
-LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
-"""No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +35,14 @@ class Motion:
         transverse: the other horizontal (k,) [m/s²], or None; only `rotated` makes use of it.
 
     Raises:
-        InvalidInput: a component is not a row of finite numbers or exceeds 5 g, or dt is not
-            positive.
+        InvalidInput: a component is no row of finite numbers up to 5 g, or dt is not positive.
     """
 
-    horizontal: np.ndarray
+    horizontal: Array
     dt: float
-    vertical: np.ndarray | None = None
+    vertical: Array | None = None
     name: str = ""
-    transverse: np.ndarray | None = field(default=None, kw_only=True)
+    transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
@@ -55,7 +51,7 @@ class Motion:
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
-                object.__setattr__(self, component, _checked(samples, component))
+                object.__setattr__(self, component, signals.checked(samples, component))
 
     @classmethod
     def read(
@@ -68,11 +64,10 @@ class Motion:
         units: str | None = None,
         dt: float | None = None,
     ) -> "Motion":
-        """Read a record; the format is found by the content of the file.
+        """Return the motion of a record; the format is found by the content of the file.
 
-        A file with one component gives it as the horizontal, whatever its direction. One with
-        several gives its first horizontal, its vertical (turned up), and its second horizontal as
-        the transverse.
+        A single component is the horizontal, whatever its direction. Of several, the first level
+        one is the horizontal, the second the transverse; the vertical is turned up.
 
         Args:
             path: PEER AT2, AFAD, ESM/ITACA, COSMOS V2, CSMIP/CDMG V2, USGS SMC, K-NET, or columns.
@@ -86,36 +81,17 @@ class Motion:
         Raises:
             InvalidInput: what cannot be read without doubt, with file and line.
         """
-        channels = read_channels(path, column=column, units=units, dt=dt)
-        motion = cls._from_channels(channels, Path(path))
+        channels = read_components(path, column=column, units=units, dt=dt)
+        rows: dict[str, Any] = {name: channel.samples for name, channel in channels.items()}
+        try:
+            motion = cls(**rows, dt=channels["horizontal"].dt, name=Path(path).stem)
+        except InvalidInput as error:
+            raise InvalidInput(f"{path}: {error}") from error
         if vertical is not None:
             motion = motion.with_vertical(cls.read(vertical))
         if transverse is not None:
             motion = motion.with_transverse(cls.read(transverse))
         return motion
-
-    @classmethod
-    def _from_channels(cls, channels: list[Channel], path: Path) -> "Motion":
-        steps = {channel.dt for channel in channels}
-        level = [channel for channel in channels if not channel.is_vertical]
-        upright = [channel for channel in channels if channel.is_vertical]
-        if len(channels) == 1:
-            level, upright = channels, []
-        if len(steps) > 1 or len(upright) > 1 or not 1 <= len(level) <= 2:
-            names = ", ".join(channel.direction or "?" for channel in channels)
-            raise InvalidInput(
-                f"{path}: components {names} are not those of one instrument: choose with column="
-            )
-        try:
-            return cls(
-                level[0].samples,
-                steps.pop(),
-                vertical=upright[0].samples if upright else None,
-                transverse=level[1].samples if len(level) == 2 else None,
-                name=path.stem,
-            )
-        except InvalidInput as error:
-            raise InvalidInput(f"{path}: {error}") from error
 
     @classmethod
     def synthetic(
@@ -127,37 +103,25 @@ class Motion:
         dt: float = 0.005,
         vertical_ratio: float = 2.0 / 3.0,
     ) -> "Motion":
-        """Make an artificial accelerogram without drift: Kanai-Tajimi noise under an envelope.
+        """Return an artificial accelerogram without drift, as `synthetic` makes it from noise.
 
         Args:
             duration: time of the last sample [s].
             pga: horizontal peak [m/s²].
             seed: the same seed gives the same motion.
             dt: time between samples [s].
-            vertical_ratio: vertical peak by horizontal peak; 0 leaves the vertical out.
+            vertical_ratio: vertical peak by horizontal peak [-]; 0 leaves the vertical out.
+
+        Raises:
+            InvalidInput: fewer than 50 samples, or pga, ratio or seed out of range.
         """
-        given = {"duration [s]": duration, "pga [m/s²]": pga, "dt [s]": dt}
-        for key, value in (given | {"vertical_ratio [-]": vertical_ratio}).items():
-            real(value, f"synthetic motion, {key}")
-        if not (duration >= 50 * dt > 0.0 and pga > 0.0 and vertical_ratio >= 0.0):
-            raise InvalidInput(
-                f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
-                f"{vertical_ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
-            )
-        whole(seed, "seed of a synthetic motion", least=0)
-        random = np.random.default_rng(seed)
-        count = round(duration / dt) + 1
-        level = pga * enveloped_noise(count, dt, random=random)
-        upright = (
-            vertical_ratio * pga * enveloped_noise(count, dt, random=random, component="vertical")
-        )
-        return cls(level, dt, upright if vertical_ratio else None, name=f"synthetic {seed}")
+        level, upright = accelerogram(duration, dt, pga=pga, ratio=vertical_ratio, seed=seed)
+        return cls(level, dt, upright, name=f"synthetic {seed}")
 
     @property
     def duration(self) -> float:
         """Time of the last sample of the longest component [s]."""
-        longest = max(len(self.component(name)) for name in self.components)
-        return (longest - 1) * self.dt
+        return (max(len(self.component(name)) for name in self.components) - 1) * self.dt
 
     @property
     def pga(self) -> float:
@@ -169,34 +133,51 @@ class Motion:
         """Names of the components there are."""
         return tuple(name for name in COMPONENTS if getattr(self, name) is not None)
 
-    def component(self, name: str) -> np.ndarray:
-        """Return the accelerations of one component (n,) [m/s²]."""
+    def component(self, name: str) -> Array:
+        """Return the accelerations of one component (n,) [m/s²].
+
+        Args:
+            name: horizontal, vertical or transverse.
+
+        Raises:
+            InvalidInput: the motion has no such component.
+        """
         if name not in self.components:
             raise InvalidInput(
                 f"motion {self.name!r} has no component {name!r}, only {', '.join(self.components)}"
             )
-        return getattr(self, name)
+        samples: Array = getattr(self, name)
+        return samples
 
-    def times(self, component: str = "horizontal") -> np.ndarray:
-        """Return the times of the samples of one component (n,) [s]."""
-        return np.arange(len(self.component(component))) * self.dt
-
-    def velocity(self, component: str = "horizontal") -> np.ndarray:
-        """Return the ground velocity (n,) [m/s]."""
-        return signals.velocity(self.component(component), self.dt)
-
-    def displacement(self, component: str = "horizontal") -> np.ndarray:
-        """Return the ground displacement (n,) [m]."""
-        return signals.displacement(self.component(component), self.dt)
-
-    def at(self, times: float | np.ndarray) -> np.ndarray:
-        """Return the acceleration at any times, straight between samples, zero outside the record.
+    def times(self, component: str = "horizontal") -> Array:
+        """Return the times of the samples of one component (n,) [s].
 
         Args:
-            times: times (n,) [s].
+            component: horizontal, vertical or transverse.
+        """
+        return np.arange(len(self.component(component))) * self.dt
 
-        Returns:
-            Horizontal and vertical acceleration (n, 2) [m/s²].
+    def velocity(self, component: str = "horizontal") -> Array:
+        """Return the ground velocity (n,) [m/s], at rest at first.
+
+        Args:
+            component: horizontal, vertical or transverse.
+        """
+        return signals.velocity(self.component(component), self.dt)
+
+    def displacement(self, component: str = "horizontal") -> Array:
+        """Return the ground displacement (n,) [m], at rest at first.
+
+        Args:
+            component: horizontal, vertical or transverse.
+        """
+        return signals.displacement(self.component(component), self.dt)
+
+    def at(self, times: float | Array) -> Array:
+        """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
+
+        Args:
+            times: times (n,) [s]; straight between samples, zero outside the record.
         """
         moments = np.atleast_1d(np.asarray(times, dtype=float))
         both = np.zeros((len(moments), 2))
@@ -206,67 +187,118 @@ class Motion:
         return both
 
     def scaled(self, factor: float) -> "Motion":
-        """Multiply all components by a factor [-]; a negative one turns them round."""
+        """Return the motion with all components multiplied by a factor.
+
+        Args:
+            factor: what to multiply by [-]; a negative one turns the motion round.
+        """
         return self._each(lambda samples: factor * samples)
 
     def reversed(self) -> "Motion":
-        """Turn the horizontal components round, as if the structure faced the other way."""
-        turned = {name: -self.component(name) for name in self.components if name != "vertical"}
-        return replace(self, **turned)  # type: ignore[arg-type]
+        """Return the motion with its horizontals turned: as if the structure faced backwards."""
+        return replace(self.scaled(-1.0), vertical=self.vertical)
 
     def scaled_to_pga(self, pga: float) -> "Motion":
-        """Scale all components by the one factor that gives the horizontal this peak [m/s²]."""
+        """Return the motion with all components scaled by one factor, to a horizontal peak.
+
+        Args:
+            pga: peak of the horizontal to reach [m/s²].
+
+        Raises:
+            InvalidInput: the horizontal is at rest, or pga is not positive.
+        """
         if self.pga == 0.0 or not pga > 0.0:
             raise InvalidInput(f"scaling a peak of {self.pga:g} to {pga:g} m/s²: both must be > 0")
         return self.scaled(pga / self.pga)
 
     def cut(self, start: float, end: float | None = None) -> "Motion":
-        """Keep the samples from start to end [s]; a component that ended before keeps one zero."""
+        """Return the samples from start to end; a component that ended before keeps one zero.
+
+        Args:
+            start: time of the first sample kept [s].
+            end: time of the last [s]; None keeps all to the end.
+
+        Raises:
+            InvalidInput: the start is negative, or no sample of the horizontal is left.
+        """
         stop = self.duration if end is None else end
-        first = int(np.ceil(round(start / self.dt, 6)))
-        last = int(np.floor(round(stop / self.dt, 6))) + 1
-        if start < 0.0 or first >= len(self.horizontal) or last <= first:
+        first = np.ceil(round(start / self.dt, 6))
+        last = np.floor(round(min(stop, self.duration) / self.dt, 6))
+        if not (start >= 0.0 and first < len(self.horizontal) and first <= last):
             raise InvalidInput(
                 f"cut from {start:g} to {stop:g} s: nothing of the {self.duration:g} s is left"
             )
-        return self._each(
-            lambda samples: samples[first:last] if first < len(samples) else np.zeros(1)
-        )
+        kept = slice(int(first), int(last) + 1)
+        return self._each(lambda samples: samples[kept] if len(samples[kept]) else np.zeros(1))
 
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
-        """Cut to where the horizontal's Arias intensity is between two fractions of its end."""
+        """Return the part of significant duration, after Trifunac and Brady (1975).
+
+        Args:
+            low: fraction of the horizontal's Arias intensity at which it begins [-].
+            high: fraction at which it ends [-].
+
+        Raises:
+            InvalidInput: not 0 <= low < high <= 1, or the horizontal is at rest.
+        """
         return self.cut(*signals.significant_window(self.horizontal, self.dt, low, high))
 
     def resampled(self, dt: float) -> "Motion":
-        """Sample anew at a step dt [s] by straight lines, keeping all peaks; it does not filter."""
-        if not dt > 0.0:
-            raise InvalidInput(f"dt {dt!r} s: the time between samples is a positive number")
+        """Return the motion sampled anew by straight lines, with all its peaks and no filter.
+
+        Args:
+            dt: the new time between samples [s].
+
+        Raises:
+            InvalidInput: dt is not positive and finite.
+        """
         return replace(self._each(lambda samples: signals.resampled(samples, self.dt, dt)), dt=dt)
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
-        """Take out the drift with a polynomial: velocity and displacement end at zero."""
+        """Return the motion without drift, as `signals.baseline_corrected` does it.
+
+        Args:
+            degree: of the polynomial taken out of the displacement, at least 3.
+
+        Raises:
+            InvalidInput: the degree is below 3, or not below the number of samples.
+        """
         return self._each(lambda samples: signals.baseline_corrected(samples, self.dt, degree))
 
     def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
-        """Keep the frequencies from low to high [Hz], without shift in time (Butterworth)."""
-        return self._each(
-            lambda samples: signals.band_passed(samples, self.dt, low, high, order=order)
-        )
+        """Return the motion with its frequencies in a band, as `signals.band_passed` does it.
+
+        Args:
+            low: lowest frequency kept [Hz].
+            high: highest frequency kept [Hz].
+            order: of the filter, which runs forwards and backwards.
+
+        Raises:
+            InvalidInput: not 0 < low < high < half the sampling frequency, or the order below 1.
+        """
+        return self._each(lambda row: signals.band_passed(row, self.dt, low, high, order=order))
 
     def rotated(self, angle: float) -> "Motion":
-        """Turn the horizontal axes by an angle [rad] from the horizontal towards the transverse."""
-        level, across = self.horizontal, self.component("transverse")
-        count = max(len(level), len(across))
-        level, across = (np.pad(part, (0, count - len(part))) for part in (level, across))
-        cosine, sine = np.cos(angle), np.sin(angle)
-        return replace(
-            self,
-            horizontal=cosine * level + sine * across,
-            transverse=cosine * across - sine * level,
-        )
+        """Return the motion along horizontal axes turned from the horizontal to the transverse.
+
+        Args:
+            angle: by which the axes turn [rad].
+
+        Raises:
+            InvalidInput: there is no transverse.
+        """
+        level, across = signals.rotated(self.horizontal, self.component("transverse"), angle)
+        return replace(self, horizontal=level, transverse=across)
 
     def with_vertical(self, other: "Motion | None") -> "Motion":
-        """Take the vertical of another motion, or the only component it has; None leaves it out."""
+        """Return the motion with the vertical of another one.
+
+        Args:
+            other: gives its vertical, or without one its horizontal; None leaves the vertical out.
+
+        Raises:
+            InvalidInput: the steps of the two differ.
+        """
         if other is None:
             return replace(self, vertical=None)
         self._check_step(other)
@@ -274,7 +306,14 @@ class Motion:
         return replace(self, vertical=upright)
 
     def with_transverse(self, other: "Motion") -> "Motion":
-        """Take the horizontal of another motion as the transverse."""
+        """Return the motion with the horizontal of another one as its transverse.
+
+        Args:
+            other: gives its horizontal.
+
+        Raises:
+            InvalidInput: the steps of the two differ.
+        """
         self._check_step(other)
         return replace(self, transverse=other.horizontal)
 
@@ -285,26 +324,6 @@ class Motion:
                 "bring one to the other's with resampled"
             )
 
-    def _each(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
+    def _each(self, change: Callable[[Array], Array]) -> "Motion":
         changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
         return replace(self, **changed)
-
-
-def _checked(samples: np.ndarray | None, component: str) -> np.ndarray:
-    """Return a component as its own read-only row of finite numbers below 5 g."""
-    try:
-        row = np.array(samples, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
-    if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
-        raise InvalidInput(
-            f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
-        )
-    peak = np.abs(row).max()
-    if peak > LARGEST_PEAK:
-        raise InvalidInput(
-            f"{component} acceleration reaches {peak / STANDARD_GRAVITY:.3g} g, more than 5 g: "
-            "that can only be a wrong unit (m/s² expected)"
-        )
-    row.setflags(write=False)
-    return row

@@ -2,10 +2,13 @@
 
 import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
+from numpy.typing import NDArray
 from scipy import linalg
 
 from archfem.arguments import real
 from archfem.errors import InvalidInput
+
+Array = NDArray[np.float64]
 
 SAMPLES_PER_PERIOD = 40
 """The record is interpolated until an oscillation has this many samples."""
@@ -14,8 +17,8 @@ _FINEST = 1000  # parts of a step; an oscillator still stiffer follows the groun
 
 
 def peak_responses(
-    samples: np.ndarray, dt: float, periods: np.ndarray, damping: float
-) -> tuple[np.ndarray, np.ndarray]:
+    samples: Array, dt: float, periods: Array, damping: float
+) -> tuple[Array, Array]:
     """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs.
 
     u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample (Nigam and Jennings). The
@@ -40,7 +43,7 @@ def peak_responses(
     """
     check(periods, damping)
     values, times = np.empty(len(periods)), np.empty(len(periods))
-    finer: dict[int, np.ndarray] = {1: samples}
+    finer: dict[int, Array] = {1: samples}
     for index, period in enumerate(periods):
         if period == 0.0:
             largest = int(np.argmax(np.abs(samples)))
@@ -56,11 +59,17 @@ def peak_responses(
     return values, times
 
 
-def displacement(samples: np.ndarray, dt: float, period: float, damping: float) -> np.ndarray:
+def displacement(samples: Array, dt: float, period: float, damping: float) -> Array:
     """Return the relative displacement of one oscillator (n,) [m], exact for straight samples.
 
     The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
     u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀, a digital filter.
+
+    Args:
+        samples: ground accelerations (n,) [m/s²].
+        dt: time between samples [s].
+        period: natural period [s], not zero.
+        damping: ratio to the critical [-].
     """
     omega = 2.0 * np.pi / period
     # States u, v, and the input with its slope: a' = s, s' = 0.
@@ -81,24 +90,39 @@ def displacement(samples: np.ndarray, dt: float, period: float, damping: float) 
     determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
     # At rest at the first sample, whatever the acceleration there.
     rest = samples[0] * np.array([-numerator[0], now[0] - numerator[1]])
-    return scipy.signal.lfilter(numerator, [1.0, -trace, determinant], samples, zi=rest)[0]
+    denominator = [1.0, -trace, determinant]
+    moved: Array = scipy.signal.lfilter(numerator, denominator, samples, zi=rest)[0]
+    return moved
 
 
-def interpolated(samples: np.ndarray, parts: int) -> np.ndarray:
-    """Divide every step of the samples into parts, by straight lines."""
+def interpolated(samples: Array, parts: int) -> Array:
+    """Return the samples with every step divided into parts, by straight lines.
+
+    Args:
+        samples: values (n,).
+        parts: how many parts a step gets.
+    """
     fine = np.arange((len(samples) - 1) * parts + 1) / parts
     return np.interp(fine, np.arange(len(samples)), samples)
 
 
-def check(periods: np.ndarray, damping: float) -> None:
-    """Refuse periods and damping ratios no oscillator has."""
+def check(periods: Array, damping: float) -> None:
+    """Refuse periods and damping ratios no oscillator has.
+
+    Args:
+        periods: natural periods, of any shape [s].
+        damping: ratio to the critical [-].
+
+    Raises:
+        InvalidInput: a period is negative or not finite, or the damping not from 0 to below 1.
+    """
     if not (np.all(np.isfinite(periods)) and np.all(np.asarray(periods) >= 0.0)):
         raise InvalidInput("periods of a spectrum: expected finite values from 0 s upwards")
     if not 0.0 <= real(damping, "damping ratio [-]") < 1.0:
         raise InvalidInput(f"damping ratio {damping!r}: expected from 0 to below 1 (5 % is 0.05)")
 
 
-def _parabola_peak(row: np.ndarray) -> tuple[float, float]:
+def _parabola_peak(row: Array) -> tuple[float, float]:
     """Return the extreme value of a smooth row and its place, between the samples."""
     top = int(np.argmax(np.abs(row)))
     if top in (0, len(row) - 1):

@@ -14,9 +14,10 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import EveryMechanism, possible_counts
 from archfem.history import Ending
 from archfem.models import Model
-from archfem.motion import LARGEST_PEAK, Motion
+from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
+from archfem.signals import LARGEST_PEAK
 from archfem.statics import Equilibrium, dead_load
 from archfem.tables import aligned
 from archfem.verdicts import DEFINITIONS, first_mechanisms

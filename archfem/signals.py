@@ -2,13 +2,47 @@
 
 import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
+from numpy.typing import NDArray
 from scipy import integrate
 
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
 
+Array = NDArray[np.float64]
 
-def velocity(samples: np.ndarray, dt: float) -> np.ndarray:
+LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
+"""No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""
+
+
+def checked(samples: Array | None, component: str) -> Array:
+    """Return a component as its own read-only row of finite numbers below 5 g.
+
+    Args:
+        samples: accelerations (n,) [m/s²], or what was given for them.
+        component: its name, for errors.
+
+    Raises:
+        InvalidInput: it is not one row of finite numbers, or exceeds 5 g.
+    """
+    try:
+        row = np.array(samples, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
+    if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
+        raise InvalidInput(
+            f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
+        )
+    peak = np.abs(row).max()
+    if peak > LARGEST_PEAK:
+        raise InvalidInput(
+            f"{component} acceleration reaches {peak / STANDARD_GRAVITY:.3g} g, more than 5 g: "
+            "that can only be a wrong unit (m/s² expected)"
+        )
+    row.setflags(write=False)
+    return row
+
+
+def velocity(samples: Array, dt: float) -> Array:
     """Integrate an acceleration that runs straight from sample to sample; at rest at first.
 
     Args:
@@ -18,10 +52,11 @@ def velocity(samples: np.ndarray, dt: float) -> np.ndarray:
     Returns:
         Velocities (n,) [m/s].
     """
-    return integrate.cumulative_trapezoid(samples, dx=dt, initial=0.0)
+    integral: Array = integrate.cumulative_trapezoid(samples, dx=dt, initial=0.0)
+    return integral
 
 
-def displacement(samples: np.ndarray, dt: float) -> np.ndarray:
+def displacement(samples: Array, dt: float) -> Array:
     """Integrate an acceleration that runs straight from sample to sample twice; at rest at first.
 
     In a step d₁ = d₀ + v₀ Δt + (2 a₀ + a₁) Δt²/6, which is exact.
@@ -37,7 +72,7 @@ def displacement(samples: np.ndarray, dt: float) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-def baseline_corrected(samples: np.ndarray, dt: float, degree: int = 6) -> np.ndarray:
+def baseline_corrected(samples: Array, dt: float, degree: int = 6) -> Array:
     """Take the drift out of an acceleration: it ends with no velocity and no displacement.
 
     The polynomial p(t) = c₂ t² + ... of least squares distance to the displacement, among those
@@ -51,6 +86,9 @@ def baseline_corrected(samples: np.ndarray, dt: float, degree: int = 6) -> np.nd
 
     Returns:
         Accelerations (n,) [m/s²].
+
+    Raises:
+        InvalidInput: the degree is below 3, or not below the number of samples.
 
     References:
         Chiou, Darragh, Gregor, Silva, NGA project strong-motion database, Earthquake Spectra 24
@@ -74,12 +112,11 @@ def baseline_corrected(samples: np.ndarray, dt: float, degree: int = 6) -> np.nd
     least = np.linalg.lstsq(ends, goal, rcond=None)[0]
     null = np.linalg.svd(ends)[2][2:].T
     free = np.linalg.lstsq(shapes @ null, moved - shapes @ least, rcond=None)[0]
-    return samples - bends @ (least + null @ free)
+    drift: Array = bends @ (least + null @ free)
+    return samples - drift
 
 
-def band_passed(
-    samples: np.ndarray, dt: float, low: float, high: float, *, order: int = 4
-) -> np.ndarray:
+def band_passed(samples: Array, dt: float, low: float, high: float, *, order: int = 4) -> Array:
     """Keep the frequencies between two corners, without shift in time.
 
     A Butterworth filter run forwards and backwards over the record with 1.5 order/low seconds of
@@ -90,13 +127,13 @@ def band_passed(
         dt: time between samples [s].
         low: lower corner [Hz].
         high: upper corner [Hz].
-        order: order of the filter in each direction.
+        order: order of the filter in each direction, at least 1.
 
     Returns:
         Accelerations (n,) [m/s²].
 
     Raises:
-        InvalidInput: not 0 < low < high < half the sampling frequency.
+        InvalidInput: not 0 < low < high < half the sampling frequency, or the order is below 1.
 
     References:
         Converse, Brady, BAP: basic strong-motion accelerogram processing, USGS OFR 92-296A (1992).
@@ -106,14 +143,16 @@ def band_passed(
             f"band from {low:g} to {high:g} Hz at a step of {dt:g} s: expected "
             f"0 < low < high < {0.5 / dt:g} Hz"
         )
+    if order < 1:
+        raise InvalidInput(f"filter of order {order!r}: expected 1 or more")
     pad = int(np.ceil(1.5 * order / low / dt))
     filter_ = scipy.signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
-    padded = np.pad(samples, pad)
-    return scipy.signal.sosfiltfilt(filter_, padded, padlen=0)[pad:-pad]
+    passed: Array = scipy.signal.sosfiltfilt(filter_, np.pad(samples, pad), padlen=0)
+    return passed[pad:-pad]
 
 
-def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
-    """Sample anew by straight lines, and keep every peak.
+def resampled(samples: Array, dt: float, new_dt: float) -> Array:
+    """Return samples taken anew by straight lines, with every peak kept.
 
     Each turning point of the old samples is put on the nearest new one; where several meet, the
     largest stays. Peaks move by half a new step at most and keep their values.
@@ -125,7 +164,12 @@ def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
 
     Returns:
         Accelerations (m,) [m/s²] that last at least as long.
+
+    Raises:
+        InvalidInput: the new step is not positive and finite.
     """
+    if not 0.0 < new_dt < np.inf:
+        raise InvalidInput(f"dt {new_dt!r} s: the time between samples is a positive number")
     count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
     new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
     rises = np.diff(samples, prepend=samples[0] + 1.0, append=samples[-1] + 1.0) > 0.0
@@ -135,10 +179,14 @@ def resampled(samples: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
     return new
 
 
-def between(samples: np.ndarray, places: np.ndarray) -> np.ndarray:
+def between(samples: Array, places: Array) -> Array:
     """Return values at places counted in samples (m,), straight in between and zero outside.
 
     There is no search in it: a time stepper asks often.
+
+    Args:
+        samples: values (n,).
+        places: where, in samples from the first (m,) [-].
     """
     last = len(samples) - 1
     lower = np.clip(np.floor(places), 0, max(last - 1, 0)).astype(int)
@@ -148,16 +196,50 @@ def between(samples: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.where((places >= 0.0) & (places <= last + 1e-6), values, 0.0)
 
 
-def arias(samples: np.ndarray, dt: float) -> np.ndarray:
-    """Return how Arias intensity grows: π/(2 g) ∫ a² dt (n,) [m/s], Arias (1970)."""
-    energy = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
+def rotated(level: Array, across: Array, angle: float) -> tuple[Array, Array]:
+    """Return two horizontals along axes turned from the first towards the second.
+
+    Args:
+        level: accelerations along the first axis (n,) [m/s²].
+        across: accelerations along the second axis (m,) [m/s²].
+        angle: by which the axes turn [rad].
+
+    Returns:
+        Both as long as the longer one [m/s²], the shorter followed by zeros.
+    """
+    count = max(len(level), len(across))
+    level, across = (np.pad(part, (0, count - len(part))) for part in (level, across))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return cosine * level + sine * across, cosine * across - sine * level
+
+
+def arias(samples: Array, dt: float) -> Array:
+    """Return how Arias intensity grows: π/(2 g) ∫ a² dt (n,) [m/s].
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+
+    References:
+        Arias, A measure of earthquake intensity (1970).
+    """
+    energy: Array = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
     return np.pi / (2.0 * STANDARD_GRAVITY) * energy
 
 
 def significant_window(
-    samples: np.ndarray, dt: float, low: float = 0.05, high: float = 0.95
+    samples: Array, dt: float, low: float = 0.05, high: float = 0.95
 ) -> tuple[float, float]:
     """Return when Arias intensity passes two fractions of its end [s].
+
+    Args:
+        samples: accelerations (n,) [m/s²].
+        dt: time between samples [s].
+        low: fraction at which the window begins [-].
+        high: fraction at which it ends [-].
+
+    Raises:
+        InvalidInput: not 0 <= low < high <= 1, or the samples are all zero.
 
     References:
         Trifunac, Brady, A study on the duration of strong earthquake ground motion, BSSA 65 (1975).

@@ -6,15 +6,16 @@ from archfem import oscillator
 from archfem.arguments import instance
 from archfem.errors import InvalidInput
 from archfem.motion import Motion
+from archfem.signals import Array
 
 
 def response_spectrum(
     motion: Motion,
-    periods: float | np.ndarray,
+    periods: float | Array,
     damping: float = 0.05,
     *,
     component: str = "horizontal",
-) -> np.ndarray:
+) -> Array:
     """Return the pseudo-acceleration spectrum of one component: ω² times the largest displacement.
 
     Solved exactly for an acceleration that runs straight between samples; the record is
@@ -44,13 +45,25 @@ def response_spectrum(
         raise InvalidInput(f"periods {periods!r} s are no numbers") from error
     samples = motion.component(component)
     peaks = oscillator.peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
-    return np.abs(peaks).reshape(natural.shape)
+    spectrum: Array = np.abs(peaks)
+    return spectrum.reshape(natural.shape)
 
 
 def scaled_to_spectrum(
     motion: Motion, value: float, period: float, *, damping: float = 0.05
 ) -> Motion:
-    """Scale a motion so that its horizontal spectrum has a value [m/s²] at a period [s]."""
+    """Return the motion scaled so that its horizontal spectrum has a value at a period.
+
+    Args:
+        motion: the motion; the one factor acts on all its components.
+        value: pseudo-acceleration to reach [m/s²].
+        period: natural period at which it is reached [s].
+        damping: ratio to the critical [-].
+
+    Raises:
+        InvalidInput: the motion is at rest, the value is not positive, or no oscillator has such a
+            period or damping.
+    """
     now = float(response_spectrum(motion, period, damping))
     if now == 0.0 or not value > 0.0:
         raise InvalidInput(

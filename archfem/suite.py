@@ -9,6 +9,7 @@ from archfem.codes import DesignSpectrum
 from archfem.errors import InvalidInput
 from archfem.matching import Match, matched
 from archfem.motion import Motion
+from archfem.signals import Array
 from archfem.spectra import response_spectrum
 
 
@@ -53,10 +54,18 @@ class Suite:
         scale: float = 1.0,
         reduction: float = 1.0,
     ) -> "Suite":
-        """Give each vertical to as many horizontals in turn: of six and three, two to each.
+        """Return a suite that gives each vertical to as many horizontals: of six and three, to two.
+
+        Args:
+            name: what to call it.
+            horizontals: motions, one for each pair.
+            verticals: motions whose vertical is taken, or the only component they have.
+            scale: factor on all of them [-].
+            reduction: factor R [-].
 
         Raises:
-            InvalidInput: the number of horizontals is no multiple of the number of verticals.
+            InvalidInput: the number of horizontals is no multiple of the number of verticals, or
+                the steps of two that meet differ.
         """
         if not verticals or len(horizontals) % len(verticals):
             raise InvalidInput(
@@ -80,15 +89,20 @@ class Suite:
         duration: float = 20.0,
         reduction: float = 1.0,
     ) -> "Suite":
-        """Make artificial motions matched to a spectrum, from a seed and no file.
+        """Return artificial motions matched to a spectrum, made from a seed and no file.
 
         Args:
             spectrum: target of horizontals and verticals.
             horizontals: how many pairs there are.
-            verticals: how many different verticals they share.
+            verticals: how many different verticals they share, at most one each.
             seed: the same seed gives the same suite.
             duration: of each motion [s].
             reduction: factor R [-].
+
+        Raises:
+            InvalidInput: the pairs cannot share the verticals evenly, or the duration is shorter
+                than twice the longest period matched.
+            DidNotConverge: a motion did not come near the spectrum.
         """
         made = [
             Motion.synthetic(seed=seed + index, duration=duration) for index in range(horizontals)
@@ -97,12 +111,20 @@ class Suite:
         return share.matched(spectrum)
 
     def matched(self, spectrum: DesignSpectrum) -> "Suite":
-        """Match every pair to a spectrum (see `matching`)."""
+        """Return the suite with every pair matched to a spectrum, as `matching.matched` does it.
+
+        Args:
+            spectrum: target of horizontals and verticals.
+
+        Raises:
+            InvalidInput: a pair is at rest or too short, or the spectrum lacks what it needs.
+            DidNotConverge: a pair did not come near the spectrum.
+        """
         matches = tuple(matched(pair, spectrum) for pair in self.pairs)
         return replace(self, pairs=tuple(match.motion for match in matches), matches=matches)
 
     def reversed(self) -> "Suite":
-        """Turn the horizontals round, as if the structure faced the other way."""
+        """Return the suite with its horizontals turned: as if the structure faced backwards."""
         return replace(self, pairs=tuple(pair.reversed() for pair in self.pairs))
 
     @property
@@ -111,9 +133,18 @@ class Suite:
         return tuple(pair.scaled(self.scale / self.reduction) for pair in self.pairs)
 
     def spectra(
-        self, periods: np.ndarray, *, component: str = "horizontal", damping: float = 0.05
-    ) -> np.ndarray:
-        """Return the spectra of the pairs (n_pairs, n_periods) [m/s²], scaled but not reduced."""
+        self, periods: Array, *, component: str = "horizontal", damping: float = 0.05
+    ) -> Array:
+        """Return the spectra of the pairs (n_pairs, n_periods) [m/s²], scaled but not reduced.
+
+        Args:
+            periods: natural periods (n_periods,) [s].
+            component: horizontal, vertical or transverse.
+            damping: ratio to the critical [-].
+
+        Raises:
+            InvalidInput: a pair has no such component, or no oscillator such a period or damping.
+        """
         return self.scale * np.array(
             [response_spectrum(pair, periods, damping, component=component) for pair in self.pairs]
         )

@@ -5,19 +5,27 @@ import re
 import numpy as np
 
 from archfem.records.channel import Channel
-from archfem.records.text import COUNT, NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText
+from archfem.records.units import units_written
 
 _DIRECTION = r"[NSEWUD]-[NSEWUD]"
 _RAW_PEAK = 0.5  # the header's peaks are those before AFAD took the offset out
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the header counts data the way AFAD does."""
+    """Return whether the header counts data the way AFAD does.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"^\s*NUMBER OF DATA\s*:", 40) and text.holds(r"SAMPLING INTERVAL", 40)
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the three components.
+    """Return the three components.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: count, step, unit or directions are missing, or the samples contradict them.

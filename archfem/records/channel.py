@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-import numpy as np
+from archfem.records.text import Array
 
 _DOWN = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
 _VERTICAL = re.compile(r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE)
@@ -20,14 +20,20 @@ class Channel:
         is_vertical: whether the component is the vertical one.
     """
 
-    samples: np.ndarray
+    samples: Array
     dt: float
     direction: str = ""
     is_vertical: bool = False
 
     @classmethod
-    def directed(cls, samples: np.ndarray, dt: float, direction: str) -> "Channel":
-        """Make a channel from a file's samples; a vertical that counts downwards is turned up."""
+    def directed(cls, samples: Array, dt: float, direction: str) -> "Channel":
+        """Return the channel of a file's samples; a vertical that counts downwards is turned up.
+
+        Args:
+            samples: accelerations (n,) [m/s²].
+            dt: time between samples [s].
+            direction: what the file calls the component; it tells whether this is a vertical.
+        """
         name = direction.strip()
         if _DOWN.search(name):
             return cls(-samples, dt, f"{name}, turned up", True)

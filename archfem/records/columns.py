@@ -5,7 +5,8 @@ import re
 import numpy as np
 
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, RecordText, unit_named, units_written
+from archfem.records.text import NUMBER, Array, RecordText
+from archfem.records.units import unit_named, units_written
 
 _STEP = re.compile(
     rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER})\s*(ms)?",
@@ -22,7 +23,7 @@ _JITTER = 0.25  # of a step: what rounding in print does to a time column
 def read(
     text: RecordText, *, column: int | None, units: str | None, dt: float | None
 ) -> list[Channel]:
-    """Read the acceleration columns of a plain file.
+    """Return the acceleration columns of a plain file.
 
     Lines before the first line of numbers, and lines that begin with `#`, `%`, `!` or `*`, are
     comments; they may state units and step. A first column that grows is time.
@@ -60,7 +61,7 @@ def read(
     return [Channel.directed(rows[:, index] * unit, step, name) for index, name in pairs]
 
 
-def _rows(text: RecordText) -> tuple[np.ndarray, list[int], str]:
+def _rows(text: RecordText) -> tuple[Array, list[int], str]:
     """Return the table of numbers (n, columns), its lines, and all comments in one string."""
     start = text.header_length()
     comments, table, lines = list(text.lines[:start]), [], []
@@ -83,8 +84,8 @@ def _rows(text: RecordText) -> tuple[np.ndarray, list[int], str]:
     return np.array(table), lines, "\n".join(comments)
 
 
-def _is_time(rows: np.ndarray) -> bool:
-    """Tell whether the first of several columns is meant as time: it nearly always grows."""
+def _is_time(rows: Array) -> bool:
+    """Return whether the first of several columns is meant as time: it nearly always grows."""
     if rows.shape[1] == 1 or len(rows) < 3:
         return False
     return bool(np.mean(np.diff(rows[:, 0]) > 0.0) > 0.9)
@@ -112,7 +113,7 @@ def _told(comments: str, dt: float | None) -> list[float]:
     return told
 
 
-def _step(text: RecordText, rows: np.ndarray, lines: list[int], told: list[float]) -> float:
+def _step(text: RecordText, rows: Array, lines: list[int], told: list[float]) -> float:
     """Return the time between samples [s], the same by all that tells it."""
     if _is_time(rows):
         told = [*told, _step_of(text, rows[:, 0], lines)]
@@ -123,7 +124,7 @@ def _step(text: RecordText, rows: np.ndarray, lines: list[int], told: list[float
     return text.step(told[0])
 
 
-def _step_of(text: RecordText, times: np.ndarray, lines: list[int]) -> float:
+def _step_of(text: RecordText, times: Array, lines: list[int]) -> float:
     """Return the constant step of a time column [s]."""
     count = np.arange(len(times))
     step, begin = np.polyfit(count, times, 1)

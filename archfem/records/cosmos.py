@@ -3,7 +3,8 @@
 import re
 
 from archfem.records.channel import Channel
-from archfem.records.text import COUNT, RecordText, stated_width, units_written
+from archfem.records.text import COUNT, RecordText, stated_width
+from archfem.records.units import units_written
 
 _BLOCK = rf"^\s*({COUNT})\s+acceleration\s+pts\b(.*)$"
 _HEADER = rf"^\s*({COUNT})\s+%s-header values follow"
@@ -16,12 +17,19 @@ _UNKNOWN = -999.0
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the file states a COSMOS format, or has one of its headers."""
+    """Return whether the file states a COSMOS format, or has one of its headers.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"\(Format v\d", 3) or text.holds(r"Integer-header values follow", 40)
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the acceleration of every channel.
+    """Return the acceleration of every channel.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: a channel is incomplete, holds no acceleration, or contradicts its header.
@@ -35,7 +43,7 @@ def read(text: RecordText) -> list[Channel]:
 
 
 def _channel(text: RecordText, start: int) -> tuple[Channel, int]:
-    """Read the first channel that begins after a line; return also the line after its samples."""
+    """Return the first channel that begins after a line, and the line after its samples."""
     codes, line = _header(text, "Integer", start)
     values, line = _header(text, "Real", line)
     line, block = text.find(_BLOCK, line)
@@ -63,4 +71,4 @@ def _header(text: RecordText, kind: str, start: int) -> tuple[list[float], int]:
     numbers, after = text.block(line + 1, int(stated[1]))
     if len(numbers) <= max(_AZIMUTH, _PEAK):
         raise text.error(f"{len(numbers)} values in a header of 100", line)
-    return list(numbers), after
+    return numbers.tolist(), after

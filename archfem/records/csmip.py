@@ -1,7 +1,8 @@
 """CSMIP/CDMG volume 2 files: channels of corrected acceleration, velocity and displacement."""
 
 from archfem.records.channel import Channel
-from archfem.records.text import COUNT, NUMBER, RecordText, stated_width, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText, stated_width
+from archfem.records.units import units_written
 
 _BLOCK = rf"^\s*({COUNT})\s+POINTS OF ACCEL DATA EQUALLY SPACED AT\s+({NUMBER})\s*SEC(.*)$"
 _CHANNEL = r"\bCHAN\s+\d+:\s*(\S+(?: DEG)?)"
@@ -10,12 +11,19 @@ _END = r"END OF DATA FOR CHAN"
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether a line announces equally spaced points of accelerations."""
+    """Return whether a line announces equally spaced points of accelerations.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"POINTS OF ACCEL DATA EQUALLY SPACED", 120)
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the acceleration of every channel.
+    """Return the acceleration of every channel.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: a channel is incomplete or contradicts its header.
@@ -31,7 +39,7 @@ def read(text: RecordText) -> list[Channel]:
 
 
 def _channel(text: RecordText, start: int, end: int) -> Channel:
-    """Read the channel that stands between two lines."""
+    """Return the channel that stands between two lines."""
     line, block = text.find(_BLOCK, start, end)
     if text.holds(_BLOCK, end, line + 1):
         raise text.error("a second channel begins before the end of the first", line)

@@ -1,20 +1,28 @@
 """ESM, ITACA and AFAD-TADAS files (DYNA 1.x): a header of `KEY: value`, one sample a line."""
 
 from archfem.records.channel import Channel
-from archfem.records.text import COUNT, NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText
+from archfem.records.units import units_written
 
 _HEADER = 80  # lines
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the header has the keys of DYNA for count and step."""
+    """Return whether the header has the keys of DYNA for count and step.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"^\s*NDATA\s*:", _HEADER) or text.holds(
         r"^\s*SAMPLING_INTERVAL_S\s*:", _HEADER
     )
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the one component of the file.
+    """Return the one component of the file.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: the file holds no acceleration, lacks a key, or contradicts its header.
@@ -46,7 +54,11 @@ def _value(text: RecordText, key: str) -> str:
 
 
 def _number(text: RecordText, value: str) -> float:
-    """Return the number a key gives."""
+    """Return the number a key gives.
+
+    Raises:
+        InvalidInput: it is not a number.
+    """
     try:
         return float(value)
     except ValueError as error:

@@ -10,16 +10,23 @@ _OFFSET = 0.02  # the header's peak was taken after another estimate of the offs
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the header has the scale factor or the sampling frequency of K-NET."""
+    """Return whether the header has the scale factor or the sampling frequency of K-NET.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"^\s*Scale Factor\s", _HEADER) or text.holds(
         r"^\s*Sampling Freq\(Hz\)", _HEADER
     )
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the one component of the file; its mean is taken out.
+    """Return the one component of the file, with its mean taken out.
 
     The number of samples is the frequency by the duration of the header.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: a key is missing, or the samples contradict the header.

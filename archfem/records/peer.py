@@ -3,7 +3,8 @@
 import re
 
 from archfem.records.channel import Channel
-from archfem.records.text import COUNT, NUMBER, RecordText, units_written
+from archfem.records.text import COUNT, NUMBER, RecordText
+from archfem.records.units import units_written
 
 _HEADER = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
@@ -12,15 +13,22 @@ _AFTER = re.compile(rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT})[\s,]+({NUMBER})", re.I
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the header names both NPTS and DT."""
+    """Return whether the header names both NPTS and DT.
+
+    Args:
+        text: the file.
+    """
     return text.holds(r"\bNPTS\b", _HEADER) and text.holds(r"\bDT\b", _HEADER)
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the one component of the file.
+    """Return the one component of the file.
 
     The count and the step stand behind their names (`NPTS= 5437, DT= .0050 SEC`), in either order,
     on one line or two, or both before or after the names (`4096 0.0100 NPTS, DT`).
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: the header cannot be read, tells of no acceleration, or the count is wrong.

@@ -2,13 +2,72 @@
 
 from numbers import Real
 from os import PathLike
+from typing import Protocol
 
 from archfem.errors import InvalidInput
 from archfem.records import afad, columns, cosmos, csmip, esm, knet, peer, smc
 from archfem.records.channel import Channel
-from archfem.records.text import RecordText, unit_named
+from archfem.records.text import RecordText
+from archfem.records.units import unit_named
 
-_FORMATS = (smc, cosmos, csmip, afad, esm, knet, peer)
+
+class Format(Protocol):
+    """What the module of a format offers."""
+
+    def recognises(self, text: RecordText) -> bool:
+        """Return whether a file is of this format.
+
+        Args:
+            text: the file.
+        """
+
+    def read(self, text: RecordText) -> list[Channel]:
+        """Return the components of a file of this format, in its order.
+
+        Args:
+            text: the file.
+
+        Raises:
+            InvalidInput: the file contradicts itself or lacks what it needs.
+        """
+
+
+_FORMATS: tuple[Format, ...] = (smc, cosmos, csmip, afad, esm, knet, peer)
+
+
+def read_components(
+    path: str | PathLike[str],
+    *,
+    column: int | None = None,
+    units: str | None = None,
+    dt: float | None = None,
+) -> dict[str, Channel]:
+    """Return the components of one motion: its horizontal, and its vertical and transverse if any.
+
+    A single component is the horizontal, whatever its direction.
+
+    Args:
+        path: a file of any format that `read_channels` reads.
+        column: which component or plain column, counted from 1; None takes all.
+        units: unit of plain columns: g, m/s2, cm/s2 or gal.
+        dt: time between samples of plain columns [s].
+
+    Raises:
+        InvalidInput: what `read_channels` refuses, or channels that are not of one instrument.
+    """
+    channels = read_channels(path, column=column, units=units, dt=dt)
+    if len(channels) == 1:
+        return {"horizontal": channels[0]}
+    level = [channel for channel in channels if not channel.is_vertical]
+    upright = [channel for channel in channels if channel.is_vertical]
+    steps = {channel.dt for channel in channels}
+    if len(steps) > 1 or len(upright) > 1 or not 1 <= len(level) <= 2:
+        names = ", ".join(channel.direction or "?" for channel in channels)
+        raise InvalidInput(
+            f"{path}: components {names} are not those of one instrument: choose with column="
+        )
+    named = dict(zip(("horizontal", "transverse"), level, strict=False))
+    return named | ({"vertical": upright[0]} if upright else {})
 
 
 def read_channels(
@@ -18,7 +77,7 @@ def read_channels(
     units: str | None = None,
     dt: float | None = None,
 ) -> list[Channel]:
-    """Read all components of a record, or one of them.
+    """Return all channels of a record, or one of them.
 
     Args:
         path: a file in PEER AT2, AFAD, ESM/ITACA (DYNA), COSMOS V2, CSMIP/CDMG V2, USGS SMC or

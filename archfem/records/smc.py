@@ -14,14 +14,21 @@ _UPRIGHT = {0: "UP", 180: "DOWN"}  # degrees from the upward vertical
 
 
 def recognises(text: RecordText) -> bool:
-    """Tell whether the file begins with a type number and name, and a starred line after."""
+    """Return whether the file begins with a type number and name, and a starred line after.
+
+    Args:
+        text: the file.
+    """
     first = re.match(r"\s*\d\s+[A-Z ]+$", text.lines[0].rstrip())
     starred = any(line.strip() == "*" for line in text.lines[1:_INTEGERS])
     return bool(first) and starred
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Read the one component of the file.
+    """Return the one component of the file.
+
+    Args:
+        text: the file.
 
     Raises:
         InvalidInput: the file holds no acceleration or contradicts its header.

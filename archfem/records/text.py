@@ -8,9 +8,11 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archfem.errors import InvalidInput
-from archfem.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 """Pattern of a number as Fortran and C print it."""
@@ -25,16 +27,6 @@ _NUMERIC = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
 _DIGIT = re.compile(r"[0-9]")
 _RUN_TOGETHER = re.compile(r"(?<=[\d.])(?=[-+])")
 _ALIKE = 0.97  # share of numbers printed alike from which on the rest count as damaged
-
-# The order matters: the longer unit is tried first and blotted out before the next is looked for.
-_UNITS = (
-    (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-    (r"cm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
-    (r"\bgals?\b", 1e-2),
-    (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
-    (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
-)
-_NAMES = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,10 @@ class RecordText:
 
     @classmethod
     def opened(cls, path: str | PathLike[str]) -> "RecordText":
-        """Read a file: UTF-8 where it is that, else a Western or Turkish 8-bit encoding.
+        """Return the text of a file: UTF-8 where it is that, else Western or Turkish in 8 bits.
+
+        Args:
+            path: the file.
 
         Raises:
             InvalidInput: there is no such file, it cannot be read, or it is not text.
@@ -76,12 +71,21 @@ class RecordText:
         return cls(place, tuple(lines), lines[-1].strip() == "")
 
     def error(self, message: str, line: int | None = None) -> InvalidInput:
-        """Make the error that names the file and the line (an index here, counted from 1 there)."""
+        """Return the error that names the file and the line.
+
+        Args:
+            message: what is wrong, and what to do.
+            line: index of the line, counted from 1 in the message; None is the whole file.
+        """
         where = f"{self.path}" if line is None else f"{self.path}, line {line + 1}"
         return InvalidInput(f"{where}: {message}")
 
     def is_numeric(self, line: int) -> bool:
-        """Tell whether a line holds numbers and nothing else."""
+        """Return whether a line holds numbers and nothing else.
+
+        Args:
+            line: its index.
+        """
         content = self.lines[line]
         return bool(_NUMERIC.fullmatch(content) and _DIGIT.search(content))
 
@@ -89,6 +93,10 @@ class RecordText:
         """Return the numbers of one line; numbers run together are parted at their signs.
 
         Where that does not part them, a stated width of the columns does.
+
+        Args:
+            line: its index.
+            width: of the columns, where the file states it.
 
         Raises:
             InvalidInput: something in the line is not a finite number.
@@ -105,15 +113,15 @@ class RecordText:
         return row
 
     def _tokens(self, line: int, width: int | None) -> list[str]:
-        """Part a line into what should be numbers, with E for Fortran's D."""
+        """Return the parts of a line that should be numbers, with E for Fortran's D."""
         content = self.lines[line].upper().replace("D", "E")
         tokens = _RUN_TOGETHER.sub(" ", content).replace(",", " ").replace(";", " ").split()
         if width and not all(re.fullmatch(NUMBER, token) for token in tokens):
             return [content[at : at + width] for at in range(0, len(content.rstrip()), width)]
         return tokens
 
-    def block(self, first: int, count: int, width: int | None = None) -> tuple[np.ndarray, int]:
-        """Read as many numbers as a header states.
+    def block(self, first: int, count: int, width: int | None = None) -> tuple[Array, int]:
+        """Return as many numbers as a header states.
 
         Args:
             first: index of the line they begin in.
@@ -156,8 +164,12 @@ class RecordText:
             line = next(line for length, line in tails if length != usual)
             raise self.error("a number has not as many digits as the others: it is damaged", line)
 
-    def last_block(self, first: int, count: int) -> np.ndarray:
-        """Read as many numbers as a header states, which end the file.
+    def last_block(self, first: int, count: int) -> Array:
+        """Return as many numbers as a header states, which end the file (count,).
+
+        Args:
+            first: index of the line they begin in.
+            count: how many there are.
 
         Raises:
             InvalidInput: there are fewer or more, or the last one is cut off.
@@ -184,8 +196,15 @@ class RecordText:
         if len(set(tails[-6:-1])) == 1 and len(tails[-1]) < len(tails[-2]):
             raise self.error(f"the last number {tokens[-1]!r} is cut off", len(self.lines) - 1)
 
-    def find(self, pattern: str, start: int = 0, stop: int | None = None) -> tuple[int, re.Match]:
+    def find(
+        self, pattern: str, start: int = 0, stop: int | None = None
+    ) -> tuple[int, re.Match[str]]:
         """Return the first line (its index) that holds a pattern, and the match.
+
+        Args:
+            pattern: regular expression; capitals do not matter.
+            start: index of the first line searched.
+            stop: index of the line after the last; None searches to the end.
 
         Raises:
             InvalidInput: there is none.
@@ -198,12 +217,22 @@ class RecordText:
         raise self.error(f"no line tells {pattern!r}: the header is damaged")
 
     def holds(self, pattern: str, stop: int, start: int = 0) -> bool:
-        """Tell whether one of the lines before stop holds a pattern."""
+        """Return whether a line holds a pattern.
+
+        Args:
+            pattern: regular expression; capitals do not matter.
+            stop: index of the line after the last searched.
+            start: index of the first.
+        """
         search = re.compile(pattern, re.IGNORECASE).search
         return any(search(line) for line in self.lines[start:stop])
 
     def header_length(self) -> int:
-        """Return how many lines stand before the first line of numbers."""
+        """Return how many lines stand before the first line of numbers.
+
+        Raises:
+            InvalidInput: no line has numbers only.
+        """
         for line in range(len(self.lines)):
             if self.is_numeric(line):
                 return line
@@ -211,6 +240,10 @@ class RecordText:
 
     def step(self, dt: float, line: int | None = None) -> float:
         """Return a sampling interval that can be meant [s].
+
+        Args:
+            dt: as the file has it [s].
+            line: index of the line that has it, for errors.
 
         Raises:
             InvalidInput: it is not positive or longer than 0.1 s.
@@ -221,8 +254,13 @@ class RecordText:
             )
         return dt
 
-    def check_peak(self, samples: np.ndarray, stated: float, tolerance: float = 0.02) -> None:
+    def check_peak(self, samples: Array, stated: float, tolerance: float = 0.02) -> None:
         """Compare the samples with the peak that the header states, both in one unit.
+
+        Args:
+            samples: accelerations (n,).
+            stated: peak, of either sign.
+            tolerance: difference that is accepted, by the larger peak [-].
 
         Raises:
             InvalidInput: they differ: samples, units or header are damaged.
@@ -236,29 +274,11 @@ class RecordText:
             )
 
 
-def unit_named(name: str) -> float:
-    """Return a unit of acceleration given by keyword [m/s²].
-
-    Raises:
-        InvalidInput: it is not one of g, m/s2, cm/s2, gal, mm/s2.
-    """
-    key = str(name).lower().replace("²", "2").replace("^", "").replace(" ", "")
-    if key not in _NAMES:
-        raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(_NAMES)}")
-    return _NAMES[key]
-
-
 def stated_width(line: str) -> int | None:
-    """Return the width of the columns where a line states a Fortran format such as (8F10.3)."""
+    """Return the width of the columns where a line states a Fortran format such as (8F10.3).
+
+    Args:
+        line: the line.
+    """
     match = re.search(r"\(\s*\d+[FE](\d+)\.\d+\s*\)", line, re.IGNORECASE)
     return int(match[1]) if match else None
-
-
-def units_written(header: str) -> set[float]:
-    """Return the units of acceleration that a header mentions [m/s²]."""
-    found = set()
-    for pattern, unit in _UNITS:
-        header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
-        if count:
-            found.add(unit)
-    return found

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import archfem as af
 from archfem.codes import Eurocode8, TableSpectrum, Tbec2018
-from archfem.errors import InvalidInput
 
 ROUND_OFF = 1e-12
 
@@ -98,5 +98,5 @@ def test_table_is_straight_between_its_points():
     ],
 )
 def test_what_the_codes_do_not_define_is_refused(build, message):
-    with pytest.raises(InvalidInput, match=message):
+    with pytest.raises(af.errors.InvalidInput, match=message):
         build()

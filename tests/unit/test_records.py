@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archfem.errors import InvalidInput
-from archfem.motion import Motion
-from archfem.records.read import read_channels
-from archfem.units import STANDARD_GRAVITY
+import archfem as af
+from archfem.records.read import read_channels, read_components
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "mutated_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -86,31 +84,31 @@ def test_real_records_have_their_published_count_and_peak(recorded, name, dt, co
         assert channel.dt == dt
         # Half of the last digit of the table.
         digits = 0.5e-5 if peak < 0.001 else 0.5e-4
-        reached = np.abs(channel.samples).max() / STANDARD_GRAVITY
+        reached = np.abs(channel.samples).max() / af.units.STANDARD_GRAVITY
         assert reached == pytest.approx(peak, abs=digits * 1.001)
 
 
 def test_a_downward_vertical_is_turned_up(recorded):
     # The first sample of the file is -0.4595648E-03 g, positive downwards.
-    motion = Motion.read(
+    motion = af.Motion.read(
         recorded / "peer_at2/RSN77_SFERN_PUL164.AT2",
         vertical=recorded / "peer_at2/RSN77_SFERN_PULDWN.AT2",
     )
-    assert motion.vertical[0] == pytest.approx(0.4595648e-3 * STANDARD_GRAVITY)
-    assert motion.horizontal[0] == pytest.approx(-0.4486975e-3 * STANDARD_GRAVITY)
+    assert motion.vertical[0] == pytest.approx(0.4595648e-3 * af.units.STANDARD_GRAVITY)
+    assert motion.horizontal[0] == pytest.approx(-0.4486975e-3 * af.units.STANDARD_GRAVITY)
 
 
 def test_two_horizontals_of_two_files_can_be_rotated(recorded):
     files = [recorded / f"peer_at2/RSN125_FRIULI.A_A-TMZ{angle}.AT2" for angle in ("000", "270")]
-    motion = Motion.read(files[0], transverse=files[1])
+    motion = af.Motion.read(files[0], transverse=files[1])
     turned = motion.rotated(0.5 * np.pi)
-    assert turned.pga == pytest.approx(0.3151 * STANDARD_GRAVITY, rel=2e-4)
+    assert turned.pga == pytest.approx(0.3151 * af.units.STANDARD_GRAVITY, rel=2e-4)
     # Each keeps its own length until they are mixed; then the longer one counts.
     assert (len(motion.horizontal), len(turned.horizontal)) == (7277, 7279)
 
 
 def test_three_components_of_one_file_are_kept_together(recorded):
-    motion = Motion.read(recorded / "other_formats/ce36456p_CE36456.V2")
+    motion = af.Motion.read(recorded / "other_formats/ce36456p_CE36456.V2")
     peaks = [np.abs(motion.component(name)).max() for name in motion.components]
     assert motion.components == ("horizontal", "vertical", "transverse")
     assert peaks == pytest.approx([2.67957, 0.948, 2.5626], rel=2e-3)
@@ -120,15 +118,30 @@ def test_three_components_of_one_file_are_kept_together(recorded):
 
 def test_one_component_is_chosen_by_its_number(recorded):
     path = recorded / "plain_columns/erzikan.txt"
-    motion = Motion.read(path, column=2)
+    motion = af.Motion.read(path, column=2)
     assert motion.components == ("horizontal",)
-    assert motion.pga == pytest.approx(0.4957 * STANDARD_GRAVITY, rel=1e-4)
-    with pytest.raises(InvalidInput, match="choose from 1 to 2"):
-        Motion.read(path, column=3)
-    with pytest.raises(InvalidInput, match="has 1 components"):
-        Motion.read(recorded / "peer_at2/NIS090.AT2", column=2)
-    with pytest.raises(InvalidInput, match="leave out"):
-        Motion.read(recorded / "peer_at2/NIS090.AT2", dt=0.01)
+    assert motion.pga == pytest.approx(0.4957 * af.units.STANDARD_GRAVITY, rel=1e-4)
+    with pytest.raises(af.errors.InvalidInput, match="choose from 1 to 2"):
+        af.Motion.read(path, column=3)
+    with pytest.raises(af.errors.InvalidInput, match="has 1 components"):
+        af.Motion.read(recorded / "peer_at2/NIS090.AT2", column=2)
+    with pytest.raises(af.errors.InvalidInput, match="leave out"):
+        af.Motion.read(recorded / "peer_at2/NIS090.AT2", dt=0.01)
+
+
+def test_components_are_told_by_their_directions(write):
+    rows = "1 2 3\n-4 5 6\n0 8 8.5\n"
+    path = write("# gal, dt = 0.01 s: N-S, E-W, U-D\n" + rows)
+    found = read_components(path)
+    assert {name: channel.direction for name, channel in found.items()} == {
+        "horizontal": "N-S",
+        "transverse": "E-W",
+        "vertical": "U-D",
+    }
+    assert read_components(path, column=3).keys() == {"horizontal"}
+    for directions in ("N-S, E-W, NS", "N-S, U-D, UP"):
+        with pytest.raises(af.errors.InvalidInput, match="not those of one instrument"):
+            read_components(write(f"# gal, dt = 0.01 s: {directions}\n" + rows))
 
 
 VALUES = "  .1000000E+00 -.2000000E+00  .3000000E+00\n  .0500000E+00\n"
@@ -154,16 +167,16 @@ TITLE = "PEER NGA RECORD\nFriuli, 5/6/1976, Tolmezzo, 0\nACCELERATION TIME SERIE
 def test_peer_headers_of_all_kinds(write, counted):
     for blank, end in (("", "\n"), ("\n\n", "\r\n")):
         path = write((blank + TITLE + counted + "\n" + VALUES).replace("\n", end))
-        motion = Motion.read(path)
-        expected = np.array([0.1, -0.2, 0.3, 0.05]) * STANDARD_GRAVITY
+        motion = af.Motion.read(path)
+        expected = np.array([0.1, -0.2, 0.3, 0.05]) * af.units.STANDARD_GRAVITY
         assert motion.dt == 0.01
         assert motion.horizontal == pytest.approx(expected)
 
 
 def test_numbers_run_together_and_fortran_exponents(write):
     values = "-.1000000D+00-.2000000D+00 .3000000D+00-.5000000D-01\n"
-    motion = Motion.read(write(TITLE + "NPTS= 4, DT= .01 SEC\n" + values))
-    assert motion.horizontal / STANDARD_GRAVITY == pytest.approx([-0.1, -0.2, 0.3, -0.05])
+    motion = af.Motion.read(write(TITLE + "NPTS= 4, DT= .01 SEC\n" + values))
+    assert motion.horizontal / af.units.STANDARD_GRAVITY == pytest.approx([-0.1, -0.2, 0.3, -0.05])
 
 
 @pytest.mark.parametrize("direction", ["DWN", "DOWN (USGS STATION 279)", "DN"])
@@ -171,7 +184,7 @@ def test_downward_words(write, direction):
     text = TITLE.replace("Tolmezzo, 0", f"Dam (upper, left), {direction}")
     channel = read_channels(write(text + "NPTS= 4, DT= .01 SEC\n" + VALUES))[0]
     assert channel.is_vertical
-    assert channel.samples[0] == pytest.approx(-0.1 * STANDARD_GRAVITY)
+    assert channel.samples[0] == pytest.approx(-0.1 * af.units.STANDARD_GRAVITY)
 
 
 @pytest.mark.parametrize(
@@ -216,27 +229,27 @@ def test_downward_words(write, direction):
 )
 def test_doubtful_files_are_refused_by_name_and_line(write, content, message):
     path = write(content)
-    with pytest.raises(InvalidInput, match=message) as caught:
-        Motion.read(path)
+    with pytest.raises(af.errors.InvalidInput, match=message) as caught:
+        af.Motion.read(path)
     assert path.name in str(caught.value)
 
 
 def test_files_that_are_not_there_are_refused(tmp_path):
     for path in (tmp_path / "missing.AT2", tmp_path, "a\0b", None):
-        with pytest.raises(InvalidInput, match="cannot read the record"):
-            Motion.read(path)
+        with pytest.raises(af.errors.InvalidInput, match="cannot read the record"):
+            af.Motion.read(path)
 
 
 def test_time_and_acceleration_in_columns(write):
     rows = "".join(f"{0.02 * i:.3f}\t{0.1 * (-1) ** i:.4f}\n" for i in range(50))
     for header, given, unit in (
         ("# time (s), acceleration (m/s^2)\n", {}, 1.0),
-        ("time [s], acc [g]\n", {}, STANDARD_GRAVITY),
+        ("time [s], acc [g]\n", {}, af.units.STANDARD_GRAVITY),
         ("% acc. in cm/sec^2\n", {}, 0.01),
         ("", {"units": "gal"}, 0.01),
-        ("", {"units": "g", "column": 2, "dt": 0.02}, STANDARD_GRAVITY),
+        ("", {"units": "g", "column": 2, "dt": 0.02}, af.units.STANDARD_GRAVITY),
     ):
-        motion = Motion.read(write(header + rows), **given)
+        motion = af.Motion.read(write(header + rows), **given)
         assert motion.dt == pytest.approx(0.02)
         assert motion.pga == pytest.approx(0.1 * unit)
         assert len(motion.horizontal) == 50
@@ -246,7 +259,7 @@ def test_time_and_acceleration_in_columns(write):
     "told", ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"]
 )
 def test_the_step_told_in_a_comment(write, told):
-    motion = Motion.read(write(f"% gal, {told}\n1\n-2\n3\n"))
+    motion = af.Motion.read(write(f"% gal, {told}\n1\n-2\n3\n"))
     assert motion.dt == pytest.approx(0.005)
     assert motion.pga == pytest.approx(0.03)
 
@@ -254,7 +267,7 @@ def test_the_step_told_in_a_comment(write, told):
 def test_rounded_times_still_tell_the_step(write):
     rows = "".join(f"{0.0066 * i:.3f} {i % 7}\n" for i in range(200))
     # Times are rounded to 0.0005 s, over 199 steps: 4e-4 of the step.
-    assert Motion.read(write(rows), units="gal").dt == pytest.approx(0.0066, rel=5e-4)
+    assert af.Motion.read(write(rows), units="gal").dt == pytest.approx(0.0066, rel=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -278,13 +291,13 @@ def test_rounded_times_still_tell_the_step(write):
     ],
 )
 def test_doubtful_columns_are_refused(write, content, given, message):
-    with pytest.raises(InvalidInput, match=message):
-        Motion.read(write(content), **given)
+    with pytest.raises(af.errors.InvalidInput, match=message):
+        af.Motion.read(write(content), **given)
 
 
 def test_an_error_names_the_turkish_file_too(write):
     content = SAMPLES["afad"].replace("GAZIANTEP", "AYDIN").replace("AYDIN", "AYDİN")
-    motion = Motion.read(write(content, encoding="cp1254"))
+    motion = af.Motion.read(write(content, encoding="cp1254"))
     assert motion.components == ("horizontal", "vertical", "transverse")
 
 
@@ -303,8 +316,8 @@ def test_damaged_files_raise_no_foreign_error(tmp_path):
     for content in mutants(200, seed=1):
         path.write_bytes(content)
         try:
-            assert Motion.read(path).pga > 0.0
-        except InvalidInput as error:
+            assert af.Motion.read(path).pga > 0.0
+        except af.errors.InvalidInput as error:
             refused += path.name in str(error)
     # Not every change damages; most do.
     assert 50 < refused < 200

@@ -12,11 +12,12 @@ from archfem.criteria import HINGE, Criteria
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.history import Ending
 from archfem.models.rigid import rigid
-from archfem.motion import LARGEST_PEAK, Motion
+from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.scales import MechanismScales, ScaledRun, mechanism_scales
 from archfem.schemes import Rayleigh
 from archfem.shapes import arch_on_piers, column
+from archfem.signals import LARGEST_PEAK
 from archfem.statics import dead_load
 from archfem.verdicts import DEFINITIONS, first_mechanisms
 
