@@ -13,7 +13,6 @@ import numpy as np
 from scipy.sparse.linalg import eigsh
 
 from archfem.actions import BodyForce
-from archfem.compiled.contact import LARGEST
 from archfem.criteria import judged
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
@@ -26,6 +25,7 @@ from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.soft import soft_blocks
 from archfem.statics import equilibrium, self_weight
+from archfem.stepping.modal import LARGEST
 from archfem.structure import Array, Structure
 
 logger = logging.getLogger("archfem")

@@ -7,7 +7,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from archfem.dynamics import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import CountedMechanism as CountedMechanism
 from archfem.events import Event
@@ -16,9 +15,12 @@ from archfem.history import History
 from archfem.models import Model
 from archfem.motion import Motion
 from archfem.newton import Newton
-from archfem.schemes import Rayleigh, Scheme
+from archfem.schemes import Newmark, Rayleigh, Scheme
+from archfem.states import Batch, State
 from archfem.statics import Equilibrium, dead_load
-from archfem.steppers import AnyStepper, stepper_for
+from archfem.stepping.choice import stepper_for
+from archfem.stepping.equation import Equation
+from archfem.stepping.stepper import Stepper
 from archfem.tape import Tape
 
 logger = logging.getLogger("archfem")
@@ -59,7 +61,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     record: Record | None = None,
     until: Event | None = None,
     newton: Newton | None = None,
-    method: str = "auto",
+    method: str | Stepper = "auto",
 ) -> History:
     """Shake a structure and record what its joints do.
 
@@ -82,7 +84,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         method: "snes" solves each step through PETSc. Three compiled methods give the same history
             many times faster: "contact" works in the modes of the closed structure, "chain" on
             banded matrices, and "compliance", for large structures, with one sparse factor and
-            the open joint points alone. "auto" takes the fastest that applies.
+            the open joint points alone. "auto" takes the fastest that applies. A `Stepper` is
+            taken as it is, with its own damping, scheme and solves.
 
     Returns:
         The history; its `outcome` says how the run ended.
@@ -96,9 +99,10 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         dt = STEP if predicted is None else predicted.dt
     if not 0.0 < dt <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
-    stepper = stepper_for(method, model, motion, damping=damping, scheme=scheme, newton=newton)
+    equation = Equation(model, motion, damping, scheme or Newmark())
     if not isinstance(start, State):
-        start = stepper.at_rest((start or dead_load(model, newton)).q)
+        start = equation.at_rest((start or dead_load(model, newton)).q)
+    stepper = stepper_for(method, equation, start, dt, newton)
     first = _first(stepper, start, dt)
     tape = _tape(stepper, first, dt, record or Record())
     number, state, outcome = 0, start, "reached the end of the motion"
@@ -125,23 +129,23 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     return tape.history(motion, state, outcome)
 
 
-def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
+def _first(stepper: Stepper, start: State, dt: float) -> Batch:
     """The start, as a batch of one."""
-    contact = start.q + stepper.lag * start.velocity
+    equation = stepper.equation
     return Batch(
         np.array([start.time]),
-        stepper.model.resultants(contact)[None],
+        equation.model.resultants(equation.contact(start))[None],
         np.zeros(1, dtype=np.int64),
         np.array([dt]),
-        stepper.energy(start)[None],
+        equation.energy(start)[None],
         lambda _: start,
     )
 
 
-def _tape(stepper: AnyStepper, first: Batch, dt: float, record: Record) -> Tape:
+def _tape(stepper: Stepper, first: Batch, dt: float, record: Record) -> Tape:
     """An empty tape, and a guard over it."""
-    guard = Guard(stepper.model, first)
-    return Tape(stepper.model, stepper.name, dt, record.every, record.fields_every, guard)
+    model = stepper.equation.model
+    return Tape(model, stepper.name, dt, record.every, record.fields_every, Guard(model, first))
 
 
 def _bar(start: State, motion: Motion, dt: float) -> tqdm:
