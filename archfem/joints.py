@@ -231,6 +231,10 @@ class JointOperator:
         """The part of the tangent that never changes (n, n)."""
         return self._back[1] @ self.slip
 
+    def shear_resultants(self) -> sparse.csr_matrix:
+        """Shear resultant of each joint from coordinates, sparse (n_joints, n) [N]."""
+        return (self.sums[0] @ self.law.shear @ self.slip).tocsr()
+
     def couplings(self) -> sparse.csr_matrix:
         """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
         first, second = self.law.entries

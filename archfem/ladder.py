@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from archfem.compiled.contact import LARGEST
 from archfem.discretisation import Discretisation
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model, Prediction
@@ -22,6 +21,7 @@ from archfem.probe import largest_difference, peaks, severe_motion, strongest, u
 from archfem.quadrature import Quadrature
 from archfem.schemes import Rayleigh
 from archfem.softness import soft_blocks
+from archfem.stepping.modal import LARGEST
 from archfem.structure import Array, Structure
 
 Damping = Rayleigh | Callable[[Model], Rayleigh | None] | None

@@ -10,7 +10,6 @@ from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
 from archfem.criteria import Criteria
-from archfem.dynamics import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import Until, Watch, agreed, begun
 from archfem.guard import Guard
@@ -20,8 +19,11 @@ from archfem.motion import Motion
 from archfem.newton import Newton
 from archfem.recorder import Recorder
 from archfem.schemes import HHT, Newmark, Rayleigh, Scheme
+from archfem.states import Batch, State
 from archfem.statics import Equilibrium, dead_load
-from archfem.steppers import AnyStepper, stepper_for
+from archfem.stepping.choice import stepper_for
+from archfem.stepping.equation import Equation
+from archfem.stepping.stepper import Stepper
 
 logger = logging.getLogger("archfem")
 
@@ -73,7 +75,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     until: Until | None = None,
     criteria: Criteria | None = None,
     newton: Newton | None = None,
-    method: str = "auto",
+    method: str | Stepper = "auto",
 ) -> History:
     """Shake a structure and record what its joints do.
 
@@ -100,7 +102,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         method: "snes" solves each step through PETSc. Three compiled methods give the same history
             many times faster: "contact" works in the modes of the closed structure, "chain" on
             banded matrices, and "compliance", for large structures, with one sparse factor and
-            the open joint points alone. "auto" takes the fastest that applies.
+            the open joint points alone. "auto" takes the fastest that applies. A `Stepper` is
+            taken as it is, with its own damping, scheme and solves.
 
     Returns:
         The history; its `ended` and, in words, its `outcome` say how the run ended.
@@ -116,9 +119,10 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     dt = _step(model, dt)
     criteria = agreed(criteria, until)
     watch = None if until is None else begun(until, model.structure, criteria)
-    stepper = stepper_for(method, model, motion, damping=damping, scheme=scheme, newton=newton)
+    equation = Equation(model, motion, damping, scheme or Newmark())
     if not isinstance(start, State):
-        start = stepper.at_rest((start or dead_load(model, newton)).q)
+        start = equation.at_rest((start or dead_load(model, newton)).q)
+    stepper = stepper_for(method, equation, start, dt, newton)
     first = _first(stepper, start, dt)
     recorder = _recorder(stepper, first, dt, record or Record(), criteria)
     taken, state = 0, start
@@ -163,25 +167,25 @@ def _check_kinds(**given: Any) -> None:
             instance(value, *_KINDS[name])
 
 
-def _first(stepper: AnyStepper, start: State, dt: float) -> Batch:
+def _first(stepper: Stepper, start: State, dt: float) -> Batch:
     """The start, as a batch of one."""
-    contact = start.q + stepper.lag * start.velocity
+    equation = stepper.equation
     return Batch(
         np.array([start.time]),
-        stepper.model.resultants(contact)[None],
+        equation.model.resultants(equation.contact(start))[None],
         np.zeros(1, dtype=np.int64),
         np.array([dt]),
-        stepper.energy(start)[None],
+        equation.energy(start)[None],
         lambda _: start,
     )
 
 
 def _recorder(
-    stepper: AnyStepper, first: Batch, dt: float, record: Record, criteria: Criteria
+    stepper: Stepper, first: Batch, dt: float, record: Record, criteria: Criteria
 ) -> Recorder:
     """An empty recorder with a guard over it."""
-    kept, guard = (record.every, record.fields_every), Guard(stepper.model, first)
-    return Recorder(stepper.model, stepper.name, dt, *kept, criteria, guard)
+    model, kept = stepper.equation.model, (record.every, record.fields_every)
+    return Recorder(model, stepper.name, dt, *kept, criteria, Guard(model, first))
 
 
 def _bar(start: State, motion: Motion, dt: float) -> tqdm:

@@ -37,7 +37,7 @@ class Batch:
         smallest: the smallest step that was needed to get there (steps,) [s].
         energy: kinetic, potential, work and loss of each step, as by `Meter.step` (steps, 4) [J].
         state: gives the state at the end of step k.
-        fallback: whether these steps were given up by the contact stepper, and taken by SNES.
+        fallback: whether these steps were given up by a strategy, and taken by SNES.
     """
 
     times: Array

@@ -21,7 +21,8 @@ from timing import stopwatch, table
 
 import archfem as af
 from archfem.resultants import joint_dataset
-from archfem.steppers import stepper_for
+from archfem.stepping.choice import stepper_for
+from archfem.stepping.equation import Equation
 
 DT = 0.005
 """Time step [s]."""
@@ -77,8 +78,9 @@ def measured(rung: str, whole: af.Motion, scale: float, folder: Path) -> dict:
     for name, part in parts.items():
         for again in range(2 if rung not in SLOW else 1):  # the first may compile
             watch = stopwatch()
-            stepper = stepper_for(method, model, part.scaled(scale), damping=DAMPING)
-            start = stepper.at_rest(dead.q)
+            equation = Equation(model, part.scaled(scale), DAMPING)
+            start = equation.at_rest(dead.q)
+            stepper = stepper_for(method, equation, start, DT)
             next(iter(stepper.batches(start, DT, DT)))
             setup = watch()[0]
             watch = stopwatch()

@@ -23,7 +23,6 @@ from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
-from archfem.steppers import stepper_for
 
 CASES = [("rigid", "nodal"), ("faces", "nodal"), ("condensed", "nodal"), ("full", "nodal")]
 CASES += [("rigid", "lobatto"), ("faces", "lobatto")]
@@ -262,8 +261,8 @@ def row_of(case: tuple[str, str], motion: af.Motion, repeat: int) -> list[object
     """Run the floor and the stepper archfem takes by itself, on one fidelity and quadrature."""
     fidelity, rule = case
     model = af.build(ring(), fidelity=fidelity, cells=(4, 4), quadrature=rule)
-    chosen = stepper_for("auto", model, motion, damping=DAMPING, scheme=None, newton=None).name
-    run = Run(model, motion, chosen)
+    run = Run(model, motion, "auto")
+    chosen = run.stepper.name
     floor = Floor.of(run)
     factorised = floor.go(floor.state()) / run.steps
     lowest = least(watched(lambda: floor.go(floor.state())), run.steps, repeat).cpu

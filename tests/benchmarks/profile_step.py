@@ -3,8 +3,7 @@
     python tests/benchmarks/profile_step.py [--fidelity full --quadrature nodal --method snes]
 
 Functions by their own time, per step, as Python's profiler sees them: its own cost counts too, so
-shares matter rather than sums. A compiled loop is one line; its parts are timed by themselves when
-the method is "contact".
+shares matter rather than sums. A compiled loop is one line; its parts are timed by themselves.
 """
 
 import argparse
@@ -12,14 +11,15 @@ import cProfile
 import pstats
 from pathlib import Path
 
+import numba
 import numpy as np
 from setting import DT, ground_motion, options, ring
 from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
-from archfem.compiled import kernel
-from archfem.steppers import METHODS
+from archfem.stepping import linear
+from archfem.stepping.choice import METHODS
 
 LINES = 12
 """Functions shown."""
@@ -52,43 +52,45 @@ def _name(path: str, line: int, function: str) -> str:
     return f"{Path(path).name}:{line} {function}" if line else function
 
 
-def parts(run: Run, repeat: int) -> str:
-    """Time the parts of the contact stepper's compiled loop, each by itself, on the dead load.
+@numba.njit
+def _settled(system, kept, states, ground, times):
+    """Take the first step again and again."""
+    for _ in range(times):
+        linear.settled(system, kept, 0, states, ground)
 
-    Each call from Python costs about a microsecond, which the loop is spared.
-    """
-    method = run.stepper.method
-    modes, (numbers, compliance) = method._modes, method._prepared(DT)
-    size, law = len(modes.squares), method._law
-    state, new = np.zeros((3, size)), np.zeros((3, size))
-    state[0] = modes.shapes.T @ (run.model.mass @ run.dead.q)
-    change, contact = np.zeros(size), np.zeros(size)
-    points = len(modes.opening)
-    jacobian, other, force = np.zeros((points, 2)), np.zeros((points, 2)), np.zeros(points)
-    rests = np.zeros((len(modes.shear), 3))
-    kernel._free(state, modes.weight, numbers, change, contact)
-    gap, slips = modes.opening @ contact, modes.shear @ contact
-    actions = {
-        "all closed, in modes": lambda: kernel._free(state, modes.weight, numbers, change, contact),
-        "openings from modes": lambda: modes.opening @ contact,
-        "open points": lambda: kernel._settle(gap, compliance, law, jacobian, other, force),
-        "Newmark's formulas": lambda: kernel.finish(
-            state, new, change, (numbers.beta, numbers.gamma, DT, numbers.lag), contact
-        ),
-        "shear from modes": lambda: modes.shear @ contact,
-        "resultants": lambda: kernel.joint_resultants(rests, gap, slips, law),
-    }
+
+@numba.njit
+def _solved(system, kept, contact, times):
+    """Find the contact of a step again and again."""
+    for _ in range(times):
+        contact[:] = kept.right
+        linear.solve(system, contact, kept.gap, kept.before, kept.force)
+
+
+@numba.njit
+def _measured(system, kept, states, ground, room, times):
+    """Take resultants and energies of the first step again and again."""
+    for _ in range(times):
+        linear.measured(system.linear, kept, 0, states, ground, room[0], room[1])
+
+
+def parts(run: Run, repeat: int) -> str:
+    """Time the parts of a strategy's compiled loop, each by itself, on the dead load."""
     times = 2000
+    ends = run.start.time + DT * np.arange(1, 3)
+    series, results, _, system = run.stepper.prepared(run.start, DT, ends)
+    kept = linear.started(system.linear, series[0])
+    room, still = (results[0][0], results[2][0]), np.zeros(2)
+    actions = {
+        "settle": lambda: _settled(system, kept, series[:2], still, times),
+        "  of that, solve": lambda: _solved(system, kept, np.empty_like(kept.right), times),
+        "measure": lambda: _measured(system, kept, series[:2], still, room, times),
+    }
     rows = []
     for name, action in actions.items():
         action()
-
-        def many(action=action):
-            for _ in range(times):
-                action()
-
-        rows.append([name, f"{least(watched(many), times, repeat).cpu:.4f}"])
-    open_points = int(np.count_nonzero(force))
+        rows.append([name, f"{least(watched(action), times, repeat).cpu:.4f}"])
+    open_points = int(np.count_nonzero(kept.force))
     return table([f"part (dead load, {open_points} open points)", "ms/step"], rows)
 
 
@@ -101,7 +103,7 @@ def report(cases: list[tuple[str, str, str]], motion: af.Motion, repeat: int) ->
         run = Run(model, motion, method)
         found += [f"{fidelity}, {rule}, {method}: {run.clock(repeat).cpu:.4f} ms/step"]
         found += [functions(run)]
-        if method == "contact":
+        if method != "snes":
             found += [parts(run, repeat)]
     return "\n\n".join(found)
 

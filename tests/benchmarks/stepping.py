@@ -5,9 +5,10 @@ from setting import DAMPING, DT
 from timing import Clock, least, stopwatch, watched
 
 import archfem as af
-from archfem.dynamics import State
 from archfem.models.jointed import Jointed
-from archfem.steppers import stepper_for
+from archfem.states import State
+from archfem.stepping.choice import stepper_for
+from archfem.stepping.equation import Equation
 
 
 class Run:
@@ -22,8 +23,9 @@ class Run:
         self.motion = motion
         self.dead = af.dead_load(model)
         watch = stopwatch()
-        self.stepper = stepper_for(method, model, motion, damping=DAMPING)
-        self.start: State = self.stepper.at_rest(self.dead.q)
+        equation = Equation(model, motion, DAMPING)
+        self.start: State = equation.at_rest(self.dead.q)
+        self.stepper = stepper_for(method, equation, self.start, DT)
         next(iter(self.stepper.batches(self.start, DT, DT)))
         self.setup = watch()[0]
 
@@ -50,10 +52,9 @@ class Run:
 
 def warm_up(motion: af.Motion) -> None:
     """Compile what is compiled, on a small model."""
-    for rule in ("nodal", "exact"):
-        small = af.build(
-            af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=3, width=1.0),
-            fidelity="rigid",
-            quadrature=rule,
-        )
-        Run(small, motion.cut(0.0, 0.1), "contact").step()
+    small = af.build(
+        af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=3, width=1.0),
+        fidelity="rigid",
+    )
+    for method in ("contact", "chain", "compliance"):
+        Run(small, motion.cut(0.0, 0.1), method).step()

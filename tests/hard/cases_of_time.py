@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 import archfem as af
-from archfem.dynamics import Stepper
+from archfem.stepping.equation import Equation
 from hard.setting import DT, Found, answer, case, joints, peaks, quake, refused, ring, shaken, still
 
 
 def _tilted(model, share=0.1):
     """A block 0.6 × 2.4 m turned clockwise about its corner by a share of its slenderness."""
     theta = share * np.arctan(0.25)
-    stepper = Stepper(model, still(1.0))
-    return stepper.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
+    equation = Equation(model, still(1.0))
+    return equation.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
 
 
 def rocking(scheme, dt):
@@ -51,7 +51,7 @@ def chatter(alpha, dt):
     block = af.column(breadth=1.0, heights=[1.0], contact=joints(1e3))
     model = af.build(block, fidelity="rigid")
     damping = af.Rayleigh(0.01, (8.0, 16.0))
-    held = Stepper(model, still(1.0), damping=damping)
+    held = Equation(model, still(1.0), damping)
     start = held.at_rest(np.array([0.0, 0.01, 0.0]))
     scheme = af.HHT(alpha) if alpha else None
     given = {"dt": dt, "start": start, "damping": damping, "scheme": scheme}
@@ -122,7 +122,7 @@ def undamped_hht():
 def impossible():
     """A state with a speed beyond sense."""
     model = af.build(ring(), fidelity="rigid")
-    start = Stepper(model, still(1.0)).at_rest(af.dead_load(model).q)
+    start = Equation(model, still(1.0)).at_rest(af.dead_load(model).q)
     start = replace(start, velocity=np.full(model.size, 1e160))
     with np.errstate(all="ignore"):
         return refused(

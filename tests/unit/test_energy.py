@@ -5,8 +5,6 @@ import logging
 import numpy as np
 import pytest
 
-from archfem.compiled import kernel
-from archfem.dynamics import State, Stepper
 from archfem.energy import Balance
 from archfem.errors import DidNotConverge
 from archfem.ladder import build
@@ -16,7 +14,13 @@ from archfem.newton import Newton
 from archfem.runs import Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.shapes import column
+from archfem.states import State
 from archfem.statics import dead_load
+from archfem.stepping.equation import Equation
+from archfem.stepping.exact import Exact
+from archfem.stepping.loop import ITERATIONS, advance
+from archfem.stepping.modal import Modal
+from archfem.stepping.stepper import Stepper
 
 DAMPING = Rayleigh(0.05, (8.0, 16.0))
 MOTION = Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -101,18 +105,19 @@ def test_displacements_that_are_not_small(stack, caplog):
         time_history(model, longer)
 
 
-def test_balance_of_a_step_taken_in_halves(model, monkeypatch):
+def test_balance_of_a_step_taken_in_halves(model):
     """Work and loss of both halves count."""
-    real = Stepper._try
+    equation = Equation(model, MOTION.cut(0.0, 1.0), DAMPING)
+    real = Exact(equation)
 
-    def failing(self, state, dt):
+    def failing(state, dt):
         if dt > 0.003:
             raise DidNotConverge("made to fail")
-        return real(self, state, dt)
+        return real.attempt(state, dt)
 
     fine = time_history(model, MOTION.cut(0.0, 1.0), damping=DAMPING, dt=0.0025, method="snes")
-    monkeypatch.setattr(Stepper, "_try", failing)
-    halved = time_history(model, MOTION.cut(0.0, 1.0), damping=DAMPING, method="snes")
+    stepper = Stepper(equation, exact=Exact(equation, attempts=failing))
+    halved = time_history(model, MOTION.cut(0.0, 1.0), method=stepper)
     assert halved.dataset.attrs["halved_steps"] == 200
     drift = fine.dataset["energy_drift"].values[::2]
     scale = np.abs(drift).max()
@@ -120,30 +125,28 @@ def test_balance_of_a_step_taken_in_halves(model, monkeypatch):
 
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
-def test_contact_stepper_falls_back(ring, monkeypatch, rule):
+def test_contact_stepper_falls_back(ring, rule):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     model = build(ring, fidelity="rigid", quadrature=rule)
-    given = {"damping": DAMPING, "newton": Newton(tolerance=1e-13)}
-    short = MOTION.cut(0.8, 1.8)
-    exact = time_history(model, short, method="snes", **given)
-    monkeypatch.setattr("archfem.compiled.contact.kernel.advance", _one_pass)
-    run = time_history(model, short, method="contact", **given)
+    newton, short = Newton(tolerance=1e-13), MOTION.cut(0.8, 1.8)
+    equation = Equation(model, short, DAMPING)
+    solves = Exact(equation, newton)
+    exact = time_history(model, short, newton=newton, method=Stepper(equation, exact=solves))
+    stepper = Stepper(equation, Modal.of(equation), exact=solves, advance=_one_pass)
+    run = time_history(model, short, newton=newton, method=stepper)
     assert run.dataset.attrs["fallback_steps"] > 10
     assert exact.dataset.attrs["fallback_steps"] == 0
-    assert run.dataset["iterations"].max() > kernel.ITERATIONS
+    assert run.dataset["iterations"].max() > ITERATIONS
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
     drift = run.dataset["energy_drift"] - exact.dataset["energy_drift"]
     assert np.abs(drift).max() < 1e-6 * np.abs(exact.dataset["energy_drift"]).max()
 
 
-_advance = kernel.advance
-
-
-def _one_pass(series, gaps, resultants, iterations, *given):
+def _one_pass(series, results, ground, system):
     """Stop before the first step that took more than one pass."""
-    count = _advance(series, gaps, resultants, iterations, *given)
-    many = np.flatnonzero(iterations[:count] > 1)
+    count = advance(series, results, ground, system)
+    many = np.flatnonzero(results[1][:count] > 1)
     return int(many[0]) if len(many) else count
 
 

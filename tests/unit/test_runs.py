@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 from archfem.criteria import Criteria
-from archfem.dynamics import Stepper
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.events import CountedMechanism, EveryMechanism, MovingMechanism
 from archfem.history import Ending, History
@@ -20,6 +19,9 @@ from archfem.motion import Motion
 from archfem.runs import Record, last_state, time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.statics import dead_load
+from archfem.stepping.equation import Equation
+from archfem.stepping.exact import Exact
+from archfem.stepping.stepper import Stepper
 from archfem.summary import joint_table, pair_table, verdict
 from archfem.verdicts import first_mechanisms
 
@@ -313,33 +315,33 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
     assert run.joints["N"].notnull().all()
 
 
-def test_a_failure_carries_the_history(model, motion, monkeypatch):
-    real = Stepper._try
+def breaking(model, motion, breaks):
+    """A stepper whose attempts fail where `breaks(time, dt)` says so."""
+    equation = Equation(model, motion, DAMPING)
+    real = Exact(equation)
 
-    def failing(self, state, dt):
-        if state.time > 0.2:
+    def attempt(state, dt):
+        if breaks(state.time, dt):
             raise DidNotConverge("made to fail")
-        return real(self, state, dt)
+        return real.attempt(state, dt)
 
-    monkeypatch.setattr(Stepper, "_try", failing)
+    return Stepper(equation, exact=Exact(equation, attempts=attempt))
+
+
+def test_a_failure_carries_the_history(model, motion):
+    stepper = breaking(model, motion, lambda time, _: time > 0.2)
     with pytest.raises(DidNotConverge, match="made to fail") as caught:
-        time_history(model, motion, damping=DAMPING, method="snes")
+        time_history(model, motion, method=stepper)
     assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
     assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
     assert "failed at" in caught.value.history.outcome
     assert caught.value.history.ended is Ending.FAILED
 
 
-def test_a_step_that_fails_is_halved(model, motion, monkeypatch):
-    real = Stepper._try
-
-    def failing(self, state, dt):
-        if 0.2 < state.time < 0.21 and dt > 0.002:
-            raise DidNotConverge("made to fail")
-        return real(self, state, dt)
-
-    monkeypatch.setattr(Stepper, "_try", failing)
-    found = time_history(model, motion.cut(0.0, 0.4), damping=DAMPING, method="snes")
+def test_a_step_that_fails_is_halved(model, motion):
+    short = motion.cut(0.0, 0.4)
+    stepper = breaking(model, short, lambda time, dt: 0.2 < time < 0.21 and dt > 0.002)
+    found = time_history(model, short, method=stepper)
     smallest = found.dataset["smallest_step"].values
     assert smallest.min() == pytest.approx(0.00125)
     assert found.time[-1] == pytest.approx(0.4)

@@ -25,7 +25,7 @@ def test_synthetic_motion_repeats_and_ends_at_rest():
 
 def test_a_motion_without_end_or_samples_is_refused():
     for duration in (np.inf, np.nan):
-        with pytest.raises(af.errors.InvalidInput, match="duration .* is not a finite number"):
+        with pytest.raises(af.errors.InvalidInput, match=r"duration .* is not a finite number"):
             af.Motion.synthetic(duration=duration)
     with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
         af.Motion.synthetic(dt=0.0)

@@ -1,14 +1,12 @@
 """The stepper for large structures: its factor, its small problem, and the histories it gives."""
 
+import time
+
 import numpy as np
 import pytest
 from scipy import sparse
 
 from archfem.actions import Settlement
-from archfem.compiled import march
-from archfem.compiled.factor import Plan, backward, factorised, forward
-from archfem.compiled.newmark import follow, numbers_of
-from archfem.compiled.release import release
 from archfem.errors import InvalidInput
 from archfem.joints import Facets, JointPoints, Springs
 from archfem.ladder import build
@@ -18,7 +16,18 @@ from archfem.runs import time_history
 from archfem.schemes import HHT, Rayleigh
 from archfem.shapes import Arch, Backfill, bridge
 from archfem.statics import dead_load
-from archfem.steppers import stepper_for
+from archfem.stepping.banded import Banded
+from archfem.stepping.choice import SHORTEST, chosen, stepper_for
+from archfem.stepping.equation import Equation
+from archfem.stepping.exact import Exact
+from archfem.stepping.joint_law import Law
+from archfem.stepping.loop import advance
+from archfem.stepping.modal import Modal
+from archfem.stepping.newmark import follow, numbers_of
+from archfem.stepping.open_points import release
+from archfem.stepping.panels import Plan, backward, factorised, forward
+from archfem.stepping.sparse import Sparse
+from archfem.stepping.stepper import Stepper
 
 TIGHT = Newton(tolerance=1e-13)
 STRONG = Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
@@ -58,42 +67,81 @@ def test_history_is_that_of_snes(filled, rule, joints, scheme):
     assert np.abs(drift).max() < 1e-6  # of a joule, where hundreds are exchanged
 
 
-def test_steps_that_do_not_settle_are_left_to_snes(filled, monkeypatch):
+def test_steps_that_do_not_settle_are_left_to_snes(filled):
     model = build(filled, fidelity="rigid")
-    given = {"damping": Rayleigh(0.05, (4.0, 20.0)), "newton": TIGHT}
-    exact = time_history(model, STRONG, method="snes", **given)
-    whole = march.advance
+    equation = Equation(model, STRONG, Rayleigh(0.05, (4.0, 20.0)))
 
-    def impatient(series, gap, results, *rest):
-        count = whole(series, gap, results, *rest)
+    def impatient(series, results, ground, system):
+        count = advance(series, results, ground, system)
         many = np.flatnonzero(results[1][:count] > 4)
         return int(many[0]) if len(many) else count
 
-    monkeypatch.setattr(march, "advance", impatient)
-    run = time_history(model, STRONG, method="compliance", **given)
+    solves = Exact(equation, TIGHT)
+    exact = time_history(model, STRONG, method=Stepper(equation, exact=solves), newton=TIGHT)
+    stepper = Stepper(equation, Sparse.of(equation), exact=solves, advance=impatient)
+    run = time_history(model, STRONG, method=stepper, newton=TIGHT)
     assert run.dataset.attrs["fallback_steps"] > 3
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
 
 
-def test_the_fastest_method_is_taken(ring, filled):
-    """Modes where joints have few points, bands for chains, one sparse factor for the rest."""
-    chosen = [
-        stepper_for("auto", model, STRONG).name
-        for model in (
-            build(ring, fidelity="faces", quadrature="exact"),
-            build(ring, fidelity="rigid", cells=(16, 1)),
-            build(filled, cells=(4, 4)),
-        )
-    ]
-    assert chosen == ["contact", "chain", "compliance"]
+class Laborious(Sparse):
+    """A strategy that takes a second to begin, where a run of a thousand steps takes a tenth."""
+
+    tries = 0
+
+    @classmethod
+    def of(cls, equation):
+        cls.tries += 1
+        begun = time.process_time()
+        while time.process_time() < begun + 1.0:
+            pass
+        return super().of(equation)
+
+
+def test_the_fastest_strategy_is_taken_and_remembered(ring):
+    model = build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0)))
+    start, dt = equation.at_rest(dead_load(model).q), STRONG.duration / SHORTEST
+    ways = (Laborious, Banded)
+    assert isinstance(chosen(equation, start, dt, ways), Banded)
+    assert Laborious.tries == 1
+    assert isinstance(chosen(Equation(model, STRONG, equation.damping), start, dt, ways), Banded)
+    assert Laborious.tries == 1  # the motion may be another
+    assert isinstance(chosen(equation, start, 0.99 * dt, ways), Banded)
+    assert Laborious.tries == 2  # the step may not
+
+
+def test_short_runs_take_the_first_that_applies(ring):
+    model = build(ring, fidelity="rigid")
+    equation = Equation(model, STRONG)
+    start = equation.at_rest(dead_load(model).q)
+    assert isinstance(chosen(equation, start, 0.005, (Banded, Sparse)), Banded)
+    undamped = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0), "none"))
+    assert isinstance(chosen(undamped, start, 0.005, (Modal, Sparse)), Sparse)
+    slow = Equation(build(ring, cells=(1, 1), fidelity="monolithic"), STRONG)
+    assert stepper_for("auto", slow, start, 0.005).name == "snes"
+
+
+def test_what_is_timed_does_not_settle(ring):
+    """A strategy that gives up steps about the peak is not taken, whatever it costs."""
+    model = build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0)))
+    start, dt = equation.at_rest(dead_load(model).q), STRONG.duration / SHORTEST
+
+    class Indefinite(Banded):
+        def system(self, dt):
+            made = super().system(dt)
+            return made._replace(without=-made.without)
+
+    assert isinstance(chosen(equation, start, dt, (Indefinite, Sparse)), Sparse)
 
 
 def test_supports_that_have_moved_are_refused(ring):
     model = build(ring, fidelity="rigid")
     moved = model.settled(Settlement(0, (0.0, -1e-3, 0.0)))
     with pytest.raises(InvalidInput, match="supports have not moved"):
-        stepper_for("compliance", moved, STRONG)
+        stepper_for("compliance", Equation(moved, STRONG), None, 0.005)
 
 
 def laplacian(side):
@@ -158,7 +206,7 @@ def test_released_forces_leave_no_tension(rule):
     compliance *= 0.9 / np.linalg.eigvalsh(compliance)[-1] / 2.0  # 1 - F J stays definite
     start, force = rng.standard_normal(40), np.zeros(40)
     rows, stiffness = np.arange(40), np.full(40, 2.0 if facets else 1.0)
-    compiled = (facets, stiffness, points.arm, points.joint)
+    compiled = Law(facets, stiffness, points.arm, points.joint)
     passes = release(start, rows, compliance, compiled, force, 1e-13)
     gap = start + compliance @ force
     first, second = law.entries

@@ -8,12 +8,13 @@ import pytest
 from orders import observed_order
 from scipy.linalg import eigh
 
-from archfem.dynamics import Stepper
 from archfem.errors import InvalidInput
 from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.schemes import HHT, Newmark, Rayleigh
 from archfem.statics import dead_load, self_weight
+from archfem.stepping.equation import Equation
+from archfem.stepping.exact import Exact
 
 STILL = Motion(np.zeros(2), 1.0)
 
@@ -32,10 +33,10 @@ def swinging(model, dead, mode):
     """A start in one mode about the dead load, so small that no joint point changes status."""
     tangent = model.tangent(dead.q)
     squares, shapes = eigh(tangent.toarray(), model.mass.toarray())
-    stepper = Stepper(model, STILL)
-    state = stepper.at_rest(dead.q)
+    equation = Equation(model, STILL)
+    state = equation.at_rest(dead.q)
     shape = 1e-9 * shapes[:, mode] / np.abs(shapes[:, mode]).max()
-    return stepper.released(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
+    return equation.released(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_second_order_in_time(model, dead, scheme, bound):
     end = 5.0 * 2.0 * np.pi / omega
     errors, sizes = [], np.array([20, 40, 80])
     for steps in 5 * sizes:
-        stepper = Stepper(model, STILL, scheme=scheme)
+        stepper = Exact(Equation(model, STILL, scheme=scheme))
         *_, last = stepper.steps(start, end / steps, end)
         amplitude = shape @ (last.state.q - dead.q) / (shape @ shape)
         velocity = shape @ last.state.velocity / (shape @ shape) / omega
@@ -61,11 +62,11 @@ def test_second_order_in_time(model, dead, scheme, bound):
     assert errors[-1] < (1.05 if scheme.alpha == 0.0 else 2.5) * theory
 
 
-def energies(model, stepper, start, dt, end):
+def energies(model, start, dt, end):
     """Kinetic + potential energy less the work of weight, along a run."""
     weight = self_weight(model)
     found = []
-    for step in stepper.steps(start, dt, end):
+    for step in Exact(Equation(model, STILL)).steps(start, dt, end):
         state = step.state
         kinetic = 0.5 * state.velocity @ (model.mass @ state.velocity)
         found.append(kinetic + model.energy(state.q) - weight @ state.q)
@@ -75,7 +76,7 @@ def energies(model, stepper, start, dt, end):
 def test_energy_is_conserved_while_joints_stay_closed(model, dead):
     start, _, omega = swinging(model, dead, 0)
     dt = 2.0 * np.pi / omega / 20.0
-    energy = energies(model, Stepper(model, STILL), start, dt, 50.0 * dt)
+    energy = energies(model, start, dt, 50.0 * dt)
     rest = model.energy(dead.q) - self_weight(model) @ dead.q
     kinetic = 0.5 * omega**2 * (start.q - dead.q) @ (model.mass @ (start.q - dead.q))
     # Both are differences of energies near 10 J: their rounding is 1e-15 J.
@@ -85,16 +86,13 @@ def test_energy_is_conserved_while_joints_stay_closed(model, dead):
 
 def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
     """A push that opens joints: what the weight and the springs give is kept, but for O(dt²)."""
-    stepper = Stepper(model, STILL)
-    push = stepper.at_rest(dead.q)
+    equation = Equation(model, STILL)
+    push = equation.at_rest(dead.q)
     velocity = np.zeros(model.size)
     velocity[0::3] = 0.05
-    start = stepper.released(replace(push, velocity=velocity))
+    start = equation.released(replace(push, velocity=velocity))
     given = 0.5 * velocity @ (model.mass @ velocity)
-    drift = [
-        np.ptp(energies(model, Stepper(model, STILL), start, dt, 0.2)) / given
-        for dt in (5e-4, 2.5e-4)
-    ]
+    drift = [np.ptp(energies(model, start, dt, 0.2)) / given for dt in (5e-4, 2.5e-4)]
     opened = ~model.operator.status(dead.q + 0.01 * velocity)
     assert opened.any()
     assert drift[0] < 0.02
@@ -105,10 +103,10 @@ def test_work_of_the_ground_balances_energy(ring, model, dead):
     """Undamped, joints closed: energy gained = work of -M r a_g, to the trapezoidal rule."""
     times = np.arange(0.0, 0.5, 0.005)
     motion = Motion(0.002 * np.sin(2.0 * np.pi * 4.0 * times), 0.005)
-    stepper = Stepper(model, motion)
-    start = stepper.at_rest(dead.q)
+    equation = Equation(model, motion)
+    start = equation.at_rest(dead.q)
     weight = self_weight(model)
-    states = [start] + [s.state for s in stepper.steps(start, 0.005, 0.49)]
+    states = [start] + [s.state for s in Exact(equation).steps(start, 0.005, 0.49)]
     force = [-model.body @ motion.at(s.time)[0] for s in states]
     moved = [b.q - a.q for a, b in pairwise(states)]
     work = sum(0.5 * (a + b) @ d for a, b, d in zip(force[:-1], force[1:], moved, strict=True))
@@ -118,8 +116,8 @@ def test_work_of_the_ground_balances_energy(ring, model, dead):
 
 
 def test_at_rest_stays_at_rest(model, dead):
-    stepper = Stepper(model, STILL, damping=Rayleigh(0.05, (8.0, 16.0)))
-    *_, last = stepper.steps(stepper.at_rest(dead.q), 0.005, 5.0)
+    equation = Equation(model, STILL, Rayleigh(0.05, (8.0, 16.0)))
+    *_, last = Exact(equation).steps(equation.at_rest(dead.q), 0.005, 5.0)
     assert np.abs(last.state.q - dead.q).max() < 1e-12
 
 
@@ -127,8 +125,8 @@ def test_free_fall(stack):
     """Ground that drops faster than g: nothing holds the blocks, which fall with g."""
     model = build(stack, fidelity="rigid")
     down = Motion(np.zeros(201), 0.001, np.full(201, -3.0 * 9.81))
-    stepper = Stepper(model, down)
-    steps = list(stepper.steps(stepper.at_rest(dead_load(model).q), 0.001, 0.2))
+    equation = Equation(model, down)
+    steps = list(Exact(equation).steps(equation.at_rest(dead_load(model).q), 0.001, 0.2))
     # Relative to the ground the blocks rise at 2 g once the compressed joints have let go.
     late = steps[100:]
     rate = np.diff([s.state.velocity[1] for s in late]) / 0.001
@@ -144,7 +142,7 @@ def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
     start, shape, omega = swinging(model, dead, 0)
     low = omega / 2.0 / np.pi
     damping = Rayleigh(0.05, (low, 4.0 * low), joints)
-    stepper = Stepper(model, STILL, damping=damping)
+    stepper = Exact(Equation(model, STILL, damping))
     dt = 2.0 * np.pi / omega / 400.0
     steps = list(stepper.steps(start, dt, 400 * dt * 3.2))
     found = np.array([shape @ (s.state.q - dead.q) / (shape @ shape) for s in steps])
@@ -163,8 +161,8 @@ def test_closed_and_initial_damping_differ_only_where_joints_open(stack):
         motion = Motion(amplitude * np.sin(2.0 * np.pi * 5.0 * times), 0.005)
         ends = []
         for joints in ("closed", "initial"):
-            stepper = Stepper(model, motion, damping=Rayleigh(0.05, (5.0, 40.0), joints))
-            *_, last = stepper.steps(stepper.at_rest(dead.q), 0.005, 0.25)
+            equation = Equation(model, motion, Rayleigh(0.05, (5.0, 40.0), joints))
+            *_, last = Exact(equation).steps(equation.at_rest(dead.q), 0.005, 0.25)
             ends.append(last.state.q)
         near = np.abs(ends[0] - ends[1]).max() < 1e-9 * np.abs(ends[0]).max()
         assert near == same

@@ -25,7 +25,7 @@ from scipy.sparse.linalg import splu
 
 from archfem.structure import Array
 
-Numbers = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
 LEAF = 16
 """Columns up to which a whole branch of the elimination tree becomes one group."""
@@ -49,12 +49,12 @@ class Factor(NamedTuple):
         parent: group of the first row below, -1 where there is none (groups,).
     """
 
-    first: Numbers
-    below: Numbers
-    rows: Numbers
-    places: Numbers
+    first: Indices
+    below: Indices
+    rows: Indices
+    places: Indices
     panels: Array
-    parent: Numbers
+    parent: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +68,10 @@ class Plan:
         parent: group of the first row below, -1 where there is none (groups,).
     """
 
-    order: Numbers
+    order: Indices
     groups: list[tuple[int, int]]
-    rows: list[Numbers]
-    parent: Numbers
+    rows: list[Indices]
+    parent: Indices
 
     @classmethod
     def of(cls, pattern: sparse.csr_matrix) -> "Plan":
@@ -91,7 +91,7 @@ class Plan:
         return cls(order[after], groups, rows, parent)
 
     @property
-    def group_of(self) -> Numbers:
+    def group_of(self) -> Indices:
         """Group of each coordinate, in the order of the plan (n,)."""
         return np.repeat(np.arange(len(self.groups)), [end - start for start, end in self.groups])
 
@@ -117,7 +117,7 @@ def factorised(matrix: sparse.csr_matrix, plan: Plan) -> Factor:
     )
 
 
-def _fill(matrix: sparse.csc_matrix) -> list[Numbers]:
+def _fill(matrix: sparse.csc_matrix) -> list[Indices]:
     """Rows below the diagonal in each column of the factor, in order."""
     size = matrix.shape[0]
     found: list[set[int]] = []
@@ -134,7 +134,7 @@ def _fill(matrix: sparse.csc_matrix) -> list[Numbers]:
     return [np.array(sorted(rows), dtype=np.int64) for rows in found]
 
 
-def _postorder(parent: list[int]) -> Numbers:
+def _postorder(parent: list[int]) -> Indices:
     """Children before parents, each branch without a gap; roots have the parent `len(parent)`."""
     children: list[list[int]] = [[] for _ in range(len(parent) + 1)]
     for node, above in enumerate(parent):
@@ -147,7 +147,7 @@ def _postorder(parent: list[int]) -> Numbers:
     return np.array(order[::-1])
 
 
-def _groups(fill: list[Numbers]) -> list[tuple[int, int]]:
+def _groups(fill: list[Indices]) -> list[tuple[int, int]]:
     """First column of each group and the one after its last."""
     size = len(fill)
     branch = np.ones(size, dtype=np.int64)
@@ -186,7 +186,7 @@ def _panels(matrix: sparse.csc_matrix, plan: Plan) -> list[Array]:
     """Panel of each group, column by column, from fronts that pass on what is left of them."""
     rows, parent = plan.rows, plan.parent
     place = np.empty(matrix.shape[0], dtype=np.int64)
-    waiting: list[list[tuple[Numbers, Array]]] = [[] for _ in rows]
+    waiting: list[list[tuple[Indices, Array]]] = [[] for _ in rows]
     panels = []
     for number, (start, end) in enumerate(plan.groups):
         width, height = end - start, end - start + len(rows[number])

@@ -17,7 +17,21 @@ from the gaps of the last pass, and those of the first pass from the λ of the l
 import numba
 import numpy as np
 
-from archfem.compiled.kernel import ITERATIONS, integrals, open_part
+from archfem.stepping.joint_law import Law, integrals, open_part, pull, pulls
+from archfem.stepping.loop import ITERATIONS
+
+SETTLED = 1e-12
+"""Error of a contact force, relative to the largest of all joints as if closed, that ends the
+passes."""
+
+EXACT = 1e-11
+"""The same that is left to rounding once the gaps of the whole structure are known."""
+
+AHEAD = 2.0
+"""Steps ahead for which it is foreseen which points may open."""
+
+FEW = 24
+"""Points up to which the problem is solved directly."""
 
 ROUGH = 1e-3
 """What the first pass leaves of its residual; later ones leave the less the better they converge,
@@ -32,18 +46,21 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
         start: z₀ (p,), of which the rows are used.
         rows: points that may open, in order; of a facet both ends.
         compliance: F (p, p), of which these rows and columns are used.
-        law: exact facets?, stiffness (p,), arm (p,) and joint (p,) of the points.
+        law: `Law`.
         force: λ, as a first guess (p,); changed at the rows.
         enough: error of λ that is left [N].
     """
-    facets, stiffness = law[0], chosen(law[1], rows)
+    law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
     matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
     root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
     gap, left, last = free + matrix @ own, ROUGH, 0.0
     for passes in range(1, ITERATIONS + 1):
-        _roots(gap, stiffness, facets, root)
-        gap = _solve(free, matrix, (root, facets), own, (left, 0.1 * enough))
-        pulls(gap, (facets, stiffness), wanted)
+        _roots(gap, law, root)
+        if len(rows) <= FEW:
+            gap = _direct(free, matrix, (root, law.facets), own)
+        else:
+            gap = _solve(free, matrix, (root, law.facets), own, (left, 0.1 * enough))
+        pulls(gap, law, wanted)
         off = np.max(np.abs(wanted - own))
         if off <= enough:
             for i in range(len(rows)):
@@ -55,23 +72,31 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
 
 
 @numba.njit(cache=True)
-def pull(gap, other, stiffness, facets):  # type: ignore
-    """λ at a point: the tension that the closed stiffness would hold where the joint is open."""
-    if not facets:
-        return stiffness * max(gap, 0.0)
-    if gap <= 0.0 and other <= 0.0:
-        return 0.0
-    low, high = open_part(gap, other)
-    first, mixed, _ = integrals(low, high)
-    return stiffness * (first * gap + mixed * other)
+def exact(gap, force, near, law):  # type: ignore
+    """Whether the gaps ask for the λ they were found with; points that open count as near."""
+    largest, off = 0.0, 0.0
+    for row in range(len(gap)):
+        other = gap[row ^ 1] if law.facets else 0.0
+        wanted = pull(gap[row], other, law.stiffness[row], law.facets)
+        largest = max(largest, law.stiffness[row] * abs(gap[row]))
+        off = max(off, abs(wanted - force[row]))
+        if wanted > 0.0:
+            near[row] = True
+            if law.facets:
+                near[row ^ 1] = True
+    return off <= EXACT * largest
 
 
 @numba.njit(cache=True)
-def pulls(gap, law, force):  # type: ignore
-    """λ at all points."""
-    facets, stiffness = law[0], law[1]
+def expected(gap, before, force, facets):  # type: ignore
+    """Points that are open, or will be soon if they go on as they did (p,)."""
+    near = np.empty(len(gap), dtype=np.bool_)
     for row in range(len(gap)):
-        force[row] = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
+        near[row] = force[row] != 0.0 or gap[row] + AHEAD * (gap[row] - before[row]) > 0.0
+    if facets:
+        for row in range(0, len(gap), 2):
+            near[row] = near[row + 1] = near[row] or near[row + 1]
+    return near
 
 
 @numba.njit(cache=True)
@@ -95,12 +120,12 @@ def _square(matrix, rows):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _roots(gap, stiffness, facets, root):  # type: ignore
+def _roots(gap, law, root):  # type: ignore
     """R: the diagonal entry of each row and, for the first end of a facet, the one below it."""
     root[:] = 0.0
-    for i in range(0, len(gap), 2 if facets else 1):
-        scale = np.sqrt(stiffness[i])
-        if not facets:
+    for i in range(0, len(gap), 2 if law.facets else 1):
+        scale = np.sqrt(law.stiffness[i])
+        if not law.facets:
             root[i, 0] = scale if gap[i] > 0.0 else 0.0
         elif gap[i] > 0.0 or gap[i + 1] > 0.0:
             low, high = open_part(gap[i], gap[i + 1])
@@ -158,4 +183,31 @@ def _solve(free, matrix, roots, force, until):  # type: ignore
     image = _times_root(roots, solution)
     for i in range(len(force)):
         force[i] = image[i]
+    return free + matrix @ force
+
+
+@numba.njit(cache=True)
+def _direct(free, matrix, roots, force):  # type: ignore
+    """Solve for μ with R given by Cholesky's factor; the gaps, and λ in place."""
+    size = len(free)
+    spread, across = np.empty((size, size)), np.empty((size, size))
+    for i in range(size):
+        spread[i] = _times_transposed(roots, matrix[i])  # F R
+    for j in range(size):
+        across[j] = _times_transposed(roots, spread[:, j])  # Rᵀ F R
+    solution = _times_transposed(roots, free)
+    for i in range(size):
+        for j in range(i + 1):
+            total = -across[j, i]
+            for k in range(j):
+                total -= across[i, k] * across[j, k]
+            across[i, j] = total / across[j, j] if j < i else np.sqrt(1.0 + total)
+        for k in range(i):
+            solution[i] -= across[i, k] * solution[k]
+        solution[i] /= across[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            solution[i] -= across[k, i] * solution[k]
+        solution[i] /= across[i, i]
+    force[:] = _times_root(roots, solution)
     return free + matrix @ force

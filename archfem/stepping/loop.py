@@ -1,0 +1,79 @@
+"""The one compiled loop over steps; what a step is, the type of the strategy's system says.
+
+A system is a NamedTuple. For its type `begin`, `settle` and `measure` are given by
+`numba.extending.overload`, so that numba picks them when it compiles `advance`. The loop knows
+neither matrices nor joints: how gaps, resultants and energies come about is the system's own.
+"""
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+
+ITERATIONS = 40
+"""Passes over the joints in a step before it is given up."""
+
+
+def begin(system: Any, state: Any) -> Any:
+    """What is carried from step to step, of the state from which the first one goes."""
+    raise NotImplementedError
+
+
+def settle(system: Any, kept: Any, step: Any, states: Any, ground: Any) -> Any:
+    """Find the state at the end of a step, and fill `states[1]`.
+
+    Returns:
+        Passes over the joints; -1 if they do not settle.
+    """
+    raise NotImplementedError
+
+
+def measure(
+    system: Any, kept: Any, step: Any, states: Any, ground: Any, resultants: Any, energy: Any
+) -> Any:
+    """Fill the resultants and energies of a step that has settled."""
+    raise NotImplementedError
+
+
+def forget_stale(folder: Path) -> None:
+    """Delete compiled code of a folder that is older than any of its sources.
+
+    Numba looks at the source of each function alone, not at that of what it calls: without this,
+    `advance` would go on with strategies as they were when it was compiled.
+
+    Args:
+        folder: of modules, whose `__pycache__` holds what numba compiled.
+    """
+    newest = max(path.stat().st_mtime for path in folder.glob("*.py"))
+    for path in (folder / "__pycache__").glob("*.nb[ic]"):
+        with suppress(OSError):  # another process was first, or may not
+            if path.stat().st_mtime < newest:
+                path.unlink()
+
+
+forget_stale(Path(__file__).parent)
+
+
+@numba.njit(cache=True)
+def advance(series, results, ground, system):  # type: ignore
+    """Take steps until the end, or until one does not settle; return how many were taken.
+
+    Args:
+        series: coordinates, their velocity and acceleration at the start in [0]; filled
+            (steps + 1, 3, n).
+        results: N, V, M (steps, n_joints, 3), passes over the joints (steps,) and energies as by
+            `energy.Meter.step` (steps, 4), all filled.
+        ground: acceleration where the equation is written, and its mean over the step
+            (2, steps, 2).
+        system: of a strategy.
+    """
+    resultants, passes, energies = results
+    kept = begin(system, series[0])
+    for step in range(len(resultants)):
+        states = series[step : step + 2]
+        passes[step] = settle(system, kept, step, states, ground[0, step])
+        if passes[step] < 0:
+            return step
+        measure(system, kept, step, states, ground[1, step], resultants[step], energies[step])
+    return len(resultants)
