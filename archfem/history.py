@@ -185,4 +185,4 @@ class History:
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
             )
-        return cls(dataset if "hinge" in dataset else flagged(dataset, Criteria()), structure)
+        return cls(flagged(dataset), structure)

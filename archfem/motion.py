@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from numbers import Real
+from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from archfem import signals
-from archfem.arguments import instance, real, whole
+from archfem.arguments import instance, real
 from archfem.errors import InvalidInput
 from archfem.records.channel import Channel
 from archfem.records.read import read_channels
@@ -144,7 +144,9 @@ class Motion:
                 f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
                 f"{vertical_ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
             )
-        whole(seed, "seed of a synthetic motion", least=0)
+        instance(seed, Integral, "seed", "give a whole number")
+        if seed < 0:
+            raise InvalidInput(f"synthetic motion of seed {seed}: seeds are 0, 1, 2, …")
         random = np.random.default_rng(seed)
         count = round(duration / dt) + 1
         level = pga * enveloped_noise(count, dt, random=random)

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 
-from archfem.arguments import row, whole
+from archfem.arguments import whole
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.reduce import modal, reduced
@@ -57,7 +57,8 @@ def build(
         MeshError: the blocks cannot be cut as asked.
     """
     rule = Quadrature(quadrature, points)
-    row(cells, "cells through the thickness and along each block", 2)
+    if not hasattr(cells, "__len__") or len(cells) != 2:
+        raise InvalidInput(f"cells {cells!r}: give two numbers, through the thickness and along")
     for count in cells:
         whole(count, f"a number of cells {cells!r}")
     if isinstance(fidelity, str) and fidelity not in FIDELITIES:
