@@ -137,15 +137,15 @@ def flags(
 
 
 def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
-    """Joints with the flags of other criteria, which the dataset then carries as attributes.
+    """Joints with the flags of some criteria, which the dataset then carries as attributes.
 
     Args:
         joints: N, eccentricity and friction, as made by `joint_dataset`.
-        criteria: by default those by which the joints were judged already.
+        criteria: by default those by which the joints were judged already, or the usual ones.
     """
-    if criteria is None:
+    if criteria is None and "hinge" in joints:
         return joints
-    instance(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
+    criteria = chosen(criteria) or Criteria.of(joints)
     normal, e, friction = (
         joints[name].transpose(..., "joint", missing_dims="ignore")
         for name in ("N", "eccentricity", "friction")

@@ -187,4 +187,4 @@ class History:
                 f"{path} does not tell which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        return cls(dataset if "hinge" in dataset else flagged(dataset, Criteria()), structure)
+        return cls(flagged(dataset), structure)

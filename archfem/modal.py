@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from archfem.arguments import instance, whole
+from archfem.arguments import instance
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model, check_model
 from archfem.statics import Equilibrium
@@ -89,7 +90,8 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     check_model(model)
     if about is not None:
         instance(about, Equilibrium, "about", "give dead_load(model), or None")
-    if not 1 <= whole(count, "number of modes") <= model.size:
+    instance(count, Integral, "number of modes", "give a whole number")
+    if not 1 <= count <= model.size:
         raise InvalidInput(
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )

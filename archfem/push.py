@@ -8,7 +8,7 @@ import xarray as xr
 
 from archfem.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.arguments import instance
-from archfem.criteria import Criteria
+from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.models import Model, check_model
 from archfem.path import LoadPath, Path, Stop, SupportPath, follow
@@ -138,15 +138,19 @@ def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 
-def hinge_order(joints: xr.Dataset) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
+def hinge_order(
+    joints: xr.Dataset, criteria: Criteria | None = None
+) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
     """Sort joints by the step at which they first hinge; in a step, those nearer the edge first.
 
     Args:
         joints: over step and joint, as of a `Pushover`.
+        criteria: by default those by which the joints were judged already.
 
     Returns:
         Joints with the face that stays in contact, and the steps.
     """
+    joints = flagged(joints, criteria)
     side = joints["hinge"].transpose("step", "joint").values
     first = np.argmax(side != 0, axis=0)
     e = np.abs(joints["eccentricity"].transpose("step", "joint").values)

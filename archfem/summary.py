@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.counted import Mechanism
-from archfem.criteria import envelope, first_time, judged, longest_duration
+from archfem.criteria import envelope, first_time, flagged, judged, longest_duration
 from archfem.history import Ending, History
 from archfem.matching import Match
 from archfem.measures import measures
@@ -30,10 +30,10 @@ def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
     Only joints that are `judged` have a line.
 
     Args:
-        joints: over time and joint, with their flags.
+        joints: over time and joint.
         dead: over joint, under dead load alone.
     """
-    joints = judged(joints)
+    joints = judged(flagged(joints))
     rest = np.full(joints.sizes["joint"], np.nan)
     if dead is not None:
         rest = judged(dead)["eccentricity"].values

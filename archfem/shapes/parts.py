@@ -6,11 +6,12 @@ the centre lines of all rings meet their springing joints.
 
 from dataclasses import dataclass, field, replace
 from math import atan2, radians, sin
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
 
-from archfem.arguments import real
+from archfem.arguments import instance
 from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
 from archfem.structure import Point
@@ -194,7 +195,8 @@ class Paving:
 def _check_positive(part: Any, *keys: str) -> None:
     """Refuse lengths that cannot be meant."""
     for key in keys:
-        value = real(getattr(part, key), f"'{part.name}', {key} [m]")
+        value = getattr(part, key)
+        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
         if not 0.0 < value < 1e3:
             raise InvalidStructure(
                 f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
@@ -204,6 +206,7 @@ def _check_positive(part: Any, *keys: str) -> None:
 def _check_not_negative(part: Any, *keys: str) -> None:
     """Refuse lengths that can be 0 but no less."""
     for key in keys:
-        value = real(getattr(part, key), f"'{part.name}', {key} [m]")
+        value = getattr(part, key)
+        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
         if not 0.0 <= value < 1e3:
             raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from archfem.case import Case
-from archfem.errors import InvalidInput, InvalidStructure
+from archfem.errors import InvalidStructure
 from archfem.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE, Material
 from archfem.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
 
@@ -310,6 +310,7 @@ def test_gravity_width_and_material_are_passed_on():
         (lambda: Sidewall(**WALL | {"above": -0.1}), "'sidewall': above -0.1 m is not from 0"),
         (lambda: Sidewall(**WALL, setback=-0.1), "'sidewall': setback -0.1 m is not from 0"),
         (lambda: Backfill(cover=0.4, erosion=-0.1), "'backfill': erosion -0.1 m is not from 0"),
+        (lambda: Backfill(cover=float("nan")), "'backfill': cover nan m is not from 0"),
         (lambda: Backfill(cover=0.4, hump=-1.0), "'backfill': hump -1 m is not from 0"),
         (lambda: Backfill(cover=0.4, spandrels=-1.0), "'backfill': spandrels -1 m is not from 0"),
         (lambda: Paving(thickness=0.0), "'paving': thickness 0 m"),
@@ -318,11 +319,6 @@ def test_gravity_width_and_material_are_passed_on():
 def test_impossible_parts_are_refused(make, says):
     with pytest.raises(InvalidStructure, match=says):
         make()
-
-
-def test_what_is_no_number_is_no_length():
-    with pytest.raises(InvalidInput, match=r"'backfill', cover \[m\] = nan is not a finite number"):
-        Backfill(cover=float("nan"))
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def joints_of(failing):
             "friction_limit": ("joint", np.full(20, 0.6)),
         },
     )
-    return flagged(joints, Criteria())
+    return flagged(joints)
 
 
 def test_definitions_of_a_counted_mechanism():

@@ -99,7 +99,7 @@ def test_petsc_options_are_passed_on_and_removed(ring):
     ("given", "says"),
     [
         ({"fidelity": "exact"}, "fidelity 'exact' is not known"),
-        ({"cells": (4, 4, 4)}, "give two numbers"),
+        ({"cells": (4, 4, 4)}, "has 3 values"),
         ({"quadrature": "simpson"}, "'simpson' is not known"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.extending import overload
 
-from archfem.models.build import build
+from archfem.ladder import build
 from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.shapes import column

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from archfem.actions import BodyForce, Settlement
-from archfem.criteria import Criteria, flagged
+from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.models.rigid import rigid
 from archfem.push import hinge_order, pushover
@@ -46,7 +46,7 @@ def test_a_settlement_says_what_it_measures():
 
 def test_hinges_come_in_order_and_depend_on_what_counts_as_one(push):
     assert list(push.hinge_steps) == sorted(push.hinge_steps)
-    strict, late = hinge_order(flagged(push.joints, Criteria(hinge=0.4999)))
+    strict, late = hinge_order(push.joints, Criteria(hinge=0.4999))
     assert set(strict) <= set(push.hinges)
     assert max(late) >= max(push.hinge_steps)
 

@@ -82,9 +82,9 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
     The crown is sheared and not turned, and the springings carry the same weight between them.
     """
     model = build(COUPLE, fidelity="rigid")
-    before = dead_load(model, TIGHT).joints
+    before = dead_load(model, TIGHT).joints[["N", "V", "M"]]
     sunk, risen = (
-        dead_load(model.settled(Settlement(3, (0.0, by, 0.0))), TIGHT).joints - before
+        dead_load(model.settled(Settlement(3, (0.0, by, 0.0))), TIGHT).joints[[*before]] - before
         for by in (-1e-6, 1e-6)
     )
     assert float(sunk["V"][1]) < -1.0  # the higher block, on the right, hangs on its neighbour
