@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from archfem.arguments import real, reals, whole
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.direction import Direction, directions_of
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.materials import Contact
 from archfem.roles import with_roles
-from archfem.structure import TOUCHING, Array, Block, Joint, Structure
+from archfem.structure import TOUCHING, Block, Joint, Structure
 from archfem.units import G
 
 ContactOf = Callable[[Block, Block], Contact]

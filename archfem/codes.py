@@ -6,8 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from archfem.arguments import real
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.oscillator import Array, check
+from archfem.oscillator import check
 
 
 class DesignSpectrum(Protocol):

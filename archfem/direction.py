@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem.structure import Array, Block
+from archfem.arrays import Array
+from archfem.structure import Block
 
 STRAIGHT = 0.005
 """Spread of a ring's stones across its length, relative to that along it, up to which it has no

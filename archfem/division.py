@@ -17,10 +17,11 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
+from archfem.arrays import Array
 from archfem.discretisation import Discretisation
 from archfem.edges import Edges, Numbers, edges_of
 from archfem.errors import MeshError
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 SLENDER = 2.0
 """Longest cell of a stone, in multiples of the stone's thickness across it [-]."""

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.naming import did_you_mean
-from archfem.structure import Array
 from archfem.units import in_unit
 
 SIZES = (0.02, 20.0)

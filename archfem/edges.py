@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from archfem.structure import TOUCHING, Array, Structure
+from archfem.arrays import Array
+from archfem.structure import TOUCHING, Structure
 
 Numbers = NDArray[np.intp]
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from archfem._petsc import PETSc, SLEPc
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge
-from archfem.structure import Array
 
 ROUNDING = 1e-13
 """Of the largest ω² of a coordinate by itself: what rounding makes of a zero stays well below."""

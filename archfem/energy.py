@@ -14,8 +14,8 @@ start, is the drift. It is negative where a scheme damps by itself, as HHT does.
 import numpy as np
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.models import Model
-from archfem.structure import Array
 
 STILL = 1e-6
 """Energies below this fraction of that stored under self-weight count as none."""

@@ -11,12 +11,13 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import xarray as xr
 
+from archfem.arrays import Array
 from archfem.counted import KINDS, counted_mechanism, counted_mechanisms
 from archfem.criteria import Criteria, chosen, failing
 from archfem.errors import InvalidInput
 from archfem.mechanism import Verifier
 from archfem.resultants import joint_dataset, ratios
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 Watch = Callable[[Array], str | None]
 """Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""

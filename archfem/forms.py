@@ -17,10 +17,10 @@ from dolfinx import fem
 from scipy import sparse
 
 from archfem import _fenicsx
+from archfem.arrays import Array
 from archfem.laws import normal_traction, shear_traction
 from archfem.quadrature import Quadrature
 from archfem.space import BrokenSpace
-from archfem.structure import Array
 
 
 def strain(u: Any) -> Any:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models.cells import Cells
 from archfem.resultants import check_instant, thrust_line
-from archfem.structure import Array, Block, Structure
+from archfem.structure import Block, Structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from archfem.arrays import Array
 
 
 def area_of_polygon(points: Array) -> tuple[float, Array, float]:

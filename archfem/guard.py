@@ -4,11 +4,11 @@ import logging
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.energy import Balance
 from archfem.errors import DidNotConverge
 from archfem.models import Model
 from archfem.states import Batch, State
-from archfem.structure import Array
 
 logger = logging.getLogger("archfem")
 

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.laws import is_closed, normal_traction
 from archfem.quadrature import Quadrature
 from archfem.sparsity import Pattern
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 Numbers = NDArray[np.intp]
 Status = NDArray[np.bool_]

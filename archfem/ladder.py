@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.discretisation import Discretisation
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model, Prediction
@@ -22,7 +23,7 @@ from archfem.quadrature import Quadrature
 from archfem.schemes import Rayleigh
 from archfem.softness import soft_blocks
 from archfem.stepping.modal import LARGEST
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 Damping = Rayleigh | Callable[[Model], Rayleigh | None] | None
 """Of a run to come: known, or to be found of the finest model."""

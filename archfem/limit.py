@@ -11,13 +11,14 @@ from scipy import sparse
 
 from archfem.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.arguments import instance, real
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.programme import Optimum, Programme, friction_limits, no_limits
 from archfem.resultants import joint_dataset
 from archfem.rigid_blocks import RigidBlocks, rigid_load
 from archfem.sliding import without_dilatancy
 from archfem.softness import yielding_blocks
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 LOG = logging.getLogger("archfem")
 

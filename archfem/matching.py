@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from archfem import oscillator, signals
+from archfem.arrays import Array
 from archfem.codes import DesignSpectrum
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.measures import Measures, measures
 from archfem.motion import Motion
-from archfem.signals import Array
 from archfem.spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
 

@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.counted import Mechanism, counted_mechanism, mechanism_kind
 from archfem.criteria import Criteria, chosen, flagged
 from archfem.errors import DidNotConverge
@@ -17,7 +18,7 @@ from archfem.rigid_blocks import RigidBlocks
 from archfem.roles import judged_parts
 from archfem.screen import Screen
 from archfem.skeleton import Skeleton, skeleton_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 MOVING = 1e-6
 """Least motion, relative to the largest allowed, that counts as a motion."""

@@ -9,10 +9,10 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model, check_model
 from archfem.statics import Equilibrium
-from archfem.structure import Array
 from archfem.tables import aligned
 
 SEEN = 1e-3

@@ -11,9 +11,9 @@ import numpy as np
 
 from archfem import signals
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.records.read import read_components
-from archfem.signals import Array
 from archfem.synthetic import accelerogram
 from archfem.units import STANDARD_GRAVITY
 

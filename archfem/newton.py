@@ -14,8 +14,8 @@ from scipy import sparse
 
 from archfem._petsc import PETSc
 from archfem.arguments import instance, real
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.structure import Array
 
 Residual = Callable[[Array], Array]
 Tangent = Callable[[Array], sparse.csr_matrix]

@@ -2,13 +2,11 @@
 
 import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
-from numpy.typing import NDArray
 from scipy import linalg
 
 from archfem.arguments import real
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 SAMPLES_PER_PERIOD = 40
 """The record is interpolated until an oscillation has this many samples."""

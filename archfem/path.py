@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem.actions import BodyForce, PointLoad, Settlement
+from archfem.arrays import Array
 from archfem.criteria import Criteria
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models import Model
@@ -16,7 +17,6 @@ from archfem.newton import Solver, magnitude
 from archfem.resultants import joint_dataset
 from archfem.rigid_blocks import RigidBlocks
 from archfem.statics import Equilibrium, self_weight
-from archfem.structure import Array
 
 TOLERANCE, ROUGHLY, ITERATIONS = 1e-9, 1e-7, 30
 """Force left out of balance, relative to the sum of all loads; the same where round-off of large

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.errors import InvalidStructure
-from archfem.structure import TOUCHING, Array
+from archfem.structure import TOUCHING
 
 
 def check_simple(outline: Array, name: str) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import eigsh
 
 from archfem.actions import BodyForce
+from archfem.arrays import Array
 from archfem.criteria import judged
 from archfem.errors import DidNotConverge
 from archfem.models import Model
@@ -11,7 +12,6 @@ from archfem.motion import Motion
 from archfem.runs import time_history
 from archfem.schemes import Rayleigh
 from archfem.statics import equilibrium, self_weight
-from archfem.structure import Array
 
 WINDOW = 8.0
 """Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""

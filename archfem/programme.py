@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.rigid_blocks import RigidBlocks
-from archfem.structure import Array
 
 FEASIBLE = 1e-9
 """Residual of balance and limits that the linear programme accepts, in mean block weights."""

@@ -8,13 +8,13 @@ import xarray as xr
 
 from archfem.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.criteria import Criteria, flagged
 from archfem.errors import InvalidInput
 from archfem.models import Model, check_model
 from archfem.path import LoadPath, Path, Stop, SupportPath, follow
 from archfem.resultants import joint_dataset
 from archfem.statics import Equilibrium, dead_load
-from archfem.structure import Array
 
 CONTROLS = ("displacement", "arc length", "force")
 

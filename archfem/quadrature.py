@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from archfem.arguments import whole
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 
-Array = NDArray[np.float64]
 RULES = ("lobatto", "nodal", "gauss", "exact")
 
 

@@ -5,6 +5,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.criteria import Criteria
 from archfem.guard import Guard
 from archfem.history import SIGNS, Ending, History
@@ -12,7 +13,6 @@ from archfem.models import Model
 from archfem.motion import Motion
 from archfem.resultants import joint_dataset
 from archfem.states import Batch, State
-from archfem.structure import Array
 
 _EFFORT = {
     "iterations": {"long_name": "Newton iterations, or passes, since the last record"},

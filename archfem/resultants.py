@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.criteria import Criteria, flags
 from archfem.errors import InvalidInput
 from archfem.naming import number_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 UNITS = {
     "N": ("N", "normal force, compression positive"),

@@ -18,10 +18,11 @@ import numpy as np
 from scipy import sparse
 
 from archfem.actions import BodyForce, PointLoad
+from archfem.arrays import Array
 from archfem.quadrature import Quadrature
 from archfem.rigid_joints import rigid_joints
 from archfem.rigid_motion import first_coordinate, motion_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:

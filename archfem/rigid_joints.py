@@ -3,10 +3,11 @@
 import numpy as np
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.joints import JointOperator, JointPoints, law_of
 from archfem.quadrature import Quadrature
 from archfem.rigid_motion import motion_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 def facets_of(depth: float, cells: int) -> Array:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from archfem.structure import Array, Structure
+from archfem.arrays import Array
+from archfem.structure import Structure
 
 
 def motion_of(points: Array, centroid: Array) -> Array:

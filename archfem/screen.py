@@ -19,8 +19,8 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
+from archfem.arrays import Array
 from archfem.rigid_blocks import RigidBlocks
-from archfem.structure import Array
 
 SHUT = 1e-5
 """Least misfit of loops, per unit of gap, that counts: well above what the linear programme lets

@@ -2,13 +2,11 @@
 
 import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
-from numpy.typing import NDArray
 from scipy import integrate
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
-
-Array = NDArray[np.float64]
 
 LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
 """No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.softness import yielding_blocks
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.programme import Optimum, Programme, friction_limits
-from archfem.structure import Array
 
 RATE = 1e-5
 """Relative change of the objective, and excess of |V| over μ N, at which the iteration ends."""

@@ -15,9 +15,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
+from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.polygons import check_apart, check_simple
-from archfem.structure import TOUCHING, Array
+from archfem.structure import TOUCHING
 
 NEARLY = 5.0
 """Gaps up to so many times the tolerance are taken for faults of the survey."""

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem import _fenicsx
+from archfem.arrays import Array
 from archfem.joints import JointOperator, JointPoints, law_of
 from archfem.mesh import Mesh
 from archfem.quadrature import Quadrature
-from archfem.structure import Array
 
 Nodes = NDArray[np.int32]
 

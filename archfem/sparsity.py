@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.structure import Array
+from archfem.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

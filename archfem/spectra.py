@@ -4,9 +4,9 @@ import numpy as np
 
 from archfem import oscillator
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import Motion
-from archfem.signals import Array
 
 
 def response_spectrum(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.structure import Array
+from archfem.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ import xarray as xr
 
 from archfem.actions import BodyForce
 from archfem.arguments import instance
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.models import Model, check_model
 from archfem.newton import Newton, Solved, Solver, magnitude
 from archfem.resultants import joint_dataset, one_joint
-from archfem.structure import Array
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""

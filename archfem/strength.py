@@ -7,10 +7,11 @@ the edge stress from them, hold that of the joints where damping is "closed".
 import numpy as np
 import xarray as xr
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.stress import at_corners, check_state, principal_values
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.tables import aligned
 from archfem.units import MPa
 

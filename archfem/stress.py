@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.cells import Cells
-from archfem.structure import Array
 
 PATCH = 4
 """Least number of cells to which stress at a corner is fitted: one more than a plane has."""

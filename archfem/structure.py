@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.arguments import real
+from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.geometry import area_of_polygon, area_of_sector, side_of_line
 from archfem.materials import Contact, Material
@@ -14,7 +15,6 @@ from archfem.naming import number_of
 from archfem.roles import judged_parts, with_roles
 from archfem.units import G
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 TOUCHING = 1e-6

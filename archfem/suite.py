@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.codes import DesignSpectrum
 from archfem.errors import InvalidInput
 from archfem.matching import Match, matched
 from archfem.motion import Motion
-from archfem.signals import Array
 from archfem.spectra import response_spectrum
 
 

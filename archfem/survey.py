@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.assembly import assembled, by_materials, touching
 from archfem.direction import Direction, directions_of
 from archfem.drawings import Outline, outlines_in
@@ -22,7 +23,7 @@ from archfem.materials import (
 )
 from archfem.roles import with_roles
 from archfem.snapping import NEARLY, snapped
-from archfem.structure import Array, Block, Structure
+from archfem.structure import Block, Structure
 from archfem.units import G
 
 SHARP, FLAT = np.radians(45.0), np.radians(10.0)

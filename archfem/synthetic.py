@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.arguments import real, whole
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.signals import Array, baseline_corrected
+from archfem.signals import baseline_corrected
 
 # Firm ground; the vertical is richer in high frequencies (Clough, Penzien, section 28-5).
 _GROUND = {"horizontal": (15.0, 0.6), "vertical": (25.0, 0.6)}  # rad/s, damping ratio

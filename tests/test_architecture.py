@@ -11,8 +11,8 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 LAYERS = [
-    "errors tables files geometry laws _petsc",
-    "roles units naming arguments",
+    "errors arrays tables files laws _petsc",
+    "roles units naming arguments geometry",
     "criteria materials quadrature schemes signals oscillator records",
     "structure synthetic codes settings counted discretisation",
     "actions drawings polygons direction sparsity resultants motion softness rigid_motion",

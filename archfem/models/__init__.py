@@ -10,10 +10,11 @@ from typing import Any, Protocol, Self
 from scipy import sparse
 
 from archfem.actions import Action, Settlement
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints import JointOperator
 from archfem.models.cells import Cells
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 @dataclass(frozen=True)

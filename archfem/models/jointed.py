@@ -7,12 +7,13 @@ import numpy as np
 from scipy import sparse
 
 from archfem.actions import Action, BodyForce, Settlement
+from archfem.arrays import Array
 from archfem.joints import JointOperator
 from archfem.models import Prediction
 from archfem.models.cells import Cells
 from archfem.rigid_joints import gaps_of
 from archfem.sparsity import Pattern
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 
 class Jointed:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem.actions import Settlement
+from archfem.arrays import Array
 from archfem.forms import Forms
 from archfem.models import Prediction
 from archfem.models.full import full
@@ -13,7 +14,6 @@ from archfem.quadrature import Quadrature
 from archfem.rigid_motion import motion_of
 from archfem.space import BrokenSpace
 from archfem.sparsity import Pattern
-from archfem.structure import Array
 
 
 class Monolithic:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from archfem.arrays import Array
 from archfem.joints import Facets
 from archfem.models.jointed import Jointed
 from archfem.rigid_motion import motion_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 Numbers = NDArray[np.intp]
 

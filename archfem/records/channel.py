@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from archfem.records.text import Array
+from archfem.arrays import Array
 
 _DOWN = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
 _VERTICAL = re.compile(r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE)

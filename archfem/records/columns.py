@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.records.channel import Channel
-from archfem.records.text import NUMBER, Array, RecordText
+from archfem.records.text import NUMBER, RecordText
 from archfem.records.units import unit_named, units_written
 
 _STEP = re.compile(

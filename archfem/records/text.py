@@ -8,11 +8,9 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 """Pattern of a number as Fortran and C print it."""

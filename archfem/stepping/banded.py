@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from archfem.arrays import Array
 from archfem.stepping.band import factorise, substitute
 from archfem.stepping.equation import Equation
 from archfem.stepping.joint_law import closed_stiffness, pulls
@@ -26,7 +27,6 @@ from archfem.stepping.loop import ITERATIONS
 from archfem.stepping.open_points import SETTLED
 from archfem.stepping.sparse_rows import times
 from archfem.stepping.strategy import Reordered
-from archfem.structure import Array
 
 WIDEST = 64
 """Bandwidth up to which a factor is made anew whenever a joint opens."""

@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.newton import Newton
@@ -27,7 +28,6 @@ from archfem.stepping.modal import LARGEST, Modal
 from archfem.stepping.sparse import Sparse
 from archfem.stepping.stepper import Stepper
 from archfem.stepping.strategy import Strategy
-from archfem.structure import Array
 
 STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal)
 """In the order in which they are tried; the first that applies takes runs too short for timing."""

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from archfem.arrays import Array
 from archfem.energy import Meter
 from archfem.joints import JointOperator
 from archfem.models import Model
@@ -25,7 +26,6 @@ from archfem.schemes import Newmark, Rayleigh, Scheme
 from archfem.states import State
 from archfem.statics import self_weight
 from archfem.stepping.newmark import Numbers, numbers_of
-from archfem.structure import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,12 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.newton import Newton, Solver, magnitude
 from archfem.states import Batch, State, Step
 from archfem.stepping.equation import Equation
 from archfem.stepping.newmark import Numbers
-from archfem.structure import Array
 
 HALVINGS = 8
 """Times that a step may be halved before giving up."""

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.joints import Facets, JointOperator
-from archfem.structure import Array
 
 
 class Law(NamedTuple):

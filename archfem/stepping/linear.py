@@ -17,12 +17,12 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload
 
+from archfem.arrays import Array
 from archfem.stepping.equation import Equation
 from archfem.stepping.joint_law import Law, joint_resultants, law_of, pulls
 from archfem.stepping.loop import begin, measure, settle
 from archfem.stepping.newmark import Numbers, add_mixed, follow, mix
 from archfem.stepping.sparse_rows import Rows, add_rows, rows_of, stored, times, trimmed
-from archfem.structure import Array
 
 Matrix = Rows | Array
 

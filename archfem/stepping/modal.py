@@ -20,13 +20,13 @@ import numpy as np
 from numba.extending import overload
 from scipy.linalg import eigh
 
+from archfem.arrays import Array
 from archfem.stepping.equation import Equation
 from archfem.stepping.joint_law import law_of
 from archfem.stepping.linear import Linear, solve
 from archfem.stepping.loop import ITERATIONS
 from archfem.stepping.open_points import SETTLED, exact, expected, release
 from archfem.stepping.sparse_rows import add_rows, times
-from archfem.structure import Array
 
 LARGEST = 1200
 """Coordinates up to which all modes are computed and kept."""

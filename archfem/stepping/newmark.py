@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from archfem.structure import Array
+from archfem.arrays import Array
 
 
 class Numbers(NamedTuple):

@@ -23,7 +23,7 @@ from scipy import sparse
 from scipy.linalg import solve_triangular
 from scipy.sparse.linalg import splu
 
-from archfem.structure import Array
+from archfem.arrays import Array
 
 Indices = NDArray[np.int64]
 

@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from numba.extending import overload
 
+from archfem.arrays import Array
 from archfem.stepping.equation import Equation
 from archfem.stepping.linear import Linear, reordered, solve
 from archfem.stepping.loop import ITERATIONS
@@ -23,7 +24,6 @@ from archfem.stepping.open_points import SETTLED, exact, expected, release
 from archfem.stepping.panels import Factor, Plan, backward, factorised, forward
 from archfem.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.stepping.strategy import Reordered
-from archfem.structure import Array
 
 ENTRY = 5e-6
 """What ordering and factorising take, for each entry of the mass matrix [s]."""

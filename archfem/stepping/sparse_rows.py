@@ -11,7 +11,7 @@ from numba.core import types
 from numba.extending import overload
 from scipy import sparse
 
-from archfem.structure import Array
+from archfem.arrays import Array
 
 Rows = tuple[Any, Any, Array]
 """A sparse matrix by rows: indptr, indices, data."""

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from archfem.arrays import Array
 from archfem.states import Batch, State
 from archfem.stepping import loop
 from archfem.stepping.equation import Equation
 from archfem.stepping.exact import Exact
 from archfem.stepping.strategy import Strategy
-from archfem.structure import Array
 
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""

@@ -5,8 +5,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.stepping.equation import Equation
-from archfem.structure import Array
 
 
 class Strategy(Protocol):

@@ -9,10 +9,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from archfem.arrays import Array
 from archfem.limit import Collapse, Outcome
 from archfem.resultants import thrust_line
 from archfem.rigid_motion import motion_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.view.marks import displaced, swung
 from archfem.view.shades import LIGHT_TO_DARK
 from archfem.view.structure import draw_structure

@@ -7,10 +7,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.freebody import FreeBody, forces_on
 from archfem.models.cells import Cells
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.units import kN
 from archfem.view.style import EDGE, FAINT, GHOST, INK, LINES, NORMAL, SMALL, STONE, dress
 

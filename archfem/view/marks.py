@@ -7,11 +7,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
+from archfem.arrays import Array
 from archfem.models import Model
 from archfem.resultants import thrust_line
 from archfem.rigid_blocks import RigidBlocks
 from archfem.rigid_motion import motion_of
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 
 ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
 ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])

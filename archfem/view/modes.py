@@ -9,11 +9,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.modal import Modes
 from archfem.models.cells import Cells
 from archfem.softness import yielding_blocks
-from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import support_outlines
 from archfem.view.style import (

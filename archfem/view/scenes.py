@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 from tqdm import tqdm
 
+from archfem.arrays import Array
 from archfem.criteria import Criteria
 from archfem.errors import InvalidInput
 from archfem.history import History
 from archfem.mechanism import VerifiedMechanism
 from archfem.models import Model
 from archfem.resultants import joint_dataset
-from archfem.structure import Array
 from archfem.view.film import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
 from archfem.view.page import Page

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models.cells import Cells
-from archfem.structure import Array
 from archfem.units import MPa, mm
 from archfem.view.style import STONE
 

@@ -12,9 +12,10 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.models import Model
 from archfem.models.cells import Cells
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.view.film import Image
 from archfem.view.marks import SWING, Marks, support_outlines
 from archfem.view.shades import Scale, scale_for, shade

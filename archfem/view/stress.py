@@ -12,13 +12,14 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models import Model
 from archfem.models.cells import Cells
 from archfem.resultants import joint_dataset
 from archfem.softness import yielding_blocks
 from archfem.stress import at_corners, cell_stress, principal_values
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.units import MPa, kPa
 from archfem.view.marks import joint_marks
 from archfem.view.shades import BEYOND

@@ -10,10 +10,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from archfem.arrays import Array
 from archfem.criteria import Criteria, flagged
 from archfem.resultants import check_instant
 from archfem.softness import yielding_blocks
-from archfem.structure import Array, Structure
+from archfem.structure import Structure
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     EDGE,

@@ -50,7 +50,10 @@ MADE = [
     (lambda: af.Motion(np.zeros(5), 0.01, vertical=3.0), "vertical acceleration of shape"),
     (lambda: af.Motion(np.zeros(5), 0.01, name=3), "name of a motion is a int: give words"),
     (lambda: af.Motion.synthetic(pga="0.3 g"), "pga .* = '0.3 g' is not a finite number"),
-    (lambda: af.Motion.synthetic(seed=1.5), "seed of a synthetic motion = 1.5 is not a whole number"),
+    (
+        lambda: af.Motion.synthetic(seed=1.5),
+        "seed of a synthetic motion = 1.5 is not a whole number",
+    ),
     (lambda: af.Material("30 GPa", 0.2, 2e4), "young of 'material' = '30 GPa' is not a finite"),
     (lambda: af.Contact(1e9, None), "shear_stiffness of 'contact' = None is not a finite number"),
     (lambda: af.Tbec2018("1", 0.3, "ZC"), "map value S_S .* = '1' is not a finite number"),
