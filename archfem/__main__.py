@@ -2,6 +2,6 @@
 
 import sys
 
-from archfem.cli import main
+from archfem.cases.cli import main
 
 sys.exit(main())

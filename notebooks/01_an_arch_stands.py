@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 import archfem as af
-from archfem.statics import self_weight
+from archfem.statics.equilibrium import self_weight
 from archfem.view.structure import draw_structure
 
 # %% [markdown]
@@ -132,7 +132,7 @@ pd.Series(
 # - `thickness=0.30`: the thrust line comes closer to both faces. At which thickness does
 #   `dead_load` say that the arch cannot carry itself? The next notebook knows.
 # - `af.PointLoad` at a quarter of the span: where do the four hinges form?
-# - `picture(model, dead.q, colour="stress")` from `archfem.view.scenes` shows the deformed stones.
+# - `af.view.picture(model, dead.q, colour="stress")` shows the deformed stones.
 
 # %%
 crown = float(found.loc[8, "lobatto"])

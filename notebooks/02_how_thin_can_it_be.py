@@ -19,11 +19,11 @@
 import numpy as np
 import xarray as xr
 
-from archfem.actions import BodyForce, Settlement
-from archfem.capacity import minimum_thickness
-from archfem.limit import collapse_factor
-from archfem.shapes import circular_arch
-from archfem.view.capacity import capacity_figure, collapse_figure
+from archfem.limit.collapse import collapse_factor
+from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.actions import BodyForce, Settlement
+from archfem.masonry.shapes import circular_arch
+from archfem.view.collapse import capacity_figure, collapse_figure
 from archfem.view.structure import draw_structure
 
 # %% [markdown]

@@ -21,8 +21,8 @@ import numpy as np
 import pandas as pd
 
 import archfem as af
-from archfem.push import Stop
-from archfem.view.capacity import collapse_figure
+from archfem.statics.pushover import Stop
+from archfem.view.collapse import collapse_figure
 from archfem.view.pushover import draw_pushover
 from archfem.view.structure import draw_structure
 

@@ -19,8 +19,8 @@
 import numpy as np
 
 import archfem as af
+from archfem.view.accuracy import draw_accuracy
 from archfem.view.envelopes import draw_envelope
-from archfem.view.tradeoff import draw_accuracy
 
 # %% [markdown]
 # ## One formula for every rung

@@ -25,10 +25,10 @@ import os
 from pathlib import Path
 
 import archfem as af
-from archfem.analysis import at_rest, damping_of
-from archfem.criteria import judged
-from archfem.freebody import forces_on
-from archfem.strength import strength_use, use_table
+from archfem.cases.run import at_rest, damping_of
+from archfem.joints.criteria import judged
+from archfem.statics.freebody import forces_on
+from archfem.statics.strength import strength_use, use_table
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
 from archfem.view.freebody import draw_free_body
 from archfem.view.joints import draw_joint

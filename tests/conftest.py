@@ -7,7 +7,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 
-from archfem.shapes import circular_arch, column
+from archfem.masonry.shapes import circular_arch, column
 
 
 @pytest.fixture(scope="session")
@@ -19,7 +19,7 @@ def ring():
 @pytest.fixture(scope="session")
 def ring_model(ring):
     """The ring with all nodes of 4 × 4 cells a voussoir."""
-    from archfem.ladder import build
+    from archfem.dynamics.ladder import build
 
     return build(ring, fidelity="full", cells=(4, 4))
 

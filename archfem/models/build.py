@@ -3,13 +3,13 @@
 import logging
 from collections.abc import Mapping, Sequence
 
-from archfem.discretisation import Discretisation
 from archfem.errors import InvalidInput
-from archfem.models import Model
-from archfem.models.reduce import reduced
+from archfem.masonry.softness import soft_blocks, softness
+from archfem.masonry.structure import Structure
+from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
+from archfem.models.reduced import reduced
 from archfem.models.rigid import rigid
-from archfem.softness import soft_blocks, softness
-from archfem.structure import Structure
 
 logger = logging.getLogger("archfem")
 
@@ -33,10 +33,10 @@ def build(structure: Structure, asked: Discretisation) -> Model:
     _doubt(structure, rungs)
     if asked.fidelity == "rigid":
         return rigid(structure, asked.through, asked.rule)
-    from archfem.mesh import mesh  # FEniCSx is needed from here on only
+    from archfem.models.fem.mesh import mesh  # FEniCSx is needed from here on only
+    from archfem.models.fem.space import broken_space
     from archfem.models.full import full
     from archfem.models.monolithic import Monolithic
-    from archfem.space import broken_space
 
     space = broken_space(mesh(structure, asked), asked.degree)
     if asked.fidelity == "monolithic":

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.forms import Forms
+from archfem.joints.quadrature import Quadrature
 from archfem.models.cells import Cells
+from archfem.models.fem.forms import Forms
+from archfem.models.fem.space import BrokenSpace, joint_operator
 from archfem.models.jointed import Jointed
-from archfem.quadrature import Quadrature
-from archfem.space import BrokenSpace, joint_operator
 
 
 def full(space: BrokenSpace, rule: Quadrature) -> Jointed:

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from archfem.actions import Action, BodyForce, Settlement
 from archfem.arrays import Array
-from archfem.joints import JointOperator
-from archfem.models import Prediction
+from archfem.joints.operator import JointOperator
+from archfem.joints.rigid import gaps_of
+from archfem.joints.sparsity import Pattern
+from archfem.masonry.actions import Action, BodyForce, Settlement
+from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
-from archfem.rigid_joints import gaps_of
-from archfem.sparsity import Pattern
-from archfem.structure import Structure
+from archfem.models.model import Prediction
 
 
 class Jointed:

@@ -5,15 +5,15 @@ from copy import copy
 import numpy as np
 from scipy import sparse
 
-from archfem.actions import Settlement
 from archfem.arrays import Array
-from archfem.forms import Forms
-from archfem.models import Prediction
+from archfem.joints.quadrature import Quadrature
+from archfem.joints.sparsity import Pattern
+from archfem.masonry.actions import Settlement
+from archfem.masonry.rigid_motion import motion_of
+from archfem.models.fem.forms import Forms
+from archfem.models.fem.space import BrokenSpace
 from archfem.models.full import full
-from archfem.quadrature import Quadrature
-from archfem.rigid_motion import motion_of
-from archfem.space import BrokenSpace
-from archfem.sparsity import Pattern
+from archfem.models.model import Prediction
 
 
 class Monolithic:

@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
+from archfem.joints.quadrature import Quadrature
+from archfem.joints.rigid import rigid_joints
+from archfem.masonry.rigid_motion import motion_of
+from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
 from archfem.models.jointed import Jointed
-from archfem.quadrature import Quadrature
-from archfem.rigid_joints import rigid_joints
-from archfem.rigid_motion import motion_of
-from archfem.structure import Structure
 
 
 def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) -> Jointed:

@@ -1,1 +1,23 @@
-"""Pictures and films of structures, what they did, and what they can take."""
+"""Pictures and films of structures, what they did, and what they can take.
+
+    style      one look for all pictures
+    marks      what a picture shows of the joints at one instant
+    structure  a structure at an instant; several side by side
+    joints     joints over time
+    envelopes  eccentricity part by part
+    stress     a map of principal compression
+    modes      vibration shapes, drawn and filmed
+    freebody   a block cut free and its closing polygon
+    collapse   mechanism and thrust line of limit analysis; capacity of rings
+    pushover   what is resisted over displacement
+    motions    accelerograms with their integrals, and spectra
+    accuracy   speed against error
+    studies    factors at first mechanism, case by case
+    films      films of hinge formation: all that knows pyvista
+
+It imports from all rooms but `cases`. Start reading at `structure`, with `style` beside it.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

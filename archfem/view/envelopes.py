@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from archfem.criteria import Criteria, envelope, roles_of
+from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.history import History
-from archfem.roles import judged_parts
+from archfem.joints.criteria import Criteria, envelope, roles_of
+from archfem.masonry.roles import judged_parts
 from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
 from archfem.view.style import HINGE as RED
 

@@ -9,9 +9,9 @@ from matplotlib.patches import Polygon
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.freebody import FreeBody, forces_on
+from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
-from archfem.structure import Structure
+from archfem.statics.freebody import FreeBody, forces_on
 from archfem.units import kN
 from archfem.view.style import EDGE, FAINT, GHOST, INK, LINES, NORMAL, SMALL, STONE, dress
 

@@ -8,9 +8,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.criteria import Criteria
+from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.history import History
+from archfem.joints.criteria import Criteria
 from archfem.view.envelopes import draw_faces
 from archfem.view.style import COLUMN, INK, LINES, NORMAL, SLIP, SMALL, WIDE, dress
 from archfem.view.style import HINGE as RED

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.models import Model
-from archfem.resultants import thrust_line
-from archfem.rigid_blocks import RigidBlocks
-from archfem.rigid_motion import motion_of
-from archfem.structure import Structure
+from archfem.joints.resultants import thrust_line
+from archfem.limit.blocks import RigidBlocks
+from archfem.masonry.rigid_motion import motion_of
+from archfem.masonry.structure import Structure
+from archfem.models.model import Model
 
 ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
 ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])

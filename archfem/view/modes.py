@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.modal import Modes
+from archfem.masonry.softness import yielding_blocks
 from archfem.models.cells import Cells
-from archfem.softness import yielding_blocks
-from archfem.view.film import Image, film_path, write_film
+from archfem.statics.modes import Modes
+from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import support_outlines
 from archfem.view.style import (
     COLUMN,

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.codes import DesignSpectrum
 from archfem.errors import InvalidInput
-from archfem.motion import COMPONENTS, Motion
-from archfem.spectra import response_spectrum
-from archfem.suite import Suite
+from archfem.motion.design_spectra import DesignSpectrum
+from archfem.motion.motion import COMPONENTS, Motion
+from archfem.motion.spectra import response_spectrum
+from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.style import COLUMN, HINGE, INK, LINES, NORMAL, SMALL, dress
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.errors import InvalidInput
-from archfem.push import Pushover
+from archfem.statics.pushover import Pushover
 from archfem.units import mm
 from archfem.view.style import COLUMN, HINGE, INK, LINES, SMALL, dress, legend
 

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.models import Model
+from archfem.joints.resultants import joint_dataset
+from archfem.masonry.softness import yielding_blocks
+from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
-from archfem.resultants import joint_dataset
-from archfem.softness import yielding_blocks
-from archfem.stress import at_corners, cell_stress, principal_values
-from archfem.structure import Structure
+from archfem.models.model import Model
+from archfem.statics.stress import at_corners, cell_stress, principal_values
 from archfem.units import MPa, kPa
+from archfem.view.films.colours import BEYOND
 from archfem.view.marks import joint_marks
-from archfem.view.shades import BEYOND
 from archfem.view.structure import draw_blocks, draw_thrust
 from archfem.view.style import EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
 

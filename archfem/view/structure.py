@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.arrays import Array
-from archfem.criteria import Criteria, flagged
-from archfem.resultants import check_instant
-from archfem.softness import yielding_blocks
-from archfem.structure import Structure
+from archfem.joints.criteria import Criteria, flagged
+from archfem.joints.resultants import check_instant
+from archfem.masonry.softness import yielding_blocks
+from archfem.masonry.structure import Structure
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     EDGE,

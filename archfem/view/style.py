@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from archfem.errors import InvalidInput
 from archfem.files import in_one_stroke
-from archfem.structure import Structure
+from archfem.masonry.structure import Structure
 
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
 SOIL = "#f6f3ec"

@@ -20,9 +20,9 @@ from scaling import peak
 from timing import stopwatch, table
 
 import archfem as af
-from archfem.resultants import joint_dataset
-from archfem.stepping.choice import stepper_for
-from archfem.stepping.equation import Equation
+from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.stepping.equation import Equation
+from archfem.joints.resultants import joint_dataset
 
 DT = 0.005
 """Time step [s]."""

@@ -9,10 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-from archfem.codes import Tbec2018
-from archfem.matching import matched
-from archfem.motion import Motion
-from archfem.records.read import read_channels
+from archfem.motion.design_spectra import Tbec2018
+from archfem.motion.matching import matched
+from archfem.motion.motion import Motion
+from archfem.motion.records.read import read_channels
 from archfem.units import STANDARD_GRAVITY
 
 

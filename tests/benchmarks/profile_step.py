@@ -18,8 +18,8 @@ from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
-from archfem.stepping import linear
-from archfem.stepping.choice import METHODS
+from archfem.dynamics.stepping import linear
+from archfem.dynamics.stepping.choice import METHODS
 
 LINES = 12
 """Functions shown."""

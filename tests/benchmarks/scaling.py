@@ -19,8 +19,8 @@ from stepping import Run, warm_up
 from timing import table
 
 import archfem as af
-from archfem.stepping.equation import Equation
-from archfem.stepping.modal import Modal
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.modal import Modal
 
 SIZES = [17, 34, 68, 125, 250, 500]
 CASES = [

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 import archfem as af
-from archfem.materials import STONE_TO_STONE
+from archfem.joints.resultants import joint_dataset
+from archfem.masonry.materials import STONE_TO_STONE
 from archfem.models.jointed import Jointed
-from archfem.resultants import joint_dataset
 
 DT = 0.005
 """Time step [s]."""

@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
-from archfem.motion import Motion
-from archfem.spectra import response_spectrum
+from archfem.motion.motion import Motion
+from archfem.motion.spectra import response_spectrum
 
 if __name__ == "__main__":
     motion = Motion.synthetic(duration=60.0, seed=1)

@@ -5,10 +5,10 @@ from setting import DAMPING, DT
 from timing import Clock, least, stopwatch, watched
 
 import archfem as af
+from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.steps import State
 from archfem.models.jointed import Jointed
-from archfem.states import State
-from archfem.stepping.choice import stepper_for
-from archfem.stepping.equation import Equation
 
 
 class Run:

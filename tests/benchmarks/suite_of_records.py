@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from archfem.codes import Tbec2018
-from archfem.motion import Motion
-from archfem.suite import Suite
-from archfem.summary import match_table
+from archfem.cases.summary import match_table
+from archfem.motion.design_spectra import Tbec2018
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.motions import suite_spectra
 from archfem.view.style import COLUMN, LINES, NORMAL, SMALL, dress, save

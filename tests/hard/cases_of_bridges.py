@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 import archfem as af
-from archfem.freebody import forces_on
-from archfem.materials import BACKFILL, SOIL_TO_STONE
-from archfem.newton import Newton
-from archfem.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
-from archfem.statics import Equilibrium
+from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
+from archfem.masonry.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
+from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.freebody import forces_on
+from archfem.statics.newton import Newton
 from archfem.units import MPa
 from hard.setting import DT, Found, answer, case, off, peaks, quake, refused, shaken
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import archfem as af
-from archfem.newton import Newton
+from archfem.statics.newton import Newton
 from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, ring, shaken
 
 ALL_MODES = 3e-8

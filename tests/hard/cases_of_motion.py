@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import archfem as af
-from archfem.runs import last_state
+from archfem.dynamics.time_history import last_state
 from hard.setting import DT, Found, answer, case, joints, off, peaks, quake, ring, shaken, still
 
 G = 9.81

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import archfem as af
-from archfem.stepping.equation import Equation
+from archfem.dynamics.stepping.equation import Equation
 from hard.setting import DT, Found, answer, case, joints, peaks, quake, refused, ring, shaken, still
 
 

@@ -9,9 +9,9 @@ from time import perf_counter
 import numpy as np
 
 import archfem as af
-from archfem.guard import DOUBTFUL
-from archfem.history import Ending
-from archfem.materials import STONE_TO_STONE
+from archfem.dynamics.guard import DOUBTFUL
+from archfem.dynamics.history import Ending
+from archfem.masonry.materials import STONE_TO_STONE
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 DT = 0.005

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from archfem.actions import BodyForce
+from archfem.dynamics.ladder import build
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.exact import Exact
 from archfem.errors import DidNotConverge
-from archfem.ladder import build
-from archfem.materials import Contact, Material
-from archfem.motion import Motion
-from archfem.shapes import column
-from archfem.statics import equilibrium, self_weight
-from archfem.stepping.equation import Equation
-from archfem.stepping.exact import Exact
+from archfem.masonry.actions import BodyForce
+from archfem.masonry.materials import Contact, Material
+from archfem.masonry.shapes import column
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import equilibrium, self_weight
 
 GRAVITY = 9.81
 STONE = Material(30e9, 0.2, 2000.0 * GRAVITY)

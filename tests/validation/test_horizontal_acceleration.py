@@ -16,10 +16,10 @@ voussoirs, without sliding, is by linear programming of the static theorem.
 import numpy as np
 import pytest
 
-from archfem.actions import BodyForce
-from archfem.limit import collapse_factor, stands
-from archfem.mechanism import verified_mechanism
-from archfem.shapes import circular_arch
+from archfem.limit.collapse import collapse_factor, stands
+from archfem.limit.verified import verified_mechanism
+from archfem.masonry.actions import BodyForce
+from archfem.masonry.shapes import circular_arch
 
 HALF_A_DIGIT = 5.1e-4
 

@@ -36,11 +36,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.actions import Settlement
-from archfem.capacity import minimum_thickness
-from archfem.limit import collapse_factor, stands
-from archfem.materials import STONE_TO_STONE
-from archfem.shapes import circular_arch
+from archfem.limit.collapse import collapse_factor, stands
+from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.actions import Settlement
+from archfem.masonry.materials import STONE_TO_STONE
+from archfem.masonry.shapes import circular_arch
 
 PRINTED = 6e-5
 """Half of the last digit with which the values for few voussoirs are known, and a little."""

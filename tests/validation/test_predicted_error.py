@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.discretisation import Discretisation
+from archfem.dynamics.damping import effective_damping
+from archfem.dynamics.ladder import Setting, build, choose, finest
+from archfem.dynamics.probe import largest_difference, peaks, strongest, usual_damping
+from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.time_history import time_history
+from archfem.dynamics.tradeoff import accuracy
 from archfem.errors import InvalidInput
-from archfem.ladder import Setting, build, choose, finest
-from archfem.materials import BACKFILL, Contact
-from archfem.modal_damping import effective_damping
+from archfem.joints.quadrature import Quadrature
+from archfem.masonry.materials import BACKFILL, Contact
+from archfem.masonry.shapes import Arch, Backfill, bridge, circular_arch, column
 from archfem.models.build import build as plain
+from archfem.models.discretisation import Discretisation
 from archfem.models.rigid import rigid
-from archfem.motion import Motion
-from archfem.probe import largest_difference, peaks, strongest, usual_damping
-from archfem.quadrature import Quadrature
-from archfem.runs import time_history
-from archfem.schemes import Rayleigh
-from archfem.shapes import Arch, Backfill, bridge, circular_arch, column
-from archfem.statics import dead_load
-from archfem.tradeoff import accuracy
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load
 
 STIFF = Contact(1.48e10, 0.3e10)
 SCENES = {

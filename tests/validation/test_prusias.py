@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.analysis import at_rest, damping_of, shaken
-from archfem.cli import main
-from archfem.criteria import judged
-from archfem.strength import strength_use
+from archfem.cases.cli import main
+from archfem.cases.run import at_rest, damping_of, shaken
+from archfem.joints.criteria import judged
+from archfem.statics.strength import strength_use
 
 MESHES = Path(__file__).parents[2] / "meshes"
 PAPER_STRESS = 0.6e6

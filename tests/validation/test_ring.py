@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.ladder import build
-from archfem.materials import Contact, Material
-from archfem.shapes import circular_arch
-from archfem.statics import dead_load
-from archfem.structure import Structure
+from archfem.dynamics.ladder import build
+from archfem.masonry.materials import Contact, Material
+from archfem.masonry.shapes import circular_arch
+from archfem.masonry.structure import Structure
+from archfem.statics.equilibrium import dead_load
 
 CONVERGED = 0.2853
 """Crown eccentricity that all rules approach, to four digits."""
@@ -79,7 +79,7 @@ def test_every_block_is_in_balance(fidelity):
 
 def test_rigid_is_full_projected_on_rigid_motions():
     """Same joint quadrature: BᵀMB and G B of the full model are the rigid model's own."""
-    from archfem.rigid_motion import motion_of
+    from archfem.masonry.rigid_motion import motion_of
 
     ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
     full, rigid = build(ring, cells=(3, 3)), build(ring, cells=(3, 3), fidelity="rigid")

@@ -13,9 +13,9 @@ without sliding. The factors are by linear programming of the static theorem.
 
 import pytest
 
-from archfem.actions import BodyForce
-from archfem.limit import collapse_factor
-from archfem.shapes import arch_on_piers
+from archfem.limit.collapse import collapse_factor
+from archfem.masonry.actions import BodyForce
+from archfem.masonry.shapes import arch_on_piers
 
 HALF_A_DIGIT = 5.1e-5
 

@@ -21,10 +21,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.actions import PointLoad
-from archfem.limit import collapse_factor
-from archfem.materials import STONE_TO_STONE
-from archfem.shapes import circular_arch
+from archfem.limit.collapse import collapse_factor
+from archfem.masonry.actions import PointLoad
+from archfem.masonry.materials import STONE_TO_STONE
+from archfem.masonry.shapes import circular_arch
 
 
 def ring(friction=0.6):

@@ -6,28 +6,28 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem.actions import Settlement
+from archfem.dynamics.ladder import build
+from archfem.dynamics.schemes import HHT, Rayleigh
+from archfem.dynamics.stepping.banded import Banded
+from archfem.dynamics.stepping.choice import SHORTEST, chosen, stepper_for
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.exact import Exact
+from archfem.dynamics.stepping.joint_law import Law
+from archfem.dynamics.stepping.loop import advance
+from archfem.dynamics.stepping.modal import Modal
+from archfem.dynamics.stepping.newmark import follow, numbers_of
+from archfem.dynamics.stepping.open_points import release
+from archfem.dynamics.stepping.panels import Plan, backward, factorised, forward
+from archfem.dynamics.stepping.sparse import Sparse
+from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.time_history import time_history
 from archfem.errors import InvalidInput
-from archfem.joints import Facets, JointPoints, Springs
-from archfem.ladder import build
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.runs import time_history
-from archfem.schemes import HHT, Rayleigh
-from archfem.shapes import Arch, Backfill, bridge
-from archfem.statics import dead_load
-from archfem.stepping.banded import Banded
-from archfem.stepping.choice import SHORTEST, chosen, stepper_for
-from archfem.stepping.equation import Equation
-from archfem.stepping.exact import Exact
-from archfem.stepping.joint_law import Law
-from archfem.stepping.loop import advance
-from archfem.stepping.modal import Modal
-from archfem.stepping.newmark import follow, numbers_of
-from archfem.stepping.open_points import release
-from archfem.stepping.panels import Plan, backward, factorised, forward
-from archfem.stepping.sparse import Sparse
-from archfem.stepping.stepper import Stepper
+from archfem.joints.operator import Facets, JointPoints, Springs
+from archfem.masonry.actions import Settlement
+from archfem.masonry.shapes import Arch, Backfill, bridge
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load
+from archfem.statics.newton import Newton
 
 TIGHT = Newton(tolerance=1e-13)
 STRONG = Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)

@@ -8,13 +8,13 @@ import pytest
 from orders import observed_order
 from scipy.linalg import eigh
 
+from archfem.dynamics.ladder import build
+from archfem.dynamics.schemes import HHT, Newmark, Rayleigh
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.exact import Exact
 from archfem.errors import InvalidInput
-from archfem.ladder import build
-from archfem.motion import Motion
-from archfem.schemes import HHT, Newmark, Rayleigh
-from archfem.statics import dead_load, self_weight
-from archfem.stepping.equation import Equation
-from archfem.stepping.exact import Exact
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load, self_weight
 
 STILL = Motion(np.zeros(2), 1.0)
 

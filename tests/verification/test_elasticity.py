@@ -8,14 +8,14 @@ from orders import observed_order
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from archfem import _fenicsx
-from archfem.discretisation import Discretisation
-from archfem.forms import Forms, plane_stress
-from archfem.materials import STONE, STONE_TO_STONE
-from archfem.mesh import mesh
-from archfem.quadrature import Quadrature
-from archfem.shapes import column
-from archfem.space import broken_space, joint_operator
+from archfem.joints.quadrature import Quadrature
+from archfem.masonry.materials import STONE, STONE_TO_STONE
+from archfem.masonry.shapes import column
+from archfem.models.discretisation import Discretisation
+from archfem.models.fem import _fenicsx
+from archfem.models.fem.forms import Forms, plane_stress
+from archfem.models.fem.mesh import mesh
+from archfem.models.fem.space import broken_space, joint_operator
 
 RULES = [Quadrature(), Quadrature("nodal"), Quadrature("gauss"), Quadrature("lobatto", 4)]
 

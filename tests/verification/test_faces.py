@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from archfem.assembly import assembled
-from archfem.ladder import build
-from archfem.materials import STONE, STONE_TO_STONE
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.runs import time_history
-from archfem.schemes import Rayleigh
-from archfem.shapes import Arch, Backfill, bridge
-from archfem.statics import dead_load
-from archfem.structure import Block
+from archfem.dynamics.ladder import build
+from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.time_history import time_history
+from archfem.masonry.assembly import assembled
+from archfem.masonry.materials import STONE, STONE_TO_STONE
+from archfem.masonry.shapes import Arch, Backfill, bridge
+from archfem.masonry.structure import Block
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load
+from archfem.statics.newton import Newton
 
 TIGHT = Newton(tolerance=1e-13)
 SOIL = {"backfill": "full"}

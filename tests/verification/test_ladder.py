@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archfem.dynamics.ladder import build
+from archfem.dynamics.schemes import HHT, Rayleigh
+from archfem.dynamics.time_history import time_history
 from archfem.errors import InvalidInput
-from archfem.joints import Facets, JointPoints, Springs
-from archfem.ladder import build
-from archfem.materials import BACKFILL
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.runs import time_history
-from archfem.schemes import HHT, Rayleigh
-from archfem.shapes import circular_arch, column
-from archfem.statics import dead_load
+from archfem.joints.operator import Facets, JointPoints, Springs
+from archfem.masonry.materials import BACKFILL
+from archfem.masonry.shapes import circular_arch, column
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load
+from archfem.statics.newton import Newton
 
 MOTION = Motion.synthetic(duration=4.0, pga=2.5, seed=5)
 TIGHT = Newton(tolerance=1e-13)

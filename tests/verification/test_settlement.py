@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from archfem.actions import Settlement
+from archfem.dynamics.ladder import build
+from archfem.dynamics.time_history import time_history
 from archfem.errors import InvalidInput
-from archfem.ladder import build
-from archfem.motion import Motion
-from archfem.newton import Newton
-from archfem.rigid_joints import gaps_of
-from archfem.rigid_motion import motion_of
-from archfem.runs import time_history
-from archfem.shapes import circular_arch, column
-from archfem.statics import dead_load
+from archfem.joints.rigid import gaps_of
+from archfem.masonry.actions import Settlement
+from archfem.masonry.rigid_motion import motion_of
+from archfem.masonry.shapes import circular_arch, column
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import dead_load
+from archfem.statics.newton import Newton
 
 RING = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 COUPLE = circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)

@@ -1,0 +1,20 @@
+"""Analyses as files: TOML in, folders of results out, studies, the command line.
+
+    settings    tables of a case file and changes to them
+    structures  [structure], [materials], [contacts] as a `Structure`
+    motions     [motion], [suite] as a `Motion`, a `Suite`
+    case        one analysis as one value, read from a TOML file
+    run         carry out a case; go on where an earlier run ended
+    summary     tables and sentences of what was found
+    report      the pictures of a case, into its folder
+    findings    what a study finds of its cases, kept in files
+    study       several cases side by side
+    commands    the commands of the command line
+    cli         the command line itself
+
+It imports from all rooms. Start reading at `case`, then at `run`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,2 @@
+from .case import Case as Case
+from .study import Study as Study

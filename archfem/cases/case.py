@@ -1,0 +1,252 @@
+"""One analysis as one value, read from a TOML file.
+
+Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/mm". A key that is
+not known, a wrong unit or an impossible geometry is an error that names the key and the remedy.
+"""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from archfem.cases import motions as ground
+from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
+from archfem.cases.structures import planned
+from archfem.dynamics.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
+from archfem.errors import ArchfemError, InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.masonry.structure import Structure
+from archfem.models.discretisation import Discretisation
+from archfem.motion.design_spectra import DesignSpectrum
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+
+MODEL = {
+    "fidelity": (str, dict),
+    "cells": [int],
+    "cell": str,
+    "coarse": "m",
+    "degree": int,
+    "quadrature": str,
+    "points": int,
+    "tolerance": "1",
+}
+DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
+ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
+CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
+OUTPUT = {
+    "every": int,
+    "fields_every": int,
+    "joints": [(int, str)],
+    "animation": bool,
+    "free_body": str,
+}
+SECTIONS = (
+    "title",
+    "structure",
+    "materials",
+    "contacts",
+    "model",
+    "motion",
+    "suite",
+    "analysis",
+    "criteria",
+    "output",
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One analysis: structure, model, motion, and what to do with them.
+
+    Attributes:
+        title: in words.
+        structure: what stands.
+        model: keywords of `build`.
+        motion: what the file says of one ground motion, or None.
+        suite: what it says of a suite of them, or None; without either there is dead load alone.
+        analysis: what it says of the time history.
+        criteria: what makes a joint fail, and how many failed joints make a mechanism.
+        output: what it says of what to keep and draw.
+        settings: the whole case as it was understood, to be written again.
+        folder: where relative file names start.
+    """
+
+    title: str
+    structure: Structure
+    model: dict[str, Any]
+    motion: dict[str, Any] | None
+    suite: dict[str, Any] | None
+    analysis: dict[str, Any]
+    criteria: Criteria
+    output: dict[str, Any]
+    settings: dict[str, Any] = field(repr=False)
+    folder: Path = Path()
+
+    @classmethod
+    def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Case":
+        """Read a case file.
+
+        With `base = "other.toml"` a file says only what differs from another one: its tables go
+        over those of the other, key by key, after `without = ["section.key", …]` has taken out
+        what the other has and this one has not. Relative names start from the file's folder.
+
+        Args:
+            path: a TOML file.
+            changes: "section.key=value" each, instead of what the file says.
+
+        Raises:
+            InvalidInput: what cannot be meant, with the key, the value and the remedy.
+            InvalidStructure: lengths that do not make a structure.
+        """
+        path = Path(path)
+        settings = _tables(path, ())
+        for text in changes:
+            change(settings, text)
+        try:
+            return cls.of(settings, path.parent)
+        except ArchfemError as error:
+            raise type(error)(f"{path}: {error}") from error
+
+    @classmethod
+    def of(cls, settings: Table, folder: Path = Path()) -> "Case":
+        """Make a case of tables such as a TOML file holds."""
+        refuse_unknown(settings, SECTIONS)
+        for key in set(SECTIONS) - {"title"}:
+            if not isinstance(settings.get(key, {}), dict):
+                raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
+        analysis = checked(settings.get("analysis", {}), ANALYSIS, "analysis")
+        if "damping" in analysis:
+            analysis["damping"] = checked(analysis["damping"], DAMPING, "analysis.damping")
+        if "motion" in settings and "suite" in settings:
+            raise InvalidInput("a case has either one motion or a suite: take out one of the two")
+        motion, suite = settings.get("motion"), settings.get("suite")
+        case = cls(
+            title=str(settings.get("title", "case")),
+            structure=planned(settings, folder),
+            model=checked(settings.get("model", {}), MODEL, "model"),
+            motion=None if motion is None else ground.motion_settings(motion),
+            suite=None if suite is None else ground.suite_settings(suite),
+            analysis=analysis,
+            criteria=Criteria(**checked(settings.get("criteria", {}), CRITERIA, "criteria")),
+            output=checked(settings.get("output", {}), OUTPUT, "output"),
+            settings=dict(settings),
+            folder=folder,
+        )
+        case._check()
+        return case
+
+    def _check(self) -> None:
+        """Refuse what would otherwise be found out only after the dead load."""
+        _ = self.discretisation, self.damping, self.scheme, self.joints
+        step = self.analysis.get("dt", 0.005)
+        if not 0.0 < step <= 0.1:
+            raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
+        if "free_body" in self.output:
+            self.structure.block_number(self.output["free_body"])
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """What the structure is modelled by; its mesh alone counts where "auto" is to choose."""
+        given = {key: value for key, value in self.model.items() if key != "tolerance"}
+        if given.get("fidelity") == "auto":
+            del given["fidelity"]
+        return Discretisation(**given)
+
+    @property
+    def damping(self) -> Rayleigh | EffectiveRayleigh | None:
+        """Damping of the time history; its frequencies may be left to the modes."""
+        if "damping" not in self.analysis:
+            return None
+        given = dict(self.analysis["damping"])
+        if set(given) - {"joints", "share"} == {"ratio", "modes"}:
+            if given.pop("modes") == "effective":
+                return EffectiveRayleigh(**given)
+        elif set(given) - {"joints"} == {"ratio", "frequencies"} and len(given["frequencies"]) == 2:
+            return Rayleigh(**{**given, "frequencies": tuple(given["frequencies"])})
+        raise InvalidInput(
+            f"analysis.damping = {self.analysis['damping']}: give a ratio and two frequencies, "
+            'e.g. { ratio = 0.05, frequencies = [8.0, 16.0] }, or modes = "effective" for them'
+        )
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Numbers of the joints to draw over time, which the file may name; none if not said."""
+        return tuple(map(self.structure.joint_number, self.output.get("joints", ())))
+
+    @property
+    def scheme(self) -> Scheme:
+        """Time stepping of the time history."""
+        name, alpha = self.analysis.get("scheme", "newmark"), self.analysis.get("alpha")
+        if name == "hht":
+            return HHT() if alpha is None else HHT(alpha)
+        if name != "newmark" or alpha is not None:
+            raise InvalidInput(
+                f"analysis.scheme = {name!r} with alpha {alpha}: use 'newmark', or 'hht' and alpha"
+            )
+        return Newmark()
+
+    def ground_motion(self) -> Motion:
+        """Read or make the ground motion.
+
+        Raises:
+            InvalidInput: there is none, or its file cannot be read.
+        """
+        if self.motion is None:
+            raise InvalidInput("the case has no [motion]: give a file, or synthetic = { seed = 1 }")
+        return ground.ground_motion(self.motion, self.folder)
+
+    def ground_suite(self) -> Suite:
+        """Read or make the suite of ground motions, matched where the case says so.
+
+        Raises:
+            InvalidInput: there is none, or a pair cannot be read or matched.
+            DidNotConverge: a pair did not come near the target.
+        """
+        if self.suite is None:
+            raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
+        return ground.ground_suite(self.suite, self.folder)
+
+    @property
+    def target(self) -> DesignSpectrum | None:
+        """Target spectrum of the suite, or None."""
+        return ground.target_spectrum(self.suite or {})
+
+    def alone(self, pair: str) -> "Case":
+        """Return the case with this one pair of its suite."""
+        suite = self.settings["suite"]
+        kept = {**suite, "pairs": {pair: suite["pairs"][pair]}}
+        return self.of({**self.settings, "suite": kept}, self.folder)
+
+    def text(self) -> str:
+        """The case as TOML, changes included."""
+        return tomli_w.dumps(self.settings)
+
+
+def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
+    """Tables of a case file over those of its base.
+
+    Args:
+        path: the file.
+        above: files that are based on it, one on the other.
+    """
+    if not path.is_file():
+        raise InvalidInput(f"there is no case file {path}")
+    if path.resolve() in above:
+        raise InvalidInput(f"{path} is its own base: base must name another file")
+    try:
+        settings = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path} is not TOML: {error}") from error
+    base = settings.pop("base", None)
+    if base is None:
+        return settings
+    if not isinstance(base, str):
+        raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
+    below = _tables(path.parent / base, (*above, path.resolve()))
+    for key in settings.pop("without", []):
+        remove(below, key)
+    return merged(below, settings)

@@ -1,0 +1,86 @@
+"""The command line: `archfem run CASE.toml --out DIR`, `archfem motion FILE...`."""
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Sequence
+
+from archfem.cases import commands
+from archfem.errors import ArchfemError
+
+INTERRUPTED = 130
+"""What a shell expects of a command that Ctrl-C has ended."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; 0 is success, 1 an error of the case, 2 of the command, 130 after Ctrl-C."""
+    given = _parser().parse_args(arguments)
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    try:
+        given.command(given)
+    except ArchfemError as error:
+        print(f"archfem: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("archfem: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # whoever read the output has gone, as in `archfem … | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:  # a folder that cannot be made, a full disk
+        print(f"archfem: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="archfem", description="Does a dry-stone arch or bridge survive an earthquake?"
+    )
+    chosen = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def case_command(name: str, about: str) -> argparse.ArgumentParser:
+        command = chosen.add_parser(name, help=about, description=about)
+        command.add_argument("case", metavar="CASE.toml", help="the case file")
+        command.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="SECTION.KEY=VALUE",
+            dest="changes",
+            help="use this value instead of the file's; may be given again",
+        )
+        return command
+
+    run = case_command("run", "dead load, time histories, tables and pictures")
+    run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    run.set_defaults(command=commands.run)
+    check = case_command("check", "read a case, build its model and find its dead load")
+    check.set_defaults(command=commands.check)
+    modes = case_command("modes", "frequencies, masses and shapes of vibrations about dead load")
+    modes.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
+    modes.set_defaults(command=commands.modes)
+    mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
+    mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
+    mesh.set_defaults(command=commands.mesh)
+    accuracy = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
+    accuracy.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    accuracy.set_defaults(command=commands.accuracy)
+    study = case_command("study", "several cases side by side: when do mechanisms form in each?")
+    study.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    study.set_defaults(command=commands.study)
+    _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
+    return parser
+
+
+def _motion_command(command: argparse.ArgumentParser) -> None:
+    command.description = "Print the measures of records, draw them, their integrals and spectra."
+    command.add_argument("files", nargs="+", metavar="FILE", help="a record")
+    command.add_argument("--column", type=int, help="component or plain column, counted from 1")
+    command.add_argument("--units", help="of plain columns: g, m/s2, cm/s2 or gal")
+    command.add_argument("--dt", type=float, help="time between samples of plain columns [s]")
+    command.add_argument(
+        "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
+    )
+    command.set_defaults(command=commands.motion)

@@ -1,0 +1,186 @@
+"""What a case says of the ground: one motion, or a suite of them and its target spectrum."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from archfem.cases.settings import Table, checked
+from archfem.errors import InvalidInput
+from archfem.motion.design_spectra import DesignSpectrum, Eurocode8, TableSpectrum, Tbec2018
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+
+SYNTHETIC = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
+SOURCE = {"file": str, "column": int, "units": str, "dt": "s", "synthetic": dict}
+MOTION = {
+    **SOURCE,
+    "vertical": (str, dict),
+    "resample": "s",
+    "start": "s",
+    "end": "s",
+    "scale": "1",
+    "reversed": bool,
+}
+SUITE = {
+    "name": str,
+    "folder": str,
+    "reversed": bool,
+    "target": dict,
+    "matched": bool,
+    "scale": "1",
+    "reduction": "1",
+    "pairs": dict,
+}
+TARGETS: dict[str, tuple[Callable[..., DesignSpectrum], Table]] = {
+    "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
+    "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
+    "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
+}
+"""Design spectra by name, for 5 % damping; accelerations are in g."""
+
+
+def motion_settings(given: Any, section: str = "motion") -> dict[str, Any]:
+    """Check what a case says of one motion.
+
+    Args:
+        given: the table as read.
+        section: its name, for errors.
+
+    Raises:
+        InvalidInput: a key or value cannot be meant, or it is not clear where the motion is from.
+    """
+    settings = _source_settings(given, MOTION, section)
+    if isinstance(settings.get("vertical"), dict):
+        settings["vertical"] = _source_settings(settings["vertical"], SOURCE, f"{section}.vertical")
+    return settings
+
+
+def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion") -> Motion:
+    """Read or make a motion, then resample, cut and scale it.
+
+    Args:
+        settings: as checked by `motion_settings`.
+        folder: where relative file names start.
+        section: name of the table, for errors.
+
+    Raises:
+        InvalidInput: a file cannot be read, or horizontal and vertical differ in step.
+    """
+    motion = _from_source(settings, folder)
+    step = settings.get("resample")
+    motion = motion if step is None else motion.resampled(step)
+    if "vertical" in settings:
+        upright = settings["vertical"]
+        other = _from_source({"file": upright} if isinstance(upright, str) else upright, folder)
+        other = other if step is None else other.resampled(step)
+        if abs(other.dt - motion.dt) > 1e-6 * motion.dt:
+            raise InvalidInput(
+                f"{section}: the vertical has a step of {other.dt:g} s, the horizontal of "
+                f'{motion.dt:g} s: bring both to one with {section}.resample = "{motion.dt:g} s"'
+            )
+        motion = motion.with_vertical(other)
+    if "start" in settings or "end" in settings:
+        motion = motion.cut(settings.get("start", 0.0), settings.get("end"))
+    motion = motion.reversed() if settings.get("reversed", False) else motion
+    return motion.scaled(settings.get("scale", 1.0))
+
+
+def suite_settings(given: Any) -> dict[str, Any]:
+    """Check what a case says of a suite.
+
+    Raises:
+        InvalidInput: a key or value cannot be meant, there is no pair, or no target to match.
+    """
+    settings = checked(given, SUITE, "suite")
+    pairs = settings.get("pairs", {})
+    if not pairs:
+        raise InvalidInput(
+            "suite.pairs is empty: write a table for each pair, e.g. "
+            "[suite.pairs.first] with synthetic = { seed = 1 }"
+        )
+    for name in pairs:
+        if not re.fullmatch(r"\w[\w +-]*", name):
+            raise InvalidInput(
+                f"suite.pairs: '{name}' names a folder of results too: use letters, digits, _ and -"
+            )
+    settings["pairs"] = {
+        name: motion_settings(pair, f"suite.pairs.{name}") for name, pair in pairs.items()
+    }
+    if settings.get("matched", False) and "target" not in settings:
+        raise InvalidInput(
+            "suite.matched = true needs a target, e.g. "
+            'target = { code = "TBEC-2018", ss = 1.14, s1 = 0.315, site = "ZD" }'
+        )
+    target_spectrum(settings)
+    return settings
+
+
+def target_spectrum(settings: Table) -> DesignSpectrum | None:
+    """Make the target spectrum of a suite, or None where it has none.
+
+    Raises:
+        InvalidInput: the code is not known, or what it needs is missing or out of range.
+    """
+    if "target" not in settings:
+        return None
+    given = dict(settings["target"])
+    code = given.pop("code", None)
+    if code not in list(TARGETS):
+        raise InvalidInput(f"suite.target.code = {code!r} is not known: use one of {list(TARGETS)}")
+    make, keys = TARGETS[code]
+    try:
+        return make(**checked(given, keys, "suite.target"))
+    except TypeError as error:
+        raise InvalidInput(f"suite.target of {code}: {error}") from error
+
+
+def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
+    """Read or make the pairs of a suite, under their own names, and match them where asked.
+
+    Args:
+        settings: as checked by `suite_settings`.
+        folder: where relative file names start, or the name of the suite's own folder.
+
+    Raises:
+        InvalidInput: a file cannot be read or a pair not be matched.
+        DidNotConverge: a pair did not come near the target.
+    """
+    files = folder / settings.get("folder", "")
+    pairs = tuple(
+        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
+        for name, pair in settings["pairs"].items()
+    )
+    suite = Suite(
+        settings.get("name", "suite"),
+        pairs,
+        scale=settings.get("scale", 1.0),
+        reduction=settings.get("reduction", 1.0),
+    )
+    target = target_spectrum(settings)
+    suite = suite.matched(target) if target and settings.get("matched", False) else suite
+    return suite.reversed() if settings.get("reversed", False) else suite
+
+
+def _source_settings(given: Any, keys: Table, section: str) -> dict[str, Any]:
+    """Check a table that says where a motion is from: either a file, or made from a seed."""
+    settings = checked(given, keys, section)
+    if ("synthetic" in settings) == ("file" in settings):
+        raise InvalidInput(
+            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one"
+        )
+    if "synthetic" in settings:
+        settings["synthetic"] = checked(settings["synthetic"], SYNTHETIC, f"{section}.synthetic")
+        idle = sorted({"column", "units", "dt"} & set(settings))
+        if idle:
+            raise InvalidInput(f"{section}.{idle[0]} belongs to a file, not to a synthetic motion")
+    return settings
+
+
+def _from_source(settings: Table, folder: Path) -> Motion:
+    """Read a file by its own keywords, or make a motion."""
+    if "synthetic" in settings:
+        return Motion.synthetic(**settings["synthetic"])
+    options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}
+    return Motion.read(folder / settings["file"], **options)

@@ -1,0 +1,108 @@
+"""Tables of a case file: which keys they have, what the keys hold, and changes to them.
+
+What a key may hold is written as a unit for a number, a Python type or several, or a list of one
+unit or type for a list.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from archfem.errors import InvalidInput
+from archfem.masonry.naming import did_you_mean
+from archfem.units import in_unit
+
+Table = Mapping[str, Any]
+
+_WORDS = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
+
+
+def checked(given: Any, keys: Table, section: str) -> dict[str, Any]:
+    """Check the keys of a table and turn its values into what they must hold.
+
+    Args:
+        given: the table as read.
+        keys: what each key may hold.
+        section: name of the table, for errors.
+
+    Raises:
+        InvalidInput: it is no table, a key is unknown or a value of the wrong kind.
+    """
+    if not isinstance(given, Mapping):
+        raise InvalidInput(f"{section} = {given!r} is not a table")
+    refuse_unknown(given, keys, section)
+    return {key: _value(value, keys[key], f"{section}.{key}") for key, value in given.items()}
+
+
+def refuse_unknown(given: Table, keys: Iterable[str], section: str = "") -> None:
+    """Refuse keys that nothing would read.
+
+    Raises:
+        InvalidInput: names the key, and the nearest one there is.
+    """
+    for key in given:
+        if key not in keys:
+            hint = did_you_mean(key, keys) or f"the keys are {sorted(keys)}"
+            raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
+
+
+def merged(below: Table, above: Table) -> dict[str, Any]:
+    """Tables of one case over those of another: what both have is taken from `above`."""
+    result = dict(below)
+    for key, value in above.items():
+        under = result.get(key)
+        both = isinstance(under, Mapping) and isinstance(value, Mapping)
+        result[key] = merged(under, value) if both else value  # type: ignore[arg-type]
+    return result
+
+
+def remove(settings: dict[str, Any], path: str) -> None:
+    """Take out the table or value at "section.key".
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    *parents, last = path.split(".")
+    table: Any = settings
+    for parent in parents:
+        table = table.get(parent, {}) if isinstance(table, dict) else {}
+    if not isinstance(table, dict) or last not in table:
+        raise InvalidInput(f"without = '{path}': the base has no such key")
+    del table[last]
+
+
+def change(settings: dict[str, Any], text: str) -> None:
+    """Set one value from "section.key=value", read as TOML, or as a word.
+
+    Raises:
+        InvalidInput: the text is no change, or a parent of the key is not a table.
+    """
+    path, equals, words = text.partition("=")
+    if not equals or not path.strip():
+        raise InvalidInput(f"'{text}' is not a change: write section.key=value")
+    try:
+        value = tomllib.loads(f"value = {words}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = words.strip()
+    *parents, last = path.strip().split(".")
+    table: Any = settings
+    for parent in parents:
+        table = table.setdefault(parent, {})
+        if not isinstance(table, dict):
+            raise InvalidInput(f"'{text}': {parent} is not a table")
+    table[last] = value
+
+
+def _value(value: Any, kind: Any, key: str) -> Any:
+    """Turn one value into what its key must hold."""
+    if isinstance(kind, str):
+        return in_unit(value, kind, key)
+    if isinstance(kind, list):
+        if not isinstance(value, list):
+            raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
+        return [_value(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+        wanted = " or ".join(_WORDS[each] for each in kinds)
+        raise InvalidInput(f"{key} = {value!r} is not {wanted}")
+    return value

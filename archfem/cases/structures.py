@@ -1,0 +1,212 @@
+"""Structures as tables describe them: shapes and their lengths, materials and contacts by name."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from archfem.cases.settings import Table, checked
+from archfem.errors import InvalidInput
+from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
+from archfem.masonry.shapes.bridges import bridge
+from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
+from archfem.masonry.shapes.rings import arch_on_piers, circular_arch, column
+from archfem.masonry.structure import Structure
+from archfem.masonry.survey.survey import Layer, surveyed
+
+WORDS = {"shape": str, "material": str, "contact": str}
+COMMON = {"width": "m", "gravity": "m/s**2"}
+RING = {
+    "radius": "m",
+    "embrace": "degree",
+    "span": "m",
+    "rise": "m",
+    "thickness": "m",
+    "voussoirs": int,
+    "chords": int,
+    **COMMON,
+}
+COLUMN = {"breadth": "m", "heights": ["m"], **COMMON}
+PIERS = {
+    "radius": "m",
+    "thickness": "m",
+    "voussoirs": int,
+    "pier_breadth": "m",
+    "courses": ["m"],
+    "chords": int,
+    **COMMON,
+}
+BRIDGE = {
+    "arches": dict,
+    "piers": dict,
+    "sidewalls": dict,
+    "backfill": dict,
+    "paving": dict,
+    "chords": int,
+    **COMMON,
+}
+OUTLINES = {
+    "file": str,
+    "unit": str,
+    "snap": "m",
+    "layers": dict,
+    "contacts": dict,
+    **COMMON,
+}
+LAYER = {"part": str, "role": str, "material": str, "fixed": bool, "ignore": bool}
+USUAL_CONTACTS = {"stone/backfill": "soil to stone"}
+"""How blocks of two materials touch, unless the case says otherwise."""
+SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
+    "circular_arch": (circular_arch, RING),
+    "column": (column, COLUMN),
+    "arch_on_piers": (arch_on_piers, PIERS),
+    "bridge": (bridge, BRIDGE),
+    "outlines": (surveyed, OUTLINES),
+}
+SEVERAL: dict[str, tuple[Callable[..., Any], Table]] = {
+    "arches": (
+        Arch,
+        {"span": "m", "rise": "m", "embrace": "degree", "thickness": "m", "voussoirs": int},
+    ),
+    "piers": (Pier, {"gap": "m", "height": "m", "course": "m"}),
+    "sidewalls": (
+        Sidewall,
+        {
+            "length": "m",
+            "height": "m",
+            "course": "m",
+            "above": "m",
+            "setback": "m",
+            "state": str,
+        },
+    ),
+}
+"""Parts of a bridge of which there may be several, from left to right, each under its name."""
+FILL = {
+    "cover": "m",
+    "erosion": "m",
+    "hump": "m",
+    "spandrels": "m",
+    "material": str,
+    "contact": str,
+}
+PAVING = {"thickness": "m", "length": "m"}
+MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
+CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
+
+
+def planned(settings: Table, folder: Path = Path()) -> Structure:
+    """Build the structure that a case describes.
+
+    Args:
+        settings: tables "structure", "materials" and "contacts".
+        folder: where the names of drawings start.
+
+    Raises:
+        InvalidInput: a shape, key, material or contact is not known, or a value cannot be meant.
+        InvalidStructure: the lengths do not make a structure.
+    """
+    given = settings.get("structure", {})
+    name = given.get("shape")
+    if name not in list(SHAPES):
+        raise InvalidInput(f"structure.shape = {name!r} is not known: use one of {list(SHAPES)}")
+    shape, keys = SHAPES[name]
+    values = checked(given, {**WORDS, **keys}, "structure")
+    del values["shape"]
+    stone = _material(settings, values.pop("material", "stone"))
+    contact = _contact(settings, values.pop("contact", "stone to stone"))
+    _check_tables(settings)
+    if name == "bridge":
+        values = _parts(values, settings)
+    elif name == "outlines":
+        values = _outlines(values, settings, folder)
+    return _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
+
+
+def _check_tables(settings: Table) -> None:
+    """Make all that the case's own tables name, used or not: a misspelt preset is then missed."""
+    for section, named in (("materials", _material), ("contacts", _contact)):
+        for name in settings.get(section, {}):
+            named(settings, name)
+
+
+def _parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
+    """Parts of a bridge from their tables."""
+    parts = dict(values)
+    for key, (make, keys) in SEVERAL.items():
+        if key in parts:
+            parts[key] = _several(make, keys, parts[key], f"structure.{key}")
+    if "backfill" in parts:
+        fill = checked(parts["backfill"], FILL, "structure.backfill")
+        fill["material"] = _material(settings, fill.pop("material", "backfill"))
+        fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
+        parts["backfill"] = _made(Backfill, "structure.backfill", **fill)
+    if "paving" in parts:
+        paving = checked(parts["paving"], PAVING, "structure.paving")
+        parts["paving"] = _made(Paving, "structure.paving", **paving)
+    return parts
+
+
+def _outlines(values: dict[str, Any], settings: Table, folder: Path) -> dict[str, Any]:
+    """A drawing, what is on its layers and how that touches."""
+    if "file" not in values:
+        raise InvalidInput("structure of shape 'outlines' has no file: name the drawing")
+    drawn = dict(values)
+    drawn["path"] = folder / drawn.pop("file")
+    if "layers" in drawn:
+        drawn["layers"] = {
+            name: Layer(**checked(own, LAYER, f"structure.layers.{name}"))
+            for name, own in drawn["layers"].items()
+        }
+    pairs = USUAL_CONTACTS | drawn.get("contacts", {})
+    named = checked(pairs, dict.fromkeys(pairs, str), "structure.contacts")
+    drawn["contacts"] = {pair: _contact(settings, name) for pair, name in named.items()}
+    names = {*MATERIALS, *settings.get("materials", {})}
+    drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
+    return drawn
+
+
+def _several(make: Callable[..., Any], keys: Table, given: Table, section: str) -> list[Any]:
+    """Parts of one kind: what the table says of all, and each subtable of the part it names."""
+    each = {name: own for name, own in given.items() if isinstance(own, dict)}
+    if not each:
+        raise InvalidInput(
+            f'{section} names no part: write a table [{section}."its name"] for each'
+        )
+    common = checked({k: v for k, v in given.items() if k not in each}, keys, section)
+    return [
+        _made(
+            make, f"{section}.{name}", name=name, **common | checked(own, keys, f"{section}.{name}")
+        )
+        for name, own in each.items()
+    ]
+
+
+def _made(make: Callable[..., Any], section: str, **values: Any) -> Any:
+    """Make something of the values of a table, naming the table where a value is missing."""
+    try:
+        return make(**values)
+    except TypeError as error:
+        raise InvalidInput(f"{section}: {error}") from error
+
+
+def _material(settings: Table, name: str) -> Material:
+    """A named material: a preset, changed or made by the case's own table."""
+    return _named(settings, "materials", name, MATERIAL, (MATERIALS, Material))
+
+
+def _contact(settings: Table, name: str) -> Contact:
+    """A named contact, likewise."""
+    return _named(settings, "contacts", name, CONTACT, (CONTACTS, Contact))
+
+
+def _named(settings: Table, section: str, name: str, keys: Table, kind: tuple[Any, type]) -> Any:
+    presets, make = kind
+    own = settings.get(section, {})
+    if name not in presets and name not in own:
+        raise InvalidInput(
+            f"'{name}' is not among the {section} {sorted(set(presets) | set(own))}: "
+            f'name one of them or write a table [{section}."{name}"]'
+        )
+    base = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
+    values = {**base, **checked(own.get(name, {}), keys, f"{section}.{name}")}
+    return _made(make, f"{section}.{name}", **values, name=name)

@@ -1,0 +1,210 @@
+"""What runs did to the joints, and how strong motions are, as tables of text."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from archfem.dynamics.history import Ending, History
+from archfem.joints.criteria import envelope, first_time, flagged, judged, longest_duration
+from archfem.limit.counted import Mechanism
+from archfem.motion.matching import Match
+from archfem.motion.measures import measures
+from archfem.motion.motion import Motion
+from archfem.tables import aligned
+from archfem.units import STANDARD_GRAVITY
+
+SHOWN = 8
+"""Names in a list, beyond which those in the middle are left out."""
+
+ENDS = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
+"""Words for how a run ended, other than its own."""
+
+LOOSE = 100.0
+"""Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
+
+
+def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
+    """One line a joint: envelope, and when and how long it hinged, slid and was open.
+
+    Only joints that are `judged` have a line.
+
+    Args:
+        joints: over time and joint.
+        dead: over joint, under dead load alone.
+    """
+    joints = judged(flagged(joints))
+    rest = np.full(joints.sizes["joint"], np.nan)
+    if dead is not None:
+        rest = judged(dead)["eccentricity"].values
+    span = envelope(joints)
+    flags = {"hinge": joints["hinge"] != 0, "slide": joints["slide"], "open": joints["open"]}
+    times = {
+        key: list(zip(first_time(flag).values, longest_duration(flag).values, strict=True))
+        for key, flag in flags.items()
+    }
+    head = ["joint", "e dead", "e min", "e max", "max V/N"]
+    head += [f"{key} {what}" for key in flags for what in ("from", "for")]
+    rows = []
+    for k, name in enumerate(joints["name"].values):
+        numbers = [span[key].values[k] for key in ("lowest", "highest", "friction")]
+        cells = [str(name), *(_number(x) for x in (rest[k], *numbers))]
+        for key in flags:
+            start, longest = times[key][k]
+            cells += [_seconds(start), _seconds(longest) if longest > 0.0 else "-"]
+        rows.append(cells)
+    return aligned(head, rows)
+
+
+def pair_table(runs: Mapping[str, History]) -> str:
+    """One line a run of a suite: its ground, the gravest joint, the mechanism, and how it ended.
+
+    Args:
+        runs: what to call each run, and the run.
+    """
+    head = ["pair", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"]
+    head += ["by count", "at", "joints", "verified", "at", "end"]
+    rows = []
+    for name, run in runs.items():
+        joints = judged(run.joints)
+        size = abs(joints["eccentricity"])
+        apart = joints["open"].any("time")
+        worst = size.max("time").where(~apart, 0.5)
+        found = run.mechanism
+        moved = run.verified.moved if run.structure is not None and run.verified else None
+        level, upright = np.abs(run.dataset["ground"].values).max(axis=0)
+        rows.append(
+            [
+                name,
+                f"{level:.2f} m/s²",
+                f"{upright:.2f} m/s²",
+                _number(float(size.max())),
+                str(joints["joint"].values[int(worst.values.argmax())]),
+                _number(float(joints["friction"].max())),
+                f"{int(apart.sum())} joints" if apart.any() else "-",
+                *_class_and_time(found),
+                " ".join(map(str, found.joints)) if found else "-",
+                *(("unknown", "-") if run.structure is None else _class_and_time(moved)),
+                f"{ENDS.get(run.ended, run.ended)} {run.time[-1]:.2f} s",
+            ]
+        )
+    return aligned(head, rows)
+
+
+def verdict(run: History) -> str:
+    """What a run's mechanisms are: a line for the first by count, one for the first verified."""
+    found = run.mechanism
+    if found is None:
+        count = run.criteria.failures
+        lines = [f"no mechanism by count: never {count} failed joints at once in rings and piers"]
+    else:
+        lines = [f"by count: {_told(found, run)}"]
+    if run.structure is None:
+        return lines[0]
+    moved = run.verified
+    if moved is None:
+        lines.append("no verified mechanism: at no instant could rings or piers move")
+    else:
+        lines.append(f"verified: {_told(moved.moved, run)}")
+    return "\n".join(lines)
+
+
+def _told(found: Mechanism, run: History) -> str:
+    """A mechanism in words."""
+    words = (
+        f"{found.kind} mechanism of {found.part} at {found.time:.3f} s, "
+        f"joints {_shortened(list(map(str, found.joints)), ', ')}"
+    )
+    if run.structure is None:
+        return words
+    names = [run.structure.blocks[k].name for k in found.blocks]
+    if not names:
+        return f"{words}; rings and piers cannot move then"
+    return f"{words}; moving: {_shortened(names, '; ')}"
+
+
+def _shortened(words: Sequence[str], comma: str) -> str:
+    """A list in words, without its middle where it is long."""
+    if len(words) <= SHOWN:
+        return comma.join(words)
+    half = SHOWN // 2
+    return f"{comma.join([*words[:half], '…', *words[-half:]])} ({len(words)} in all)"
+
+
+def motion_table(motions: Sequence[Motion]) -> str:
+    """One line a component: its step and its intensity measures.
+
+    The only component of a motion may have any direction, and is named so.
+
+    Args:
+        motions: each with a name.
+    """
+    head = ["motion", "component", "samples", "dt", "PGA", "PGV", "PGD", "Arias", "CAV"]
+    head += ["Housner", "D5-95", "length"]
+    rows = []
+    for motion in motions:
+        for component in motion.components:
+            found = measures(motion, component)
+            rows.append(
+                [
+                    motion.name,
+                    component if len(motion.components) > 1 else "only one",
+                    str(len(motion.component(component))),
+                    f"{motion.dt:g} s",
+                    f"{found.pga / STANDARD_GRAVITY:.4f} g",
+                    f"{found.pgv:.4f} m/s",
+                    f"{found.pgd:.4f} m",
+                    f"{found.arias:.3g} m/s",
+                    f"{found.cav:.3g} m/s",
+                    f"{found.housner:.3g} m",
+                    f"{found.significant_duration:.2f} s",
+                    f"{found.duration:.2f} s",
+                ]
+            )
+    return aligned(head, rows)
+
+
+def match_table(matches: Sequence[Match]) -> str:
+    """One line a component of matched motions: misfit, and measures before and after.
+
+    Args:
+        matches: as a `Suite` keeps them.
+    """
+    head = ["pair", "component", "misfit", "drift", "PGA", "matched", "Arias", "matched"]
+    head += ["D5-95", "matched"]
+    rows = []
+    for match in matches:
+        for component, misfit in match.misfit.items():
+            before, after = match.before[component], match.after[component]
+            rows.append(
+                [
+                    match.motion.name,
+                    component,
+                    f"{misfit:.2%}",
+                    f"{abs(match.motion.displacement(component)[-1]):.0e} m",
+                    f"{before.pga / STANDARD_GRAVITY:.4f} g",
+                    f"{after.pga / STANDARD_GRAVITY:.4f} g",
+                    f"{before.arias:.3g} m/s",
+                    f"{after.arias:.3g} m/s",
+                    f"{before.significant_duration:.2f} s",
+                    f"{after.significant_duration:.2f} s",
+                ]
+            )
+    return aligned(head, rows)
+
+
+def _class_and_time(found: Mechanism | None) -> tuple[str, str]:
+    """Two cells of a table."""
+    if found is None or found.time is None:
+        return "none", "-"
+    return found.kind, _seconds(found.time)
+
+
+def _number(value: float) -> str:
+    if np.isnan(value):
+        return "open"
+    return f"{value:.3f}" if value < LOOSE else f"> {LOOSE:g}"
+
+
+def _seconds(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.3f} s"

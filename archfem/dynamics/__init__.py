@@ -1,0 +1,24 @@
+"""A model shaken: schemes, events, histories, scales, and which rung a scene needs.
+
+    time_history  a whole run: from dead load to the end of the motion
+    schemes       damping, and the scheme that steps
+    damping       damping right at the effective modes
+    steps         what passes between stepper and run: states, steps, batches
+    stepping      the one stepper and its strategies
+    energy        the energy balance of a run
+    guard         doubts about a run while it goes on
+    events        what ends a run: enough failed joints, or blocks that can move
+    recorder      what a run leaves behind
+    history       the record of a run, and its file
+    verdicts      when a run first meets a mechanism, by each definition
+    scales        by what factor a motion must be multiplied for a mechanism
+    ladder        which rung, mesh and step a scene needs
+    probe         what a short run tells of a model
+    tradeoff      speed against error over settings
+
+It imports from `motion`, `statics` and what is left of it. Start reading at `time_history`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,12 @@
+from .damping import effective_damping as effective_damping
+from .events import CountedMechanism as CountedMechanism
+from .events import EveryMechanism as EveryMechanism
+from .events import MovingMechanism as MovingMechanism
+from .history import Ending as Ending
+from .history import History as History
+from .scales import mechanism_scales as mechanism_scales
+from .schemes import HHT as HHT
+from .schemes import Newmark as Newmark
+from .schemes import Rayleigh as Rayleigh
+from .time_history import Record as Record
+from .verdicts import first_mechanisms as first_mechanisms

@@ -1,0 +1,143 @@
+"""Damping that is right at the first and the last mode that an earthquake along x excites.
+
+Codes take as many modes, the lowest first, as together have 90 % of the mass that can move (EN
+1998-1, 4.3.3.3.1(3); ASCE 7-16, 12.9.1.1): the last of them is the last effective one here. The
+first is the lowest that those below it and itself give 5 %, what the same clause of EN 1998-1 calls
+too much to leave out. Both hold when the mesh changes. Two other definitions do not: modes with 5 %
+each, for modes close to each other share their mass now so, now so; and 90 % by decreasing mass,
+which where fill has hundreds of small modes depends on how many were computed.
+"""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from archfem.arguments import real
+from archfem.dynamics.schemes import EFFECTIVE, Rayleigh
+from archfem.errors import InvalidInput
+from archfem.models.model import Model, check_model
+from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.modes import Modes, modes
+
+logger = logging.getLogger("archfem")
+
+FIRST_SHARE = 0.05
+"""Share of the mass along x that the modes up to the first effective one have together."""
+
+FEW, MOST = 32, 1024
+"""Modes computed at first, and at most."""
+
+NAMED = 4
+"""Modes of large mass that are named in the text."""
+
+
+@dataclass(frozen=True, eq=False)
+class EffectiveRange:
+    """The first and the last mode that are effective along x.
+
+    Attributes:
+        modes: all that were computed.
+        first: number of the first, counted from 1.
+        last: number of the last.
+    """
+
+    modes: Modes
+    first: int
+    last: int
+
+    @property
+    def frequencies(self) -> tuple[float, float]:
+        """Of both [Hz]."""
+        low, high = self.modes.frequencies[[self.first - 1, self.last - 1]]
+        return float(low), float(high)
+
+    @property
+    def share(self) -> float:
+        """Share of the mass along x of all modes up to the last [-]."""
+        return float(self.modes.mass_ratios[: self.last, 0].sum())
+
+    @property
+    def text(self) -> str:
+        """Which modes these are, and which of those between have the most mass."""
+        ratios, frequencies = self.modes.mass_ratios[: self.last, 0], self.modes.frequencies
+        large = ", ".join(
+            f"{number + 1} ({frequencies[number]:.2f} Hz, {100.0 * ratios[number]:.1f} %)"
+            for number in np.sort(np.argsort(-ratios)[:NAMED])
+        )
+        return (
+            f"modes {self.first} and {self.last}, the first and the last effective along x; up to "
+            f"the last they have {100.0 * self.share:.1f} % of the mass, most of it {large}"
+        )
+
+
+def effective_range(
+    model: Model, about: Equilibrium | None = None, *, share: float = EFFECTIVE
+) -> EffectiveRange:
+    """Find the first and the last mode effective along x.
+
+    As many modes are computed as it takes; where 1024 do not have the share, the last of them is
+    given, and a warning says how much they have.
+
+    Args:
+        model: any rung of the ladder.
+        about: the state, such as the dead load of this model; None: all joints closed.
+        share: of the mass that can move along x, of the modes up to the last [-].
+
+    Raises:
+        InvalidInput: the share is not one, or a single mode has it.
+        DidNotConverge: the structure is a mechanism in that state, or modes were not found.
+    """
+    check_model(model)
+    if not FIRST_SHARE < real(share, "share of the mass [-]") < 1.0:
+        raise InvalidInput(
+            f"share {share} of the mass is not between {FIRST_SHARE} and 1: 90 % is 0.9"
+        )
+    count = 0
+    while count < min(MOST, model.size):
+        count = min(max(FEW, 2 * count), MOST, model.size)
+        found = modes(model, count, about)
+        reached = np.cumsum(found.mass_ratios[:, 0])
+        if reached[-1] >= share:
+            break
+    else:
+        logger.warning(
+            "%d modes, up to %.1f Hz, have only %.1f %% of the mass along x, not %.0f %%: the last "
+            "of them is taken for the last effective one",
+            *(count, found.frequencies[-1], 100.0 * reached[-1], 100.0 * share),
+        )
+    first = int(np.searchsorted(reached, FIRST_SHARE)) + 1
+    last = min(int(np.searchsorted(reached, share)) + 1, count)
+    if first >= last:
+        raise InvalidInput(
+            f"mode {last} alone has {100.0 * found.mass_ratios[last - 1, 0]:.1f} % of the mass "
+            "along x, and damping needs two modes: raise the share, or give the frequencies"
+        )
+    return EffectiveRange(found, first, last)
+
+
+def effective_damping(
+    model: Model,
+    ratio: float = 0.05,
+    about: Equilibrium | None = None,
+    *,
+    joints: str = "closed",
+    share: float = EFFECTIVE,
+) -> Rayleigh:
+    """Damping with a ratio at the first and the last mode effective along x, less between them.
+
+    So Demirel and Aldemir (Buildings 11 (2021), section 2) choose it: no mode that counts along
+    the structure is damped by more than the ratio. `effective_range` tells which modes these are.
+
+    Args:
+        model: any rung of the ladder.
+        ratio: of critical damping [-].
+        about: the state, such as the dead load of this model; None: all joints closed.
+        joints: what the stiffness part acts on, as in `Rayleigh`.
+        share: of the mass that can move along x, of the modes up to the last [-].
+
+    Raises:
+        InvalidInput: a value cannot be meant, or a single mode has the share.
+        DidNotConverge: the structure is a mechanism in that state, or modes were not found.
+    """
+    return Rayleigh(ratio, effective_range(model, about, share=share).frequencies, joints)

@@ -1,0 +1,268 @@
+"""Events that end a time history: enough joints have failed, or the blocks can move.
+
+An event says what to look for. Each run has a fresh watch of its own made by it, so that one event
+serves any number of runs.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import InitVar, dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import xarray as xr
+
+from archfem.arrays import Array
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria, chosen, failing
+from archfem.joints.resultants import joint_dataset, ratios
+from archfem.limit.counted import KINDS, counted_mechanism, counted_mechanisms
+from archfem.limit.verified import Verifier
+from archfem.masonry.structure import Structure
+
+Watch = Callable[[Array], str | None]
+"""Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
+
+
+@runtime_checkable
+class Event(Protocol):
+    """What may end a run.
+
+    Attributes:
+        criteria: what makes a joint fail, or None for those of the run.
+    """
+
+    @property
+    def criteria(self) -> Criteria | None:
+        """What makes a joint fail, or None for those of the run."""
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch a run of a structure, by its criteria."""
+
+
+Until = Event | Callable[[Structure, Array], str | None]
+"""An event, or a function of the structure and N, V, M of a step that does as a `Watch` does."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CountedMechanism:
+    """Event: so many joints of one part, or of several, hinge, slide or have come apart at once.
+
+    Its words say whether the blocks can also move.
+
+    Attributes:
+        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
+            run. Given here and not to the run, they become those of the run.
+        kinds: classes that end the run, of "local", "semi-global" and "global".
+
+    Args:
+        criteria: as above.
+        kinds: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+        failures: how many make a mechanism, instead of criteria.
+
+    Raises:
+        InvalidInput: a class is not known, or a value cannot be meant.
+    """
+
+    criteria: Criteria | None = None
+    kinds: tuple[str, ...] = KINDS
+    limit: InitVar[float | None] = None
+    failures: InitVar[int | None] = None
+
+    def __post_init__(self, limit: float | None, failures: int | None) -> None:
+        own = chosen(self.criteria, hinge=limit, failures=failures)
+        object.__setattr__(self, "criteria", own)
+        _check_kinds(self.kinds)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say which joints have failed, or None."""
+        verifier = Verifier(structure)
+        glance = _Glance(structure, criteria, np.flatnonzero(structure.judged).tolist())
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, criteria.failures)
+            found = None if joints is None else counted_mechanism(joints, kinds=self.kinds)
+            if joints is None or found is None:
+                return None
+            motion = verifier.verified(joints)
+            return f"a mechanism: joints {found.joints} of the {found.part}; {motion}"
+
+        return look
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingMechanism:
+    """Event: the failed joints, and they alone, permit a motion of the blocks.
+
+    Its words say whether the count of failures agrees.
+
+    Attributes:
+        criteria: what makes a joint fail; None for those of the run. Given here and not to the
+            run, they become those of the run.
+        kinds: classes that end the run, of "local", "semi-global" and "global".
+
+    Args:
+        criteria: as above.
+        kinds: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+
+    Raises:
+        InvalidInput: a class is not known, or a value cannot be meant.
+    """
+
+    criteria: Criteria | None = None
+    kinds: tuple[str, ...] = KINDS
+    limit: InitVar[float | None] = None
+
+    def __post_init__(self, limit: float | None) -> None:
+        own = chosen(self.criteria, hinge=limit)
+        object.__setattr__(self, "criteria", own)
+        _check_kinds(self.kinds)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say which joints permit which motion, or None."""
+        verifier = Verifier(structure)
+        glance = _Glance(structure, criteria, verifier.skeleton.joints)
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, 1)
+            found = None if joints is None else verifier.moving(joints)
+            if found is None or found.kind not in self.kinds:
+                return None
+            return f"a mechanism that moves: joints {found.moved.joints}; {found}"
+
+        return look
+
+
+@dataclass(frozen=True, kw_only=True)
+class EveryMechanism:
+    """Event: a mechanism by each definition has been met, at one step of the run or another.
+
+    Definitions that the structure has no joints for are not waited for.
+
+    Attributes:
+        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
+            run. Given here and not to the run, they become those of the run.
+
+    Args:
+        criteria: as above.
+        limit: of |e| for a hinge, instead of criteria [-].
+
+    Raises:
+        InvalidInput: a value cannot be meant.
+    """
+
+    criteria: Criteria | None = None
+    limit: InitVar[float | None] = None
+
+    def __post_init__(self, limit: float | None) -> None:
+        own = chosen(self.criteria, hinge=limit)
+        object.__setattr__(self, "criteria", own)
+
+    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
+        """Begin to watch: words that say that all have been met, or None."""
+        verifier = Verifier(structure)
+        concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
+        glance = _Glance(structure, criteria, sorted(concerned))
+        wanted = {"verified", *possible_counts(structure, criteria)}
+        met: set[str] = set()
+
+        def look(resultants: Array) -> str | None:
+            joints = glance(resultants, 1)
+            if joints is None:
+                return None
+            met.update(name for name, found in counted_mechanisms(joints).items() if found)
+            if "verified" not in met and verifier.moving(joints) is not None:
+                met.add("verified")
+            return "a mechanism by each definition" if met >= wanted else None
+
+        return look
+
+
+def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
+    """Criteria of a run and of the event that may end it, which are the same.
+
+    Args:
+        criteria: given to the run, or None.
+        until: the event, or None.
+
+    Returns:
+        Those given to the run, or else to the event, or else the usual ones.
+
+    Raises:
+        InvalidInput: both were given, and differ: what ends the run would be no mechanism of it.
+    """
+    own = until.criteria if isinstance(until, Event) else None
+    if criteria is not None and own is not None and criteria != own:
+        raise InvalidInput(
+            f"the run is judged by {criteria}, and its event by {own}: give criteria to the run "
+            "alone, which its event then obeys"
+        )
+    return criteria or own or Criteria()
+
+
+def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
+    """A fresh watch over one run.
+
+    Args:
+        until: an event, or a function of structure and resultants.
+        structure: that moves.
+        criteria: of the run.
+
+    Raises:
+        InvalidInput: it is neither.
+    """
+    if isinstance(until, type) or not (isinstance(until, Event) or callable(until)):
+        raise InvalidInput(
+            f"until = {until!r} is no event: give one, e.g. CountedMechanism(), or a function of "
+            "the structure and of N, V, M of its joints"
+        )
+    if isinstance(until, Event):
+        return until.watch(structure, criteria)
+    return lambda resultants: until(structure, resultants)
+
+
+def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:
+    """Definitions of `counted_mechanisms` that the structure has joints enough for.
+
+    Args:
+        structure: what may fail.
+        criteria: say how many joints it takes; by default the usual ones.
+    """
+    apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
+    return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
+
+
+class _Glance:
+    """A quick look at some joints of a structure at every step of a run.
+
+    Labels, which take long, are given only to states of joints that have not been seen before.
+    """
+
+    def __init__(self, structure: Structure, criteria: Criteria, numbers: Sequence[int]) -> None:
+        self._structure, self._criteria = structure, criteria
+        self._numbers = np.array(numbers, dtype=np.intp)
+        self._depth = structure.depths[self._numbers]
+        self._coefficients = criteria.coefficients(structure.friction[self._numbers])
+        self._seen: set[bytes] = set()
+
+    def __call__(self, resultants: Array, least: int) -> xr.Dataset | None:
+        """All joints, labelled, where so many of those looked at fail in a way not yet seen."""
+        own = resultants[self._numbers]
+        e, friction = ratios(own, self._depth)
+        hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
+        apart = own[:, 0] <= 0.0
+        if np.count_nonzero(hinges | slides | apart) < least:
+            return None
+        senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)
+        key = np.stack([*senses, slides, apart]).astype(np.int8).tobytes()
+        if key in self._seen:
+            return None
+        self._seen.add(key)
+        return joint_dataset(self._structure, resultants, criteria=self._criteria)
+
+
+def _check_kinds(kinds: Any) -> None:
+    """Refuse classes that no mechanism has."""
+    if not isinstance(kinds, list | tuple) or not kinds or not all(each in KINDS for each in kinds):
+        raise InvalidInput(f"kinds = {kinds!r}: give some of {KINDS}, as a tuple")

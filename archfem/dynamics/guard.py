@@ -1,0 +1,112 @@
+"""Doubts about a run while it goes on: energy from nowhere, displacements that are not small."""
+
+import logging
+
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.dynamics.energy import Balance
+from archfem.dynamics.steps import Batch, State
+from archfem.errors import DidNotConverge
+from archfem.models.model import Model
+
+logger = logging.getLogger("archfem")
+
+DOUBTFUL = 0.05
+"""Drift of energy, relative to the largest exchanged, above which a run is doubted aloud."""
+
+WRONG = 0.5
+"""Gain of energy beyond the work of the ground, relative to the largest exchanged, above which a
+run is wrong: damping aside, which only takes, half of what moves came from nowhere."""
+
+LOOK = 32
+"""Steps between two looks at displacements."""
+
+
+class Guard:
+    """Watches over a run: warns once of each doubt, and ends what is certainly wrong.
+
+    Args:
+        model: that moves.
+        start: its state at the start, as a batch of one.
+
+    Attributes:
+        worst: largest drift of energy so far, as a fraction of the largest exchanged [-].
+        largest_displacement: of any point of a block, at the looks taken [m].
+    """
+
+    def __init__(self, model: Model, start: Batch) -> None:
+        self.model = model
+        self.worst = 0.0
+        self.largest_displacement = 0.0
+        self._balance = Balance(*start.energy[0, :2])
+        self._depth = float(model.structure.depths.min())
+        self._last, self._before = start.state(0), start.state(0)
+        self._steps = 0
+        self._told: set[str] = set()
+
+    def add(self, batch: Batch) -> Array:
+        """Look at the next steps; the drift of energy after each (steps,) [J]."""
+        drift = self._balance.add(batch.energy)
+        fraction = self._balance.fraction
+        if not abs(fraction) <= abs(self.worst):
+            self.worst = fraction
+        for k in range(-self._steps % LOOK, len(batch.times), LOOK):
+            self._look(batch.state(k))
+        self._steps += len(batch.times)
+        self._before, self._last = self._last, batch.state(len(batch.times) - 1)
+        return drift
+
+    def _look(self, state: State) -> None:
+        moved = np.abs(self.model.cells.lift @ state.q).max()
+        self.largest_displacement = max(self.largest_displacement, float(moved))
+
+    def judge(self) -> None:
+        """Warn of what is doubtful in what was added.
+
+        Raises:
+            DidNotConverge: most of the energy came from nowhere, or blocks moved farther than the
+                structure is large; `last` is the state before the steps added last.
+        """
+        time, size, balance = self._last.time, self.model.structure.size, self._balance
+        if not np.isfinite(balance.drift):
+            raise DidNotConverge(
+                f"by t = {time:.4g} s displacements or speeds are not numbers any more: the start "
+                "cannot be meant, or the run needs damping or a smaller dt",
+                last=self._before,
+            )
+        if balance.gain > WRONG * balance.largest:
+            raise DidNotConverge(
+                f"by t = {time:.4g} s {balance.gain / balance.largest:.0%} of the energy had come "
+                "from nowhere, so the history is wrong: use damping, the scheme HHT(-0.1) or a "
+                "smaller dt",
+                last=self._before,
+            )
+        if self.largest_displacement > size:
+            raise DidNotConverge(
+                f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
+                f"than the size of the structure, {size:.3g} m: it has fallen apart; end the run "
+                "at its mechanism, with until=CountedMechanism()",
+                last=self._before,
+            )
+        share = balance.fraction
+        if abs(share) > DOUBTFUL:
+            what = "came from nowhere" if share > 0.0 else "was lost to the scheme"
+            self._tell(
+                "energy",
+                f"energy drifts: by t = {time:.4g} s {abs(share):.0%} of the largest exchanged "
+                f"{what}; compare with a smaller dt, or with more damping",
+            )
+        if self.largest_displacement > self._depth:
+            self._tell(
+                "displacement",
+                f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
+                f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
+                "displacements that archfem assumes; read it as collapse",
+            )
+
+    def _tell(self, kind: str, words: str) -> None:
+        """Warn of each kind of doubt once a run."""
+        if kind not in self._told:
+            self._told.add(kind)
+            logger.warning("%s", words)

@@ -1,0 +1,190 @@
+"""What was recorded of a time history, and its file."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from archfem.errors import InvalidInput
+from archfem.files import in_one_stroke
+from archfem.joints.criteria import Criteria, flagged
+from archfem.joints.resultants import one_joint
+from archfem.limit.counted import Mechanism, counted_mechanism
+from archfem.limit.verified import (
+    VerifiedMechanism,
+    first_verified_mechanism,
+    verified_mechanism,
+)
+from archfem.masonry.structure import Structure
+
+SIGNS = (
+    "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
+    "higher block slips toward the extrados; gravity along -y; displacements relative to the ground"
+)
+
+
+class Ending(StrEnum):
+    """How a run ended.
+
+    Attributes:
+        FINISHED: at the end of its motion.
+        EVENT: by the event that it was to run until.
+        INTERRUPTED: by Ctrl-C.
+        FAILED: at a step without equilibrium.
+    """
+
+    FINISHED = "finished"
+    EVENT = "event"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"
+
+    @property
+    def by_itself(self) -> bool:
+        """Whether the run came to its end, and was not broken off."""
+        return self in (Ending.FINISHED, Ending.EVENT)
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The record of one run.
+
+    Attributes:
+        dataset: everything that was recorded, with units, signs, versions, the criteria by which
+            joints are judged and, where one was given, the case. Resultants and flags are over
+            (time, joint), fields over (frame, coordinate).
+        structure: what was shaken; the file does not hold it. Without it motions of the blocks
+            are unknown.
+    """
+
+    dataset: xr.Dataset
+    structure: Structure | None = None
+
+    @property
+    def joints(self) -> xr.Dataset:
+        """N, V, M, eccentricity, friction and flags of failure over time and joint."""
+        names = [name for name, values in self.dataset.items() if "joint" in values.dims]
+        return self.dataset[names]
+
+    @property
+    def criteria(self) -> Criteria:
+        """What makes a joint fail, and how many failed joints make a mechanism."""
+        return Criteria.of(self.dataset)
+
+    def judged_by(self, criteria: Criteria) -> "History":
+        """The same run, judged by other criteria.
+
+        Args:
+            criteria: instead of its own. What ended the run stays as it was.
+        """
+        return History(flagged(self.dataset, criteria), self.structure)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the recorded steps (steps,) [s]."""
+        return self.dataset["time"].values
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended, in words."""
+        return str(self.dataset.attrs["outcome"])
+
+    @property
+    def ended(self) -> Ending:
+        """How the run ended.
+
+        Raises:
+            InvalidInput: it was written by a version that kept words alone.
+        """
+        if "ended" not in self.dataset.attrs:
+            raise InvalidInput(
+                "this history tells only in words how its run ended, as earlier versions wrote it: "
+                f"'{self.outcome}'; run it again"
+            )
+        return Ending(self.dataset.attrs["ended"])
+
+    @cached_property
+    def mechanism(self) -> Mechanism | None:
+        """The first mechanism by count, or None; with the blocks that can then move, if any."""
+        found = counted_mechanism(self.joints)
+        if found is None or self.structure is None:
+            return found
+        motion = verified_mechanism(self.structure, self.joints.sel(time=found.time))
+        return found if motion.kind == "none" else replace(found, blocks=motion.moved.blocks)
+
+    @cached_property
+    def verified(self) -> VerifiedMechanism | None:
+        """The first mechanism that the blocks' motion verifies, or None.
+
+        Raises:
+            InvalidInput: the structure is not known.
+        """
+        if self.structure is None:
+            raise InvalidInput(
+                "this history does not know its structure, so that no motion of its blocks can be "
+                "looked for: read it with History.read(path, structure)"
+            )
+        return first_verified_mechanism(self.structure, self.joints)
+
+    def joint(self, joint: str | int) -> xr.Dataset:
+        """What one joint did over time.
+
+        Args:
+            joint: name or number.
+
+        Raises:
+            InvalidInput: there is no such joint.
+        """
+        return one_joint(self.joints, joint)
+
+    def save(self, path: str | Path) -> Path:
+        """Write one NetCDF file, in one stroke: a killed run leaves the old file or the new one.
+
+        Args:
+            path: the file; folders are made.
+        """
+        encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
+        with in_one_stroke(Path(path)) as draft:
+            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
+        return Path(path)
+
+    @classmethod
+    def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
+        """Read a file written by `save`; one of an earlier version is judged by the usual criteria.
+
+        Args:
+            path: the file.
+            structure: what was shaken, for `verified` and the blocks of `mechanism`. It also says
+                what roles its parts have.
+
+        Raises:
+            InvalidInput: there is no such file, or it is something else, or of another structure;
+                or nothing tells the roles of the parts.
+        """
+        if not Path(path).is_file():
+            raise InvalidInput(f"there is no history file {path}")
+        try:
+            with xr.open_dataset(path, engine="netcdf4") as opened:
+                dataset = opened.load()
+        except OSError as error:
+            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
+        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        if missing:
+            raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
+        names = dataset["name"].values.astype(str).tolist()
+        if structure is not None and names != [joint.name for joint in structure.joints]:
+            raise InvalidInput(
+                f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
+                f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        if structure is not None:
+            roles = [joint.role for joint in structure.joints]
+            dataset = dataset.assign_coords(role=("joint", roles))
+        elif "role" not in dataset.coords:
+            raise InvalidInput(
+                f"{path} does not tell which parts are rings and piers, as files of earlier "
+                "versions do not: give the structure that was shaken too"
+            )
+        return cls(flagged(dataset), structure)

@@ -1,0 +1,72 @@
+"""What a short run tells of a model: the largest |e| of each joint on the strongest motion."""
+
+import numpy as np
+from scipy.sparse.linalg import eigsh
+
+from archfem.arrays import Array
+from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.time_history import time_history
+from archfem.errors import DidNotConverge
+from archfem.joints.criteria import judged
+from archfem.masonry.actions import BodyForce
+from archfem.models.model import Model
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import equilibrium, self_weight
+
+WINDOW = 8.0
+"""Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
+
+SEVERE = 0.40
+"""|e| to which a probing motion is scaled where none is given."""
+
+
+def strongest(motion: Motion) -> Motion:
+    """The part of a motion around its peak."""
+    peak = float(motion.times()[np.argmax(np.abs(motion.horizontal))])
+    start = max(0.0, min(peak - WINDOW / 2.0, motion.duration - WINDOW))
+    return motion.cut(start, min(start + WINDOW, motion.duration))
+
+
+def severe_motion(model: Model) -> Motion:
+    """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
+    weight, low, high = self_weight(model), 0.0, 2.0
+    for _ in range(10):
+        middle = 0.5 * (low + high)
+        try:
+            joints = equilibrium(model, weight + model.load(BodyForce(middle))).joints
+            severe = float(abs(judged(joints)["eccentricity"]).max()) > SEVERE
+        except DidNotConverge:
+            severe = True
+        low, high = (low, middle) if severe else (middle, high)
+    pga = max(low, 0.02) * model.structure.gravity
+    return Motion.synthetic(duration=WINDOW, pga=pga, seed=1)
+
+
+def usual_damping(model: Model) -> Rayleigh:
+    """Five per cent at the first closed frequency and at three times that."""
+    square = eigsh(
+        model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
+    )[0]
+    first = float(np.sqrt(square) / (2.0 * np.pi))
+    return Rayleigh(0.05, (first, 3.0 * first))
+
+
+def peaks(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
+    """Largest |e| of each joint that is judged over a run (n,); 0.5 where it came apart.
+
+    Args:
+        model: any rung of the ladder.
+        motion: of the ground.
+        damping: None is undamped.
+        dt: time step [s].
+
+    Raises:
+        DidNotConverge: a step failed.
+    """
+    joints = judged(time_history(model, motion, damping=damping, dt=dt).joints)
+    return abs(joints["eccentricity"]).fillna(0.5).max("time").values
+
+
+def largest_difference(first: Array, second: Array) -> float:
+    """Error in eccentricity: the largest difference of two runs' peaks over the joints."""
+    return float(np.abs(first - second).max())

@@ -1,0 +1,170 @@
+"""Which strategy takes a run: the fastest on the run's own motion, timed.
+
+What a step takes depends on how many joints are open, so a few steps are timed about the peak of
+the motion, where most are: there runs spend their time, and the ranking of strategies while all
+joints are closed says nothing of it. All strategies go from one state, to which the first of them
+has shaken the structure over the steps before. The time until a strategy can begin counts as well,
+spread over the run. As all give one history, to rounding, the choice changes nothing but the time.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.banded import WIDEST, Banded
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.exact import Exact
+from archfem.dynamics.stepping.loop import advance
+from archfem.dynamics.stepping.modal import LARGEST, Modal
+from archfem.dynamics.stepping.sparse import Sparse
+from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.stepping.strategy import Strategy
+from archfem.dynamics.steps import State
+from archfem.errors import InvalidInput
+from archfem.models.model import Model
+from archfem.statics.newton import Newton
+
+STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal)
+"""In the order in which they are tried; the first that applies takes runs too short for timing."""
+
+METHODS = ("auto", *sorted(each.name for each in STRATEGIES), "snes")
+
+TIMED = 20
+"""Steps that are timed."""
+
+LEAD = 40
+"""Steps before those, in which joints open."""
+
+REPEATS = 2
+"""Times that those of a strategy are timed; the least counts."""
+
+SHORTEST = 1000
+"""Steps of a run from which timing pays."""
+
+WORTH = 0.25
+"""Part of the fastest run known so far that it may take to set up one more strategy."""
+
+CLEARLY = 0.95
+"""Part of the least time so far below which another strategy counts as faster."""
+
+_chosen: WeakKeyDictionary[Model, dict[object, type[Strategy]]] = WeakKeyDictionary()
+
+
+def stepper_for(
+    method: "str | Stepper",
+    equation: Equation,
+    start: State,
+    dt: float,
+    newton: Newton | None = None,
+) -> Stepper:
+    """The stepper of a run.
+
+    Args:
+        method: "snes", "contact", "chain", "compliance", or "auto": of the last three the fastest,
+            where one applies; or a stepper made before, which is then taken as it is.
+        equation: of motion.
+        start: state from which the run goes.
+        dt: its time step [s].
+        newton: settings of the equilibrium solves.
+
+    Raises:
+        InvalidInput: the method is not known, or does not apply to this model and damping.
+    """
+    if isinstance(method, Stepper):
+        return method
+    if method not in METHODS:
+        raise InvalidInput(f"method '{method}' is not known: use one of {METHODS}")
+    strategy = None
+    if method == "auto":
+        strategy = chosen(equation, start, dt)
+    elif method != "snes":
+        strategy = next(each for each in STRATEGIES if each.name == method).of(equation)
+        if strategy is None:
+            raise InvalidInput(
+                f"the {method} stepper does not apply to a '{equation.model.fidelity}' model of "
+                f"{equation.model.size} coordinates under this damping: contact needs at most "
+                f"{LARGEST} of them and damping on closed or initial joints, chain a bandwidth up "
+                f"to {WIDEST}, and all three joints whose supports have not moved; use "
+                "method='snes'"
+            )
+    return Stepper(equation, strategy, exact=Exact(equation, newton))
+
+
+def chosen(
+    equation: Equation,
+    start: State,
+    dt: float,
+    strategies: Sequence[type[Strategy]] = STRATEGIES,
+) -> Strategy | None:
+    """The strategy that takes a run fastest, or None where none applies.
+
+    What was found by timing is remembered for a model, its damping, scheme and time step.
+
+    Args:
+        equation: of motion.
+        start: state from which the run goes.
+        dt: its time step [s].
+        strategies: to choose from; the first that applies takes a run too short for timing.
+    """
+    steps = round((equation.motion.duration - start.time) / dt)
+    remembered = _chosen.setdefault(equation.model, {})
+    key = (equation.damping, equation.scheme, dt, tuple(strategies))
+    if key in remembered:
+        return remembered[key].of(equation)
+    if steps >= SHORTEST:
+        with threadpool_limits(limits=1, user_api="blas"):
+            fastest = _fastest(equation, start, dt, strategies)
+        if fastest is not None:
+            remembered[key] = type(fastest)
+            return fastest
+    made = (each.of(equation) for each in strategies)
+    return next((strategy for strategy in made if strategy is not None), None)
+
+
+def _fastest(
+    equation: Equation, start: State, dt: float, strategies: Sequence[type[Strategy]]
+) -> Strategy | None:
+    """Time those that apply, but for those whose set-up alone would take too much of the run."""
+    times = start.time + dt * np.arange(1, round((equation.motion.duration - start.time) / dt) + 1)
+    peak = int(np.argmax(np.linalg.norm(equation.motion.at(times), axis=1)))
+    first = min(max(peak, LEAD), len(times) - TIMED)
+    before, timed = times[first - LEAD : first], times[first : first + TIMED]
+    fastest, least, state = None, np.inf, None
+    for kind in strategies:
+        begun = time.process_time()
+        strategy = kind.of(equation)
+        if strategy is None or strategy.setup > WORTH * least:
+            continue
+        stepper = Stepper(equation, strategy)
+        stepper.prepared(start, dt, timed)
+        setup = time.process_time() - begun
+        state = state or _shaken(stepper, start, dt, before)
+        found = setup + len(times) * _clocked(stepper, state, dt, timed)
+        if found < CLEARLY * least:
+            fastest, least = strategy, found
+    return fastest
+
+
+def _shaken(stepper: Stepper, start: State, dt: float, times: Array) -> State:
+    """The state after some steps, as far as they settle."""
+    first = replace(start, time=float(times[0] - dt))
+    batch = stepper.taken(first, dt, times)
+    return batch.state(len(batch.times) - 1) if len(batch.times) else first
+
+
+def _clocked(stepper: Stepper, state: State, dt: float, times: Array) -> float:
+    """Processor time of a step in the compiled loop [s]; infinite where one does not settle."""
+    advance(*stepper.prepared(state, dt, times[:1]))  # compiles it, so that this is not timed
+    least = np.inf
+    for _ in range(REPEATS):
+        room = stepper.prepared(state, dt, times)
+        begun = time.process_time()
+        if advance(*room) < len(times):
+            return np.inf
+        least = min(least, time.process_time() - begun)
+    return least / len(times)

@@ -1,0 +1,113 @@
+"""The joint law, compiled: what closed parts of joints carry, and what tension they do not.
+
+With all joints closed forces are linear in the gaps z. The law takes out of them the tension
+
+    λ = J(z) z,
+
+J block-diagonal, zero where a joint is closed: point by point, or facet by facet exactly.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.joints.operator import Facets, JointOperator
+
+
+class Law(NamedTuple):
+    """The joint law as the compiled loops take it.
+
+    Attributes:
+        facets: whether facets are exact.
+        stiffness: of each point, that of the whole facet where facets are exact (p,) [N/m].
+        arm: of each point (p,) [m].
+        joint: of each point (p,).
+    """
+
+    facets: bool
+    stiffness: Array
+    arm: Array
+    joint: Any
+
+
+def law_of(joints: JointOperator) -> Law:
+    """The law of some joints, compiled."""
+    points = joints.points
+    stiffness = points.weight * points.normal_stiffness
+    facets = isinstance(joints.law, Facets)
+    if facets:
+        stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
+    return Law(facets, stiffness, points.arm, points.joint)
+
+
+@numba.njit(cache=True)
+def open_part(a, b):  # type: ignore
+    """Where a facet of unit length with end gaps a and b is open."""
+    if a > 0.0:
+        return 0.0, (1.0 if b > 0.0 else a / (a - b))
+    return (a / (a - b) if b > 0.0 else 1.0), 1.0
+
+
+@numba.njit(cache=True)
+def integrals(low, high):  # type: ignore
+    """∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2)."""
+    squares, cubes = 0.5 * (high**2 - low**2), (high**3 - low**3) / 3.0
+    return high - low - 2.0 * squares + cubes, squares - cubes, cubes
+
+
+@numba.njit(cache=True)
+def pull(gap, other, stiffness, facets):  # type: ignore
+    """λ at a point: the tension that the closed stiffness would hold where the joint is open."""
+    if not facets:
+        return stiffness * max(gap, 0.0)
+    if gap <= 0.0 and other <= 0.0:
+        return 0.0
+    low, high = open_part(gap, other)
+    first, mixed, _ = integrals(low, high)
+    return stiffness * (first * gap + mixed * other)
+
+
+@numba.njit(cache=True)
+def pulls(gap, law, force):  # type: ignore
+    """λ at all points."""
+    for row in range(len(gap)):
+        other = gap[row ^ 1] if law.facets else 0.0
+        force[row] = pull(gap[row], other, law.stiffness[row], law.facets)
+
+
+@numba.njit(cache=True)
+def closed_stiffness(gap, law, stiffness):  # type: ignore
+    """Stiffness of the closed part of the joint at each row: its own, and with its partner."""
+    whole = law.stiffness
+    if not law.facets:
+        for row in range(len(gap)):
+            stiffness[row, 0] = whole[row] if gap[row] <= 0.0 else 0.0
+        return
+    for row in range(0, len(gap), 2):
+        a, b, low, high = gap[row], gap[row + 1], 0.0, 1.0
+        if a > 0.0 or b > 0.0:
+            opens, ends = open_part(a, b)
+            low, high = (ends, 1.0) if a > 0.0 else (0.0, opens)
+        first, mixed, second = integrals(low, high)
+        stiffness[row, 0] = whole[row] * first
+        stiffness[row, 1] = stiffness[row + 1, 1] = whole[row] * mixed
+        stiffness[row + 1, 0] = whole[row] * second
+
+
+@numba.njit(cache=True)
+def joint_resultants(result, gap, shear, law):  # type: ignore
+    """N, V, M of every joint from the gaps at its points."""
+    result[:] = 0.0
+    result[:, 1] = shear
+    for row in range(len(gap)):
+        carried = 0.0  # from the closed part alone, so that an open joint carries exactly nothing
+        if not law.facets:
+            carried = law.stiffness[row] * min(gap[row], 0.0)
+        elif gap[row] <= 0.0 or gap[row ^ 1] <= 0.0:
+            low, high = open_part(gap[row], gap[row ^ 1])
+            first, mixed, _ = integrals(high, 1.0) if low == 0.0 else integrals(0.0, low)
+            carried = law.stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
+        result[law.joint[row], 0] -= carried
+        result[law.joint[row], 2] -= carried * law.arm[row]

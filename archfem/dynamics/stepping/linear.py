@@ -1,0 +1,248 @@
+"""A step of a structure that is linear but for its joints, in whatever coordinates it is given.
+
+With w = u + β v the contact where the equation of a step is written, and C = α M + R,
+
+    (K + μ M + ν R) w = p + M y + R x + Gᵀ λ,    z = G w,    λ = J(z) z,
+
+K with all joints closed, y and x from the state before, λ the tension taken out of open joints. How
+w and λ are found is the strategy's: it overloads `solve` for the type of its system. All else is
+the same for all: images of the state under M, K, R and G follow it by Newmark's formulas without
+further products, and give resultants and energies.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.extending import overload
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.joint_law import Law, joint_resultants, law_of, pulls
+from archfem.dynamics.stepping.loop import begin, measure, settle
+from archfem.dynamics.stepping.newmark import Numbers, add_mixed, follow, mix
+from archfem.dynamics.stepping.sparse_rows import Rows, add_rows, rows_of, stored, times, trimmed
+
+Matrix = Rows | Array
+
+
+class Linear(NamedTuple):
+    """What the systems of linear strategies have in common, as their field `linear`.
+
+    Attributes:
+        mass: M.
+        closed: K, with all joints closed.
+        rest: R, what of C is not proportional to M; without entries where there is none.
+        opening: G (p, n).
+        shear: shear resultants of the joints (n_joints, n).
+        weight: forces of gravity (n,).
+        body: forces per unit ground acceleration (2, n).
+        numbers: of the time step.
+        law: of the joints.
+    """
+
+    mass: Matrix
+    closed: Matrix
+    rest: Matrix
+    opening: Matrix
+    shear: Matrix
+    weight: Array
+    body: Array
+    numbers: Numbers
+    law: Law
+
+
+class Kept(NamedTuple):
+    """What is carried from step to step; of the two ends of a step, each is the old one in turn.
+
+    Attributes:
+        images: of u, v and a under M, K and R (2, 3, 3, n).
+        gaps: openings at u, v and a, the tension taken out at u, and how much more is taken out
+            where the law sees the joints (2, 5, p).
+        gap: openings that the law sees (p,).
+        before: the same a step earlier (p,).
+        force: λ (p,).
+        contact: w (n,).
+        right: right side of a step (n,).
+    """
+
+    images: Array
+    gaps: Array
+    gap: Array
+    before: Array
+    force: Array
+    contact: Array
+    right: Array
+
+
+def reordered(equation: Equation, order: Array, dt: float) -> Linear:
+    """The matrices of an equation of motion by rows, its coordinates in another order."""
+    model, joints = equation.model, equation.joints
+    assert joints is not None
+    square = [model.mass, model.closed(), equation.rest]
+    mass, closed, rest = (rows_of(trimmed(matrix[order][:, order])) for matrix in square)
+    wide = [joints.opening, joints.shear_resultants()]
+    opening, shear = (rows_of(trimmed(matrix[:, order])) for matrix in wide)
+    body = np.ascontiguousarray(model.body[order].T)
+    weight, numbers, law = equation.weight[order], equation.numbers(dt), law_of(joints)
+    return Linear(mass, closed, rest, opening, shear, weight, body, numbers, law)
+
+
+def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:
+    """Solve a step: from its right side to the contact, in place; leaves the gaps there and λ.
+
+    To be overloaded for the type of a system. Gaps, those a step earlier and λ come as they were
+    at the start of the step.
+
+    Returns:
+        Passes over the joints; -1 if they do not settle.
+    """
+    raise NotImplementedError
+
+
+def is_linear(system: types.Type) -> bool:
+    """Whether this is the type of a system of a linear strategy."""
+    return isinstance(system, types.NamedTuple) and "linear" in system.fields
+
+
+@overload(begin)
+def _begin(system, state):  # type: ignore
+    if is_linear(system):
+        return lambda system, state: started(system.linear, state)
+
+
+@overload(settle)
+def _settle(system, kept, step, states, ground):  # type: ignore
+    if is_linear(system):
+        return lambda system, kept, step, states, ground: settled(
+            system, kept, step, states, ground
+        )
+
+
+@overload(measure)
+def _measure(system, kept, step, states, ground, resultants, energy):  # type: ignore
+    if is_linear(system):
+        return lambda system, kept, step, states, ground, resultants, energy: measured(
+            system.linear, kept, step, states, ground, resultants, energy
+        )
+
+
+@numba.njit(cache=True)
+def started(linear, state):  # type: ignore
+    """Images of a state under M, K and R, its gaps and what the joints do there."""
+    size, points = state.shape[1], len(linear.law.stiffness)
+    images, gaps = np.zeros((2, 3, 3, size)), np.zeros((2, 5, points))
+    gap, force = np.empty(points), np.empty(points)
+    for k in range(3):
+        times(linear.mass, state[k], images[0, 0, k])
+        times(linear.closed, state[k], images[0, 1, k])
+        if stored(linear.rest) > 0:
+            times(linear.rest, state[k], images[0, 2, k])
+        times(linear.opening, state[k], gaps[0, k])
+    mix(gap, gaps[0], (1.0, linear.numbers.lag, 0.0))
+    pulls(gap, linear.law, force)
+    _late(gaps[0], linear)
+    return Kept(images, gaps, gap, gap.copy(), force, np.empty(size), np.empty(size))
+
+
+@numba.njit(cache=True)
+def settled(system, kept, step, states, ground):  # type: ignore
+    """Take a step, and let the images follow."""
+    linear, right, contact = system.linear, kept.right, kept.contact
+    old, new = kept.images[step % 2], kept.images[(step + 1) % 2]
+    _load(right, ground, linear)
+    add_mixed(right, old[0], linear.numbers.pushed)
+    if stored(linear.rest) > 0:
+        add_mixed(right, old[2], linear.numbers.dragged)
+    contact[:] = right
+    passes = solve(system, contact, kept.gap, kept.before, kept.force)
+    if passes > 0:
+        add_rows(linear.opening, np.flatnonzero(kept.force), kept.force, right)
+        _follow(contact, right, (old, new), linear)
+        follow(contact, states[0], states[1], linear.numbers)
+    return passes
+
+
+@numba.njit(cache=True)
+def measured(linear, kept, step, states, ground, resultants, energy):  # type: ignore
+    """Resultants and energies at the end of a step."""
+    numbers, gap, contact = linear.numbers, kept.gap, kept.contact
+    turn, next_turn = step % 2, (step + 1) % 2
+    old, new = kept.gaps[turn], kept.gaps[next_turn]
+    follow(gap, old, new, numbers)
+    _late(new, linear)
+    if numbers.share != 1.0:
+        mix(gap, new, (1.0, numbers.lag, 0.0))
+        mix(contact, states[1], (1.0, numbers.lag, 0.0))
+        pulls(gap, linear.law, kept.force)
+    shear = np.empty(len(resultants))
+    times(linear.shear, contact, shear)
+    joint_resultants(resultants, gap, shear, linear.law)
+    _energies(states, (kept.images[turn], kept.images[next_turn]), linear, ground, energy)
+    _joint_energies(old, new, energy)
+
+
+@numba.njit(cache=True)
+def _load(result, ground, linear):  # type: ignore
+    """Forces of gravity and of the ground."""
+    weight, across, up = linear.weight, linear.body[0], linear.body[1]
+    x, y = ground[0], ground[1]
+    for k in range(len(result)):
+        result[k] = weight[k] - x * across[k] - y * up[k]
+
+
+@numba.njit(cache=True)
+def _follow(contact, right, images, linear):  # type: ignore
+    """Images of the state under M, K and R after a step; overwrites its right side."""
+    (old, new), numbers = images, linear.numbers
+    image = np.empty(len(contact))
+    times(linear.mass, contact, image)
+    follow(image, old[0], new[0], numbers)
+    for k in range(len(right)):
+        right[k] -= numbers.inertia * image[k]
+    if stored(linear.rest) > 0:
+        times(linear.rest, contact, image)
+        follow(image, old[2], new[2], numbers)
+        for k in range(len(right)):
+            right[k] -= numbers.rate * image[k]
+    follow(right, old[1], new[1], numbers)
+
+
+@numba.njit(cache=True)
+def _late(gaps, linear):  # type: ignore
+    """Tension taken out at the gaps as they are, and how much more where the law sees them."""
+    pulls(gaps[0], linear.law, gaps[3])
+    if linear.numbers.lag > 0.0:
+        seen, stays, late = np.empty(gaps.shape[1]), gaps[3], gaps[4]
+        mix(seen, gaps, (1.0, linear.numbers.lag, 0.0))
+        pulls(seen, linear.law, late)
+        for row in range(len(late)):
+            late[row] -= stays[row]
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc"})
+def _energies(states, images, linear, ground, energy):  # type: ignore
+    """Energies of a step as if all joints were closed and held tension."""
+    old, new = images
+    weight, across, up = linear.weight, linear.body[0], linear.body[1]
+    before, u, v = states[0, 0], states[1, 0], states[1, 1]
+    inertia, late, rate = (old[0, 1], new[0, 1]), (old[1, 1], new[1, 1]), (old[2, 1], new[2, 1])
+    elastic, drag, lag = new[1, 0], linear.numbers.drag, linear.numbers.lag
+    kinetic, potential, work, lost = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(u)):
+        moved = u[k] - before[k]
+        kinetic += 0.5 * v[k] * inertia[1][k]
+        potential += u[k] * (0.5 * elastic[k] - weight[k])
+        work -= moved * (ground[0] * across[k] + ground[1] * up[k])
+        damping = drag * (inertia[0][k] + inertia[1][k]) + lag * (late[0][k] + late[1][k])
+        lost += 0.5 * moved * (damping + rate[0][k] + rate[1][k])
+    energy[0], energy[1], energy[2], energy[3] = kinetic, potential, work, lost
+
+
+@numba.njit(cache=True)
+def _joint_energies(old, new, energy):  # type: ignore
+    """Take off what open joints do not store or damp."""
+    for row in range(old.shape[1]):
+        energy[1] -= 0.5 * new[0, row] * new[3, row]
+        energy[3] -= 0.5 * (new[0, row] - old[0, row]) * (old[4, row] + new[4, row])

@@ -1,0 +1,164 @@
+"""The strategy that works in modes: everything is linear but the joints.
+
+With all joints closed the structure is linear and, under Rayleigh damping on its mass and closed
+stiffness, falls into independent modes. In their coordinates η, all of which are kept, a step is
+
+    w = H (r + Bᵀ λ),    z = B H r + F λ,
+
+with H diagonal, B = G Φ the modes' openings at the joint points, F = B H Bᵀ their compliance over
+one step, and λ the tension taken out of open joints, so a step costs one product with B and a small
+dense problem in the open points alone. The idea is Wilson's fast nonlinear analysis
+(Three-dimensional static and dynamic analysis of structures, 2002, chapter 18), here without
+truncation: the history is that of the equilibrium solves, to rounding.
+"""
+
+from functools import cached_property
+from typing import ClassVar, NamedTuple, Self
+
+import numba
+import numpy as np
+from numba.extending import overload
+from scipy.linalg import eigh
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.joint_law import law_of
+from archfem.dynamics.stepping.linear import Linear, solve
+from archfem.dynamics.stepping.loop import ITERATIONS
+from archfem.dynamics.stepping.open_points import SETTLED, exact, expected, release
+from archfem.dynamics.stepping.sparse_rows import add_rows, times
+
+LARGEST = 1200
+"""Coordinates up to which all modes are computed and kept."""
+
+CUBE = 0.5e-9
+"""What the modes take to be found, for each coordinate cubed [s]."""
+
+
+class ModalSystem(NamedTuple):
+    """A structure in its modes.
+
+    Attributes:
+        linear: its matrices, diagonal or dense.
+        gain: H (n,).
+        compliance: F (p, p).
+    """
+
+    linear: Linear
+    gain: Array
+    compliance: Array
+
+
+class Modal:
+    """Steps in the modes of the closed structure.
+
+    Args:
+        equation: of motion.
+    """
+
+    name: ClassVar[str] = "contact"
+
+    def __init__(self, equation: Equation) -> None:
+        self._equation = equation
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """The strategy where the closed structure falls into modes, few enough to keep all."""
+        proportional = equation.damping is None or equation.damping.joints != "none"
+        few = equation.model.size <= LARGEST
+        return cls(equation) if equation.joints is not None and proportional and few else None
+
+    @property
+    def setup(self) -> float:
+        """Estimate of the time until the first step can be taken [s]."""
+        return CUBE * self._equation.model.size**3
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array]:
+        """ω² (n,) [1/s²] and shapes of unit modal mass (n, n)."""
+        model = self._equation.model
+        squares, shapes = eigh(model.closed().toarray(), model.mass.toarray())
+        return squares, shapes
+
+    @cached_property
+    def _back(self) -> Array:
+        """From displacements to modes, M Φ (n, n)."""
+        return np.asarray(self._equation.model.mass @ self._modes[1])
+
+    def enter(self, vectors: Array) -> Array:
+        """From displacements, velocities, … to modes (3, n)."""
+        return np.asarray(vectors @ self._back)
+
+    def leave(self, vectors: Array) -> Array:
+        """Back from modes (3, n)."""
+        return np.stack([self._modes[1] @ each for each in vectors])
+
+    def system(self, dt: float) -> ModalSystem:
+        """All that steps of this length need."""
+        equation, joints, (squares, shapes) = self._equation, self._equation.joints, self._modes
+        assert joints is not None
+        numbers, damping = equation.numbers(dt), equation.damping
+        rate = damping.stiffness if damping and damping.joints == "initial" else 0.0
+        opening = np.ascontiguousarray(joints.opening @ shapes)
+        linear = Linear(
+            np.ones_like(squares),
+            squares,
+            rate * squares if rate else np.empty(0),
+            opening,
+            np.ascontiguousarray(joints.shear_resultants() @ shapes),
+            shapes.T @ equation.weight,
+            np.ascontiguousarray((shapes.T @ equation.model.body).T),
+            numbers,
+            law_of(joints),
+        )
+        gain = 1.0 / (squares * (1.0 + numbers.rate * rate) + numbers.inertia)
+        compliance = (opening * gain) @ opening.T
+        return ModalSystem(linear, gain, np.ascontiguousarray(compliance))
+
+
+@overload(solve)
+def _solve(system, vector, gap, before, force):  # type: ignore
+    if getattr(system, "instance_class", None) is ModalSystem:
+        return lambda system, vector, gap, before, force: solved(system, vector, gap, before, force)
+
+
+@numba.njit(cache=True)
+def solved(system, vector, gap, before, force):  # type: ignore
+    """Solve a step: from its right side to the modes' contact, in place; leaves gaps and λ.
+
+    Returns:
+        Passes over the open points; -1 if they do not settle.
+    """
+    linear, law = system.linear, system.linear.law
+    near = expected(gap, before, force, law.facets)
+    enough = SETTLED * np.max(law.stiffness * np.abs(gap))
+    before[:] = gap
+    for k in range(len(vector)):
+        vector[k] *= system.gain[k]
+    start = np.empty(len(gap))
+    times(linear.opening, vector, start)
+    gap[:] = start
+    passes = 0
+    while passes < ITERATIONS:
+        passes += 1
+        rows = np.flatnonzero(near)
+        if len(rows) > 0:
+            taken = release(start, rows, system.compliance, law, force, enough)
+            if taken < 0:
+                return -1
+            passes += taken - 1
+            gap[:] = start
+            add_rows(system.compliance, rows, force, gap)
+        if exact(gap, force, near, law):
+            _give(vector, linear.opening, force, system.gain)
+            return passes
+    return -1
+
+
+@numba.njit(cache=True)
+def _give(vector, opening, force, gain):  # type: ignore
+    """Add what the tension taken out moves, H Bᵀ λ."""
+    for row in range(len(force)):
+        if force[row] != 0.0:
+            for k in range(len(vector)):
+                vector[k] += gain[k] * opening[row, k] * force[row]

@@ -1,0 +1,213 @@
+"""The small problem of a step: the tension to be taken out of the open joint points.
+
+With z the gaps at the points, z₀ those if all joints held tension, and F their compliance,
+
+    z = z₀ + F λ,    λ = J(z) z,
+
+J block-diagonal, zero where a joint is closed and positive semi-definite elsewhere: J = R Rᵀ. In
+μ = Rᵀ z
+
+    (1 - Rᵀ F R) μ = Rᵀ z₀,    λ = R μ,
+
+which is symmetric and, as the open structure has at least mass, positive definite. Its eigenvalues
+lie between 0 and 1, few of them near 0, so conjugate gradients take a few products; they start
+from the gaps of the last pass, and those of the first pass from the λ of the last step.
+"""
+
+import numba
+import numpy as np
+
+from archfem.dynamics.stepping.joint_law import Law, integrals, open_part, pull, pulls
+from archfem.dynamics.stepping.loop import ITERATIONS
+
+SETTLED = 1e-12
+"""Error of a contact force, relative to the largest of all joints as if closed, that ends the
+passes."""
+
+EXACT = 1e-11
+"""The same that is left to rounding once the gaps of the whole structure are known."""
+
+AHEAD = 2.0
+"""Steps ahead for which it is foreseen which points may open."""
+
+FEW = 24
+"""Points up to which the problem is solved directly."""
+
+ROUGH = 1e-3
+"""What the first pass leaves of its residual; later ones leave the less the better they converge,
+as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
+
+
+@numba.njit(cache=True)
+def release(start, rows, compliance, law, force, enough):  # type: ignore
+    """Find λ where it may differ from zero; return the number of passes, -1 if it does not settle.
+
+    Args:
+        start: z₀ (p,), of which the rows are used.
+        rows: points that may open, in order; of a facet both ends.
+        compliance: F (p, p), of which these rows and columns are used.
+        law: `Law`.
+        force: λ, as a first guess (p,); changed at the rows.
+        enough: error of λ that is left [N].
+    """
+    law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
+    matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
+    root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
+    gap, left, last = free + matrix @ own, ROUGH, 0.0
+    for passes in range(1, ITERATIONS + 1):
+        _roots(gap, law, root)
+        if len(rows) <= FEW:
+            gap = _direct(free, matrix, (root, law.facets), own)
+        else:
+            gap = _solve(free, matrix, (root, law.facets), own, (left, 0.1 * enough))
+        pulls(gap, law, wanted)
+        off = np.max(np.abs(wanted - own))
+        if off <= enough:
+            for i in range(len(rows)):
+                force[rows[i]] = own[i]
+            return passes
+        left = min(ROUGH, (off / last) ** 2) if last > 0.0 else ROUGH
+        last = off
+    return -1
+
+
+@numba.njit(cache=True)
+def exact(gap, force, near, law):  # type: ignore
+    """Whether the gaps ask for the λ they were found with; points that open count as near."""
+    largest, off = 0.0, 0.0
+    for row in range(len(gap)):
+        other = gap[row ^ 1] if law.facets else 0.0
+        wanted = pull(gap[row], other, law.stiffness[row], law.facets)
+        largest = max(largest, law.stiffness[row] * abs(gap[row]))
+        off = max(off, abs(wanted - force[row]))
+        if wanted > 0.0:
+            near[row] = True
+            if law.facets:
+                near[row ^ 1] = True
+    return off <= EXACT * largest
+
+
+@numba.njit(cache=True)
+def expected(gap, before, force, facets):  # type: ignore
+    """Points that are open, or will be soon if they go on as they did (p,)."""
+    near = np.empty(len(gap), dtype=np.bool_)
+    for row in range(len(gap)):
+        near[row] = force[row] != 0.0 or gap[row] + AHEAD * (gap[row] - before[row]) > 0.0
+    if facets:
+        for row in range(0, len(gap), 2):
+            near[row] = near[row + 1] = near[row] or near[row + 1]
+    return near
+
+
+@numba.njit(cache=True)
+def chosen(vector, rows):  # type: ignore
+    """Entries of a vector."""
+    result = np.empty(len(rows))
+    for i in range(len(rows)):
+        result[i] = vector[rows[i]]
+    return result
+
+
+@numba.njit(cache=True)
+def _square(matrix, rows):  # type: ignore
+    """Rows and columns of a matrix."""
+    result = np.empty((len(rows), len(rows)))
+    for i in range(len(rows)):
+        line = matrix[rows[i]]
+        for j in range(len(rows)):
+            result[i, j] = line[rows[j]]
+    return result
+
+
+@numba.njit(cache=True)
+def _roots(gap, law, root):  # type: ignore
+    """R: the diagonal entry of each row and, for the first end of a facet, the one below it."""
+    root[:] = 0.0
+    for i in range(0, len(gap), 2 if law.facets else 1):
+        scale = np.sqrt(law.stiffness[i])
+        if not law.facets:
+            root[i, 0] = scale if gap[i] > 0.0 else 0.0
+        elif gap[i] > 0.0 or gap[i + 1] > 0.0:
+            low, high = open_part(gap[i], gap[i + 1])
+            first, mixed, second = integrals(low, high)
+            corner = np.sqrt(max(first, 1e-300))
+            root[i, 0] = scale * corner
+            root[i, 1] = scale * mixed / corner
+            root[i + 1, 0] = scale * np.sqrt(max(second - (mixed / corner) ** 2, 0.0))
+
+
+@numba.njit(cache=True)
+def _times_root(roots, vector):  # type: ignore
+    """R times a vector."""
+    root, facets = roots
+    result = root[:, 0] * vector
+    if facets:
+        for i in range(1, len(vector), 2):
+            result[i] += root[i - 1, 1] * vector[i - 1]
+    return result
+
+
+@numba.njit(cache=True)
+def _times_transposed(roots, vector):  # type: ignore
+    """Rᵀ times a vector."""
+    root, facets = roots
+    result = root[:, 0] * vector
+    if facets:
+        for i in range(0, len(vector), 2):
+            result[i] += root[i, 1] * vector[i + 1]
+    return result
+
+
+@numba.njit(cache=True)
+def _solve(free, matrix, roots, force, until):  # type: ignore
+    """Solve for μ with R given by conjugate gradients, from the last λ; the gaps, and λ in place.
+
+    Ends when the residual is a fraction of the first, or an error of λ small enough.
+    """
+    solution = _times_transposed(roots, free + matrix @ force)
+    image = _times_root(roots, solution)
+    rest = _times_transposed(roots, free + matrix @ image) - solution
+    direction, square = rest.copy(), rest @ rest
+    stiffest = max(np.max(np.abs(roots[0])) ** 2, 1e-300)
+    end = max(until[0] ** 2 * square, until[1] ** 2 / stiffest)
+    for _ in range(4 * len(free)):
+        if square <= end:
+            break
+        image = direction - _times_transposed(roots, matrix @ _times_root(roots, direction))
+        length = square / (direction @ image)
+        solution += length * direction
+        rest -= length * image
+        new = rest @ rest
+        direction = rest + (new / square) * direction
+        square = new
+    image = _times_root(roots, solution)
+    for i in range(len(force)):
+        force[i] = image[i]
+    return free + matrix @ force
+
+
+@numba.njit(cache=True)
+def _direct(free, matrix, roots, force):  # type: ignore
+    """Solve for μ with R given by Cholesky's factor; the gaps, and λ in place."""
+    size = len(free)
+    spread, across = np.empty((size, size)), np.empty((size, size))
+    for i in range(size):
+        spread[i] = _times_transposed(roots, matrix[i])  # F R
+    for j in range(size):
+        across[j] = _times_transposed(roots, spread[:, j])  # Rᵀ F R
+    solution = _times_transposed(roots, free)
+    for i in range(size):
+        for j in range(i + 1):
+            total = -across[j, i]
+            for k in range(j):
+                total -= across[i, k] * across[j, k]
+            across[i, j] = total / across[j, j] if j < i else np.sqrt(1.0 + total)
+        for k in range(i):
+            solution[i] -= across[i, k] * solution[k]
+        solution[i] /= across[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            solution[i] -= across[k, i] * solution[k]
+        solution[i] /= across[i, i]
+    force[:] = _times_root(roots, solution)
+    return free + matrix @ force

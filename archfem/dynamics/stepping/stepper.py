@@ -1,0 +1,112 @@
+"""The stepper: many steps at a time by a strategy, and SNES for the one that does not settle."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping import loop
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.exact import Exact
+from archfem.dynamics.stepping.strategy import Strategy
+from archfem.dynamics.steps import Batch, State
+
+BATCH = 128
+"""Steps between two looks at events, Ctrl-C and the progress bar."""
+
+
+class Stepper:
+    """Steps an equation of motion by a strategy, and by SNES what that gives up.
+
+    Args:
+        equation: of motion.
+        strategy: takes the steps; without one SNES takes them all.
+        exact: takes those that the strategy gives up; by default `Exact` of the equation.
+        advance: the loop over steps that a strategy settles.
+    """
+
+    def __init__(
+        self,
+        equation: Equation,
+        strategy: Strategy | None = None,
+        *,
+        exact: Exact | None = None,
+        advance: Callable[..., int] = loop.advance,
+    ) -> None:
+        self.equation = equation
+        self.strategy = strategy
+        self.exact = exact or Exact(equation)
+        self._advance = advance
+        self._systems: dict[float, Any] = {}
+
+    @property
+    def name(self) -> str:
+        """The method, as users give it."""
+        return self.strategy.name if self.strategy else "snes"
+
+    def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
+        """Yield the steps to the end, many at a time.
+
+        Args:
+            start: state from which to go.
+            dt: time step [s].
+            end: time of the last step [s].
+
+        Raises:
+            DidNotConverge: SNES failed as well; `last` is the state before.
+        """
+        if self.strategy is None:
+            yield from self.exact.batches(start, dt, end)
+            return
+        total = round((end - start.time) / dt)
+        state, done = start, 0
+        while done < total:
+            times = start.time + dt * np.arange(done + 1, min(done + BATCH, total) + 1)
+            batch = self.taken(state, dt, times)
+            if len(batch.times):
+                yield batch
+                done += len(batch.times)
+                state = batch.state(len(batch.times) - 1)
+            if len(batch.times) < len(times):
+                (fallback,) = self.exact.batches(state, dt, state.time + dt)
+                passes = fallback.iterations + loop.ITERATIONS  # those in vain count too
+                yield replace(fallback, iterations=passes, fallback=True)
+                done += 1
+                state = fallback.state(0)
+
+    def taken(self, state: State, dt: float, times: Array) -> Batch:
+        """Take steps by the strategy up to these times, or up to one that does not settle.
+
+        Args:
+            state: from which to go.
+            dt: time step [s].
+            times: ends of the steps (steps,) [s].
+        """
+        strategy = self.strategy
+        assert strategy is not None
+        series, results, ground, system = self.prepared(state, dt, times)
+        count = self._advance(series, results, ground, system)
+        resultants, passes, energy = (each[:count] for each in results)
+        return Batch(
+            times[:count],
+            resultants,
+            passes,
+            np.full(count, dt),
+            energy,
+            lambda k: State(float(times[k]), *strategy.leave(series[k + 1])),
+        )
+
+    def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
+        """What the loop takes to go from a state to these times: see `loop.advance`."""
+        assert self.strategy is not None
+        steps, joints = len(times), len(self.equation.model.structure.joints)
+        first = self.strategy.enter(np.stack([state.q, state.velocity, state.acceleration]))
+        series = np.empty((steps + 1, *first.shape))
+        series[0] = first
+        passes = np.zeros(steps, dtype=np.int64)
+        results = (np.empty((steps, joints, 3)), passes, np.empty((steps, 4)))
+        if dt not in self._systems:
+            self._systems = {dt: self.strategy.system(dt)}
+        return series, results, self.equation.ground(times, dt), self._systems[dt]

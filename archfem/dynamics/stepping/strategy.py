@@ -1,0 +1,64 @@
+"""What a strategy of time stepping has to provide, and what most of them have in common."""
+
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.equation import Equation
+
+
+class Strategy(Protocol):
+    """A way to take steps in the compiled loop; what it gives is the history of `exact`.
+
+    A further one provides this class, and for the type of its systems overloads (by
+    `numba.extending.overload`) of the three functions that the loop calls: `begin` says what is
+    carried from step to step, `settle` finds the state after a step, `measure` its resultants and
+    energies. Nothing is presupposed of them: gaps need not be linear in the coordinates, and
+    joints may have memory, in an array of the system that `settle` writes, or as further rows of
+    the states if runs are to go on from it. Where all is linear but the joints, overload
+    `linear.solve` alone and give the system a field `linear`.
+
+    Attributes:
+        name: as users give it.
+    """
+
+    name: ClassVar[str]
+
+    @property
+    def setup(self) -> float:
+        """Estimate of the time until the first step can be taken [s]."""
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """The strategy for an equation of motion, or None where it does not apply."""
+
+    def enter(self, vectors: Array) -> Array:
+        """From q, velocity and acceleration (3, n) to the rows of a state in its own terms."""
+
+    def leave(self, vectors: Array) -> Array:
+        """Back from those to q, velocity and acceleration (3, n)."""
+
+    def system(self, dt: float) -> NamedTuple:
+        """All that steps of this length need, for the compiled loop."""
+
+
+class Reordered:
+    """Coordinates in an order that suits the factor of a strategy.
+
+    Args:
+        order: numbers of the coordinates, the first one first (n,).
+    """
+
+    def __init__(self, order: NDArray[Any]) -> None:
+        self.order = order
+        self._place = np.argsort(order)
+
+    def enter(self, vectors: Array) -> Array:
+        """From coordinates to those in order (3, n)."""
+        return vectors[:, self.order]
+
+    def leave(self, vectors: Array) -> Array:
+        """Back from those (3, n)."""
+        return vectors[:, self._place]

@@ -1,0 +1,211 @@
+"""A whole time history: from dead load to the end of the motion, recorded as asked."""
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from archfem.arguments import instance, real, whole
+from archfem.dynamics.events import Until, Watch, agreed, begun
+from archfem.dynamics.guard import Guard
+from archfem.dynamics.history import Ending, History
+from archfem.dynamics.recorder import Recorder
+from archfem.dynamics.schemes import HHT, Newmark, Rayleigh, Scheme
+from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.steps import Batch, State
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.models.model import Model, check_model
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.newton import Newton
+
+logger = logging.getLogger("archfem")
+
+STEP = 0.005
+"""Time step where none is given [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """What of a run is kept.
+
+    Attributes:
+        every: keep the joints' resultants at every n-th step.
+        fields_every: keep the coordinates q at every n-th step, for pictures of the whole
+            structure and for stress; None keeps none.
+    """
+
+    every: int = 1
+    fields_every: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse steps below one."""
+        for key in ("every", "fields_every"):
+            value = getattr(self, key)
+            if key == "every" or value is not None:
+                whole(value, f"record {key}")
+
+
+_KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
+    "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
+    "damping": ((Rayleigh,), "damping", "give Rayleigh(0.05, (8.0, 16.0)), or None"),
+    "scheme": ((Newmark, HHT), "scheme", "give Newmark() or HHT()"),
+    "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
+    "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
+    "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
+}
+"""Classes of arguments, what to call them, and what to give."""
+
+
+def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
+    model: Model,
+    motion: Motion,
+    *,
+    dt: float | None = None,
+    start: Equilibrium | State | None = None,
+    damping: Rayleigh | None = None,
+    scheme: Scheme | None = None,
+    record: Record | None = None,
+    until: Until | None = None,
+    criteria: Criteria | None = None,
+    newton: Newton | None = None,
+    method: str | Stepper = "auto",
+) -> History:
+    """Shake a structure and record what its joints do.
+
+    Horizontal and vertical ground acceleration act together, on top of the dead load, from time
+    zero to the end of the motion. Displacements are small and relative to the ground. On a
+    terminal a bar shows progress; Ctrl-C ends the run and keeps what was computed.
+
+    Args:
+        model: any rung of the ladder.
+        motion: of the ground.
+        dt: time step [s], by default 0.005, or that for which the model was chosen; ground
+            accelerations between samples are interpolated.
+        start: the dead load, found first where it is not given, or the `last_state` of an
+            earlier run, which is then continued.
+        damping: None is undamped.
+        scheme: `Newmark` (average acceleration, the default) or `HHT`.
+        record: what is kept; by default the resultants of every step.
+        until: event that ends the run, or a function of the structure and N, V, M of its joints
+            (n_joints, 3) [N, N, N m] that gives words to end it; by default only the end of the
+            motion does.
+        criteria: what makes a joint fail, and how many failed joints make a mechanism; the history
+            carries them. By default those of the event, or else the usual ones.
+        newton: settings of the solves.
+        method: "snes" solves each step through PETSc. Three compiled methods give the same history
+            many times faster: "contact" works in the modes of the closed structure, "chain" on
+            banded matrices, and "compliance", for large structures, with one sparse factor and
+            the open joint points alone. "auto" takes the fastest that applies. A `Stepper` is
+            taken as it is, with its own damping, scheme and solves.
+
+    Returns:
+        The history; its `ended` and, in words, its `outcome` say how the run ended.
+
+    Raises:
+        InvalidInput: an argument cannot be meant, or run and event have different criteria.
+        DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
+    """
+    check_model(model)
+    instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    _check_kinds(start=start, damping=damping, scheme=scheme, record=record)
+    _check_kinds(criteria=criteria, newton=newton)
+    dt = _step(model, dt)
+    criteria = agreed(criteria, until)
+    watch = None if until is None else begun(until, model.structure, criteria)
+    equation = Equation(model, motion, damping, scheme or Newmark())
+    if not isinstance(start, State):
+        start = equation.at_rest((start or dead_load(model, newton)).q)
+    stepper = stepper_for(method, equation, start, dt, newton)
+    first = _first(stepper, start, dt)
+    recorder = _recorder(stepper, first, dt, record or Record(), criteria)
+    taken, state = 0, start
+    ended, outcome = Ending.FINISHED, "reached the end of the motion"
+    try:
+        recorder.add(0, first)
+        # Steps are too small for threads, which only get in each other's way.
+        with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
+            for batch in stepper.batches(start, dt, motion.duration):
+                reason, size = _reason(watch, batch)
+                batch = batch.cut(size)
+                state = batch.state(size - 1)
+                recorder.add(taken + 1, batch, last=reason is not None)
+                taken += size
+                bar.update(size)
+                if reason is not None:
+                    ended, outcome = Ending.EVENT, f"ended at {state.time:.4g} s by {reason}"
+                    break
+    except KeyboardInterrupt:
+        ended, outcome = Ending.INTERRUPTED, f"interrupted at {state.time:.4g} s"
+        logger.warning("%s: what was computed is kept", outcome)
+    except DidNotConverge as error:
+        words = f"failed at {state.time:.4g} s: {error}"
+        error.history = recorder.history(motion, state, Ending.FAILED, words)
+        raise
+    return recorder.history(motion, state, ended, outcome)
+
+
+def _step(model: Model, dt: float | None) -> float:
+    """The time step that was asked for, or that for which the model was chosen [s]."""
+    if dt is None:
+        return model.prediction.dt if model.prediction else STEP
+    if not 0.0 < real(dt, "dt [s]") <= 0.1:
+        raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
+    return dt
+
+
+def _check_kinds(**given: Any) -> None:
+    """Refuse arguments of the wrong class; None leaves each to its default."""
+    for name, value in given.items():
+        if value is not None:
+            instance(value, *_KINDS[name])
+
+
+def _first(stepper: Stepper, start: State, dt: float) -> Batch:
+    """The start, as a batch of one."""
+    equation = stepper.equation
+    return Batch(
+        np.array([start.time]),
+        equation.model.resultants(equation.contact(start))[None],
+        np.zeros(1, dtype=np.int64),
+        np.array([dt]),
+        equation.energy(start)[None],
+        lambda _: start,
+    )
+
+
+def _recorder(
+    stepper: Stepper, first: Batch, dt: float, record: Record, criteria: Criteria
+) -> Recorder:
+    """An empty recorder with a guard over it."""
+    model, kept = stepper.equation.model, (record.every, record.fields_every)
+    return Recorder(model, stepper.name, dt, *kept, criteria, Guard(model, first))
+
+
+def _bar(start: State, motion: Motion, dt: float) -> tqdm:
+    steps = max(0, round((motion.duration - start.time) / dt))
+    return tqdm(total=steps, unit="step", disable=None, leave=False)
+
+
+def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:
+    """Why the run ends within a batch, if it does, and after how many of its steps."""
+    if watch is not None:
+        for k, resultants in enumerate(batch.resultants):
+            if reason := watch(resultants):
+                return reason, k + 1
+    return None, len(batch.times)
+
+
+def last_state(history: History) -> State:
+    """The state in which a run ended, from which another can go on."""
+    dataset = history.dataset
+    return State(
+        float(dataset.attrs["last_time"]),
+        *(dataset[f"last_{name}"].values for name in ("q", "velocity", "acceleration")),
+    )

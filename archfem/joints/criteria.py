@@ -1,0 +1,216 @@
+"""When a joint has failed: hinging, sliding, opening; and by which criteria."""
+
+from collections.abc import Hashable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from archfem.arguments import instance, real, whole
+from archfem.errors import InvalidInput
+from archfem.masonry.roles import judged_parts
+
+HINGE = 0.46
+"""|e| from which a joint counts as hinged, 8 % short of its edge: Demirel and Aldemir (2021)."""
+
+FAILURES = 4
+"""Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
+
+USED_UP = 1e-6
+"""Friction left, relative to its limit, below which it is used up: round-off decides nothing there.
+Well above that of programmes and equilibria (1e-9), well below what friction is known to."""
+
+PREFIX = "criteria_"
+"""Of the attributes of a dataset that tell by which criteria its joints were judged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criteria:
+    """What makes a joint fail, and how many failed joints make a mechanism.
+
+    Criteria judge what was computed and change no force: a joint of a model slides, or does not,
+    by its own law. A run carries its criteria, and all that is said of it obeys them.
+
+    Attributes:
+        hinge: |e| from which a joint counts as hinged, up to 0.5, its edge [-].
+        failures: joints of rings and piers that, failed at once, count as a mechanism.
+        friction: |V| / N from which every joint counts as sliding [-]; None takes the coefficient
+            of friction of each joint's own contact.
+    """
+
+    hinge: float = HINGE
+    failures: int = FAILURES
+    friction: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse limits that no joint, or every joint, would pass."""
+        if not 0.0 < real(self.hinge, "criteria hinge [-]") <= 0.5:
+            raise InvalidInput(
+                f"criteria hinge = {self.hinge!r}: |e| of a hinge is above 0 and at most 0.5, the "
+                f"edge of the joint; {HINGE} is usual"
+            )
+        whole(self.failures, "criteria failures")
+        if self.friction is not None:
+            real(self.friction, "criteria friction [-]", least=0.0)
+
+    @classmethod
+    def of(cls, joints: xr.Dataset) -> "Criteria":
+        """Criteria by which joints were judged; the usual ones where they do not tell."""
+        kinds = {"hinge": float, "failures": int, "friction": float}
+        told = {key: joints.attrs.get(PREFIX + key) for key in kinds}
+        return cls(**{key: kinds[key](value) for key, value in told.items() if value is not None})
+
+    @property
+    def attributes(self) -> dict[str, float | int]:
+        """The criteria as attributes of a dataset; without friction where it is the joints' own."""
+        return {PREFIX + key: value for key, value in asdict(self).items() if value is not None}
+
+    def coefficients(self, own: Any) -> Any:
+        """Coefficients of friction by which joints are judged, given the joints' own [-]."""
+        return own if self.friction is None else np.full_like(own, self.friction)
+
+
+def chosen(criteria: Criteria | None, **single: Any) -> Criteria | None:
+    """Criteria that were given as a whole, or by single values beside the usual others.
+
+    Args:
+        criteria: or None.
+        single: fields of `Criteria`; None where it was not given.
+
+    Raises:
+        InvalidInput: both were given.
+    """
+    if criteria is not None:
+        instance(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
+    given = {key: value for key, value in single.items() if value is not None}
+    if given and criteria is not None:
+        raise InvalidInput(f"give {given} in criteria=Criteria(…), or without criteria; not both")
+    return Criteria(**given) if given else criteria
+
+
+def failing(
+    eccentricity: NDArray[np.float64],
+    friction: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    hinge: float,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which joints hinge, and which slide; an open joint, whose e is undefined, does neither.
+
+    Args:
+        eccentricity: M / (N h) (…, n_joints) [-].
+        friction: mobilised, |V| / N (…, n_joints) [-].
+        coefficients: of friction (n_joints,) [-].
+        hinge: |e| from which a joint hinges [-].
+    """
+    return np.abs(eccentricity) >= hinge, friction >= (1.0 - USED_UP) * coefficients
+
+
+def flags(
+    dims: tuple[Hashable, ...],
+    normal: NDArray[np.float64],
+    ratios: tuple[NDArray[np.float64], NDArray[np.float64]],
+    coefficients: NDArray[np.float64],
+    hinge: float,
+) -> dict[str, tuple[Any, ...]]:
+    """Flags of failure, as variables of a dataset.
+
+    `hinge` is the face on which a joint hinges (1 extrados, -1 intrados, where it stays closed; 0
+    none), `slide` says whether its mobilised friction has reached its coefficient, and `open`
+    whether it has come apart over its whole depth.
+
+    Args:
+        dims: names of the dimensions, the last that of the joints.
+        normal: N (…, n_joints) [N].
+        ratios: eccentricity and mobilised friction (…, n_joints) [-].
+        coefficients: of friction (n_joints,) [-].
+        hinge: |e| from which a joint hinges [-].
+    """
+    hinges, slides = failing(*ratios, coefficients, hinge)
+    side = np.where(hinges, np.sign(ratios[0]), 0.0).astype(np.int8)
+    return {
+        "hinge": (dims, side, {"long_name": "face on which it hinges, 1 extrados, -1 intrados"}),
+        "slide": (dims, slides, {"long_name": "whether its friction is used up"}),
+        "open": (dims, normal <= 0.0, {"long_name": "whether it has come apart"}),
+    }
+
+
+def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
+    """Joints with the flags of some criteria, which the dataset then carries as attributes.
+
+    Args:
+        joints: N, eccentricity and friction, as made by `joint_dataset`.
+        criteria: by default those by which the joints were judged already, or the usual ones.
+    """
+    if criteria is None and "hinge" in joints:
+        return joints
+    criteria = chosen(criteria) or Criteria.of(joints)
+    normal, e, friction = (
+        joints[name].transpose(..., "joint", missing_dims="ignore")
+        for name in ("N", "eccentricity", "friction")
+    )
+    coefficients = criteria.coefficients(joints["friction_limit"].values)
+    ratios = e.values, friction.values
+    result = joints.assign(flags(e.dims, normal.values, ratios, coefficients, criteria.hinge))
+    counts = np.isin(joints["part"].values.astype(str), judged_parts(roles_of(joints)))
+    result.coords["judged"] = (joints["part"].dims, counts)
+    others = {key: value for key, value in joints.attrs.items() if not key.startswith(PREFIX)}
+    result.attrs = others | criteria.attributes
+    return result
+
+
+def failed(joints: xr.Dataset) -> xr.DataArray:
+    """Whether each joint hinges, slides or has come apart, by the flags that it carries."""
+    return ((joints["hinge"] != 0) | joints["slide"] | joints["open"]).rename("failed")
+
+
+def first_time(flags: xr.DataArray) -> xr.DataArray:
+    """First time at which each joint is flagged [s]; NaN where it never is.
+
+    Args:
+        flags: true or false over time and joint.
+    """
+    found = flags["time"].values[flags.argmax("time").values]
+    return xr.where(flags.any("time"), found, np.nan).rename("first_time")
+
+
+def longest_duration(flags: xr.DataArray) -> xr.DataArray:
+    """Longest unbroken time for which each joint is flagged [s].
+
+    A flag raised at a single instant lasts for one time step.
+    """
+    time = flags["time"].values
+    step = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(1)
+    up = flags.transpose("time", ...).values
+    elapsed = np.cumsum(np.where(up, step[:, None], 0.0), axis=0)
+    before = np.maximum.accumulate(np.where(up, 0.0, elapsed), axis=0)
+    return xr.DataArray((elapsed - before).max(axis=0), {"joint": flags["joint"]}, ("joint",))
+
+
+def envelope(joints: xr.Dataset) -> xr.Dataset:
+    """Least and largest eccentricity, and largest friction, of each joint over a run."""
+    return xr.Dataset(
+        {
+            "lowest": joints["eccentricity"].min("time"),
+            "highest": joints["eccentricity"].max("time"),
+            "friction": joints["friction"].max("time"),
+        }
+    )
+
+
+def roles_of(joints: xr.Dataset) -> dict[str, str]:
+    """Role of each part, by its name, in the order of the joints.
+
+    Args:
+        joints: as made by `joint_dataset`, with `part` and `role`.
+    """
+    parts, roles = (
+        np.atleast_1d(joints[key].values).astype(str).tolist() for key in ("part", "role")
+    )
+    return dict(zip(parts, roles, strict=True))
+
+
+def judged(joints: xr.Dataset) -> xr.Dataset:
+    """Those joints that are judged, by the flag that they carry; they keep their numbers."""
+    return joints.isel(joint=joints["judged"].values)

@@ -1,0 +1,18 @@
+"""Rigid blocks without stiffness: collapse factor, least thickness, mechanisms.
+
+    blocks     rigid blocks in equilibrium
+    programme  the linear programme and its limits
+    collapse   the load that makes a mechanism; whether a structure stands
+    sliding    sliding without dilatancy
+    thickness  the least thickness that stands
+    skeleton   the blocks that move as rigid bodies when joints fail
+    screen     a quick look at whether they can move at all
+    counted    mechanisms by counting failed joints
+    verified   mechanisms by a motion that the failed joints permit
+
+It imports from `masonry`, `joints` and the ground. Start reading at `collapse`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

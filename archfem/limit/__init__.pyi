@@ -1,0 +1,9 @@
+from .collapse import Collapse as Collapse
+from .collapse import collapse_factor as collapse_factor
+from .collapse import stands as stands
+from .counted import Mechanism as Mechanism
+from .counted import counted_mechanism as counted_mechanism
+from .counted import counted_mechanisms as counted_mechanisms
+from .thickness import minimum_thickness as minimum_thickness
+from .verified import VerifiedMechanism as VerifiedMechanism
+from .verified import verified_mechanism as verified_mechanism

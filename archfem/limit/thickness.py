@@ -1,0 +1,79 @@
+"""The least thickness at which a family of structures stands."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from archfem.errors import InvalidInput, InvalidStructure
+from archfem.limit.collapse import stands
+from archfem.masonry.structure import Structure
+
+THINNEST = 1e-4
+"""Thickness at which the search for one that stands begins, relative to the structure's size."""
+
+
+def minimum_thickness(
+    build: Callable[[float], Structure],
+    *,
+    friction: str | None = "coulomb",
+    strength: float | None = None,
+    tolerance: float = 1e-6,
+) -> float:
+    """Find the least thickness at which a family of structures stands, by bisection [m].
+
+    The search doubles a very small thickness until one stands, and then halves the bracket.
+
+    Args:
+        build: makes the structure of a given thickness [m].
+        friction: as for `collapse_factor`.
+        strength: as for `collapse_factor` [Pa].
+        tolerance: relative width of the last bracket; its standing end is returned.
+
+    Raises:
+        InvalidInput: no thickness makes it stand, or every one does.
+
+    References:
+        Milankovitch, Z. Math. Phys. 55 (1907) 1-27. Heyman, Int. J. Mech. Sci. 11 (1969) 363-372.
+    """
+    if not 1e-9 <= tolerance < 1.0:
+        raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")
+
+    def holds(thickness: float) -> bool:
+        return stands(build(thickness), friction=friction, strength=strength)
+
+    low, high = _bracket(build, holds)
+    while high - low > tolerance * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def _bracket(
+    build: Callable[[float], Structure], holds: Callable[[float], bool]
+) -> tuple[float, float]:
+    """A thickness at which a family does not stand, and twice that, at which it does [m]."""
+    thin = THINNEST * _size(build)
+    if holds(thin):
+        raise InvalidInput(
+            f"it stands at any thickness, even {thin:.3g} m: there is no least one to look for"
+        )
+    while True:
+        try:
+            thick = holds(2.0 * thin)
+        except InvalidStructure as error:
+            raise InvalidInput(
+                f"no thickness makes it stand: {thin:.4g} m does not, and {error}"
+            ) from error
+        if thick:
+            return thin, 2.0 * thin
+        thin *= 2.0
+
+
+def _size(build: Callable[[float], Structure]) -> float:
+    """Size of the first member of a family that can be built, from the thickest down [m]."""
+    for thickness in 10.0 ** np.arange(2, -7, -1):
+        try:
+            return build(float(thickness)).size
+        except InvalidStructure as error:
+            refusal = error
+    raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")

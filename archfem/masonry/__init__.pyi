@@ -1,0 +1,14 @@
+from . import shapes as shapes
+from .actions import BodyForce as BodyForce
+from .actions import PointLoad as PointLoad
+from .actions import Settlement as Settlement
+from .assembly import assembled as assembled
+from .materials import BACKFILL as BACKFILL
+from .materials import SOIL_TO_STONE as SOIL_TO_STONE
+from .materials import STONE as STONE
+from .materials import STONE_TO_STONE as STONE_TO_STONE
+from .materials import Contact as Contact
+from .materials import Material as Material
+from .structure import Block as Block
+from .structure import Joint as Joint
+from .structure import Structure as Structure

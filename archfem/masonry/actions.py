@@ -1,0 +1,141 @@
+"""What acts on a structure besides its own weight."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from archfem.arguments import real, reals, whole
+from archfem.arrays import Array
+from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """A force on every block in proportion to its weight.
+
+    Attributes:
+        horizontal: multiple of g, positive along x [-].
+        vertical: multiple of g, positive upward [-]; self-weight is -1.
+    """
+
+    horizontal: float
+    vertical: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what are no multiples of g."""
+        real(self.horizontal, "body force, horizontal [g]")
+        real(self.vertical, "body force, vertical [g]")
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force on the extrados, where a vertical through x leaves the structure.
+
+    Attributes:
+        x: where it stands [m].
+        force: its components for the whole width, up positive (2,) [N].
+    """
+
+    x: float
+    force: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no place or no force."""
+        real(self.x, "point load, x [m]")
+        object.__setattr__(self, "force", reals(self.force, "point load, force (x, y) [N]", 2))
+
+    def place(self, structure: Structure) -> tuple[int, Array]:
+        """Number of the loaded block and the loaded point (2,) [m].
+
+        Raises:
+            InvalidInput: no block that moves lies below or above x.
+        """
+        tops = {
+            number: top
+            for number in structure.free
+            if (top := _highest(structure.blocks[number].drawn(), self.x)) is not None
+        }
+        if not tops:
+            points = np.concatenate([structure.blocks[b].drawn() for b in structure.free])
+            low, high = points[:, 0].min(), points[:, 0].max()
+            raise InvalidInput(
+                f"a point load at x = {self.x:.4g} m misses the structure, which reaches from "
+                f"{low:.4g} to {high:.4g} m: move it there"
+            )
+        block = max(tops, key=lambda number: tops[number])
+        return block, np.array([self.x, tops[block]])
+
+
+@dataclass(frozen=True)
+class Settlement:
+    """A motion of a support.
+
+    Attributes:
+        block: number or name of a fixed block.
+        motion: of its centroid along x and y, and anticlockwise about it (3,) [m, m, rad].
+    """
+
+    block: int | str
+    motion: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion, or of no block."""
+        if not isinstance(self.block, str):
+            whole(self.block, "settlement, block", least=0)
+        motion = reals(self.motion, "settlement, motion (x, y, turn) [m, m, rad]", 3)
+        object.__setattr__(self, "motion", motion)
+
+    def place(self, structure: Structure) -> int:
+        """Number of the block that settles.
+
+        Raises:
+            InvalidInput: there is no such block, or it is not a support.
+        """
+        supports = {b.name: n for n, b in enumerate(structure.blocks) if b.fixed}
+        number = supports.get(self.block, self.block) if isinstance(self.block, str) else self.block
+        if number not in supports.values():
+            raise InvalidInput(
+                f"block {self.block!r} cannot settle: the supports are {supports}; name one of them"
+            )
+        return int(number)
+
+    def added(self, structure: Structure, supports: Array) -> Array:
+        """Motions of all blocks with this one on top (n_blocks, 3) [m, m, rad]."""
+        moved = supports.copy()
+        moved[self.place(structure)] += self.motion
+        return moved
+
+
+Action = BodyForce | PointLoad
+
+
+def loads(given: Action | Sequence[Action]) -> list[Action]:
+    """One action, or several that grow together, as a list.
+
+    Args:
+        given: a `BodyForce`, a `PointLoad`, or some of them.
+
+    Raises:
+        InvalidInput: something else is among them, or there is none.
+    """
+    several = given if isinstance(given, list | tuple) else [given]
+    if not several or not all(isinstance(each, BodyForce | PointLoad) for each in several):
+        raise InvalidInput(
+            f"load {given!r} is none: give BodyForce(horizontal), PointLoad(x, (0, -1)), or a list "
+            "of them; a Settlement comes alone"
+        )
+    return list(several)
+
+
+def _highest(outline: Array, x: float) -> float | None:
+    """Largest y at which a vertical line meets a closed outline, or None where it misses."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    step = end[:, 0] - start[:, 0]
+    met = (np.minimum(start[:, 0], end[:, 0]) <= x) & (x <= np.maximum(start[:, 0], end[:, 0]))
+    met &= np.abs(step) > 0.0
+    if not met.any():
+        return None
+    share = (x - start[met, 0]) / step[met]
+    return float(np.max(start[met, 1] + share * (end[met, 1] - start[met, 1])))

@@ -1,0 +1,319 @@
+"""What stands and what touches: blocks, the joints between them, and the structure they form."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem.arguments import real
+from archfem.arrays import Array
+from archfem.errors import InvalidStructure
+from archfem.masonry.geometry import area_of_polygon, area_of_sector, side_of_line
+from archfem.masonry.materials import Contact, Material
+from archfem.masonry.naming import number_of
+from archfem.masonry.roles import judged_parts, with_roles
+from archfem.units import G
+
+Point = tuple[float, float]
+
+TOUCHING = 1e-6
+"""Largest distance of two points that count as one, relative to the size of the structure."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A plane body bounded by straight edges, or a voussoir cut from a circular ring.
+
+    Attributes:
+        outline: vertices in anticlockwise order [m].
+        material: what it is made of.
+        name: how a person finds it.
+        fixed: an abutment or foundation, which does not move of itself.
+        corners: numbers of the four vertices between which a structured mesh is spanned, or None
+            for an unstructured one. Cells *along* lie on the first and third of the four sides so
+            made, cells *through the thickness* on the second and fourth.
+        part: the part of the structure it belongs to, e.g. "arch" or "north pier".
+        centre: where given, the first and third sides of the four-sided outline are arcs about
+            this point, and the other two are radial: an annular sector.
+        role: of its part: "ring" or "pier", which are judged, or "other", which follows what
+            carries it. Where nothing of a part tells it, the structure fills it in by the words of
+            the part's name, and warns where they leave it open; without a name a part is a ring.
+    """
+
+    outline: tuple[Point, ...]
+    material: Material
+    name: str
+    fixed: bool = False
+    corners: tuple[int, int, int, int] | None = None
+    part: str = ""
+    centre: Point | None = None
+    role: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse outlines that do not bound an area anticlockwise."""
+        if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
+            raise InvalidStructure(
+                f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"
+            )
+        if self.area <= 0.0:
+            raise InvalidStructure(
+                f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"
+            )
+
+    @cached_property
+    def points(self) -> Array:
+        """Vertices (n, 2) [m]."""
+        return np.array(self.outline, dtype=float)
+
+    def arc(self, side: int, pieces: int) -> Array:
+        """Points on side 0 or 2 of a sector, at equal angles (pieces + 1, 2) [m]."""
+        arm = self.points - np.array(self.centre)
+        start, end = arm[side], arm[side + 1]
+        turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
+        angles = turn * np.linspace(0.0, 1.0, pieces + 1)[:, None]
+        across = np.array([-start[1], start[0]])
+        return np.array(self.centre) + np.cos(angles) * start + np.sin(angles) * across
+
+    def drawn(self, pieces: int = 16) -> Array:
+        """Outline with each arc replaced by so many chords (n, 2) [m]."""
+        if self.centre is None:
+            return self.points
+        return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+
+    def side_of(self, line: Array, near: float) -> int:
+        """On which side of a line it lies: 1 left, -1 right, 0 where no straight edge covers it."""
+        return side_of_line(self.points, line, near, arcs=() if self.centre is None else (0, 2))
+
+    @cached_property
+    def _measures(self) -> tuple[float, Array, float]:
+        """Area, centroid, polar second moment of area about the centroid."""
+        if self.centre is None:
+            return area_of_polygon(self.points)
+        return area_of_sector(self.points, np.array(self.centre))
+
+    @property
+    def area(self) -> float:
+        """Area [m²]."""
+        return self._measures[0]
+
+    @property
+    def centroid(self) -> Array:
+        """Centre of gravity (2,) [m]."""
+        return self._measures[1]
+
+    @property
+    def polar_moment(self) -> float:
+        """Polar second moment of area about the centroid [m⁴]."""
+        return self._measures[2]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A straight dry joint between two blocks.
+
+    Attributes:
+        blocks: numbers of the two blocks it separates, in either order.
+        intrados: its end on the inner face [m].
+        extrados: its end on the outer face [m]; eccentricity is positive toward it.
+        contact: stiffness and friction.
+        name: how a person finds it.
+        part: the part of the structure it belongs to; mechanisms are counted by part.
+        role: of that part, as for a block.
+    """
+
+    blocks: tuple[int, int]
+    intrados: Point
+    extrados: Point
+    contact: Contact
+    name: str
+    part: str = ""
+    role: str = ""
+
+    @property
+    def lower(self) -> int:
+        """The block of lower number; the joint's normal points away from it."""
+        return min(self.blocks)
+
+    @property
+    def higher(self) -> int:
+        """The block of higher number."""
+        return max(self.blocks)
+
+    @cached_property
+    def ends(self) -> Array:
+        """Both ends, intrados first (2, 2) [m]."""
+        return np.array([self.intrados, self.extrados], dtype=float)
+
+    @cached_property
+    def middle(self) -> Array:
+        """Mid-point, from which eccentricity is measured (2,) [m]."""
+        return self.ends.mean(axis=0)
+
+    @cached_property
+    def depth(self) -> float:
+        """Length h from intrados to extrados [m]."""
+        return float(np.linalg.norm(self.ends[1] - self.ends[0]))
+
+    @cached_property
+    def tangent(self) -> Array:
+        """Unit vector from intrados to extrados (2,)."""
+        return (self.ends[1] - self.ends[0]) / self.depth
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Blocks in contact along dry joints.
+
+    Attributes:
+        blocks: the bodies; fixed ones are abutments. Their roles, and those of the joints, are
+            filled in where they are not told.
+        joints: where they touch.
+        width: out-of-plane width w [m].
+        gravity: acceleration of gravity, along -y [m/s²].
+        name: what it is called in titles and files.
+    """
+
+    blocks: tuple[Block, ...]
+    joints: tuple[Joint, ...]
+    width: float = 1.0
+    gravity: float = G
+    name: str = "structure"
+
+    def __post_init__(self) -> None:
+        """Fill in roles, and refuse what does not hang together."""
+        object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
+        object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
+        if not 0.0 < real(self.width, "width [m]") < 1e4:
+            raise InvalidStructure(
+                f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
+            )
+        if not 0.0 < real(self.gravity, "gravity [m/s²]") < 1e3:
+            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
+        for kind, things in (("block", self.blocks), ("joint", self.joints)):
+            names = [thing.name for thing in things]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise InvalidStructure(f"{kind} names {twice} are used twice: name each once")
+        if all(block.fixed for block in self.blocks):
+            raise InvalidStructure("no block is free to move: leave at least one not fixed")
+        _ = self.normals
+        self._check_support()
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box around all blocks [m]."""
+        points = np.concatenate([block.drawn() for block in self.blocks])
+        return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Unit normals of the joints, from the lower to the higher block (n_joints, 2)."""
+        return np.array([self._normal(joint) for joint in self.joints]).reshape(-1, 2)
+
+    @cached_property
+    def tangents(self) -> Array:
+        """Unit vectors of the joints, from intrados to extrados (n_joints, 2)."""
+        return np.array([joint.tangent for joint in self.joints])
+
+    @cached_property
+    def ends(self) -> Array:
+        """Ends of the joints, intrados first (n_joints, 2, 2) [m]."""
+        return np.array([joint.ends for joint in self.joints])
+
+    @cached_property
+    def middles(self) -> Array:
+        """Mid-points of the joints (n_joints, 2) [m]."""
+        return np.array([joint.middle for joint in self.joints])
+
+    @cached_property
+    def depths(self) -> Array:
+        """Depths h of the joints (n_joints,) [m]."""
+        return np.array([joint.depth for joint in self.joints])
+
+    @cached_property
+    def friction(self) -> Array:
+        """Coefficients μ of the joints (n_joints,) [-]."""
+        return np.array([joint.contact.friction for joint in self.joints])
+
+    @cached_property
+    def pairs(self) -> NDArray[np.intp]:
+        """Numbers of the two blocks at each joint, the lower first (n_joints, 2)."""
+        return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)
+
+    def _normal(self, joint: Joint) -> Array:
+        """Outward normal of the lower block's edge, which must also be one of the higher's."""
+        if not 0 <= joint.lower < joint.higher < len(self.blocks):
+            raise InvalidStructure(
+                f"joint '{joint.name}' is between blocks {joint.blocks}: "
+                f"give two different numbers from 0 to {len(self.blocks) - 1}"
+            )
+        near = TOUCHING * self.size
+        if joint.depth <= near:
+            raise InvalidStructure(
+                f"joint '{joint.name}' is {joint.depth:.3g} m long: its two ends are one point"
+            )
+        sides = [self.blocks[number].side_of(joint.ends, near) for number in sorted(joint.blocks)]
+        if sides[0] * sides[1] >= 0:
+            names = [self.blocks[number].name for number in sorted(joint.blocks)]
+            raise InvalidStructure(
+                f"joint '{joint.name}' lists blocks {names}, which share no face along "
+                f"{joint.intrados}-{joint.extrados} within {near:.1e} m: check which blocks it "
+                "joins and where its ends are"
+            )
+        return float(sides[0]) * np.array([joint.tangent[1], -joint.tangent[0]])
+
+    def _check_support(self) -> None:
+        """Every block must be joined, through others, to one that is fixed."""
+        held = {number for number, block in enumerate(self.blocks) if block.fixed}
+        pairs = [set(joint.blocks) for joint in self.joints]
+        while reached := {b for pair in pairs if pair & held for b in pair} - held:
+            held |= reached
+        loose = [block.name for number, block in enumerate(self.blocks) if number not in held]
+        if loose:
+            raise InvalidStructure(
+                f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
+            )
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Numbers of the blocks that move."""
+        return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """Whether each joint is judged, as `judged_parts` says of its part (n_joints,)."""
+        parts = judged_parts({joint.part: joint.role for joint in self.joints})
+        return np.array([joint.part in parts for joint in self.joints], dtype=bool)
+
+    @cached_property
+    def weight(self) -> float:
+        """Weight of the blocks that move, for the whole width [N]."""
+        free = (self.blocks[number] for number in self.free)
+        return self.width * sum(block.area * block.material.unit_weight for block in free)
+
+    def density(self, block: Block) -> float:
+        """Density of a block's material under this structure's gravity [kg/m³]."""
+        return block.material.unit_weight / self.gravity
+
+    def joint_number(self, joint: int | str) -> int:
+        """Number of a joint.
+
+        Args:
+            joint: number or name.
+
+        Raises:
+            InvalidInput: there is no such joint; the nearest name is suggested.
+        """
+        return number_of("joint", [each.name for each in self.joints], joint)
+
+    def block_number(self, block: int | str) -> int:
+        """Number of a block.
+
+        Args:
+            block: number or name.
+
+        Raises:
+            InvalidInput: there is no such block; the nearest name is suggested.
+        """
+        return number_of("block", [each.name for each in self.blocks], block)

@@ -1,0 +1,1 @@
+"""Structures from drawings: outlines as people draw them, made to touch, as blocks."""

@@ -1,0 +1,207 @@
+"""Outlines that nearly touch, made to touch: surveys never close exactly.
+
+Vertices nearer to one another than a tolerance become one. A vertex that near to another outline's
+edge is put onto it, and a joint between two blocks that bends no more than that is made straight.
+What then still overlaps, or nearly touches, is an error: it is not clear what was meant.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from archfem.arrays import Array
+from archfem.errors import InvalidStructure
+from archfem.masonry.overlaps import check_apart, check_simple
+from archfem.masonry.structure import TOUCHING
+
+NEARLY = 5.0
+"""Gaps up to so many times the tolerance are taken for faults of the survey."""
+
+Edge = tuple[int, int]
+Boundaries = list[list[int]]
+
+
+def snapped(
+    outlines: Sequence[Array], names: Sequence[str], snap: float
+) -> tuple[list[Array], float]:
+    """Make outlines touch that nearly do.
+
+    Args:
+        outlines: vertices of each (n, 2), either way round [m].
+        names: of the blocks, for errors.
+        snap: tolerance [m].
+
+    Returns:
+        The outlines, all anticlockwise, and the largest movement of a vertex [m].
+
+    Raises:
+        InvalidStructure: an outline crosses itself, two overlap or are the same, or a gap between
+            two is little wider than the tolerance.
+    """
+    if not snap > 0.0:
+        raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
+    for name, points in zip(names, outlines, strict=True):
+        check_simple(points, name)
+    turned = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
+    given = np.concatenate(turned)
+    places, number = _merged(turned, snap)
+    parts = np.split(number, np.cumsum([len(points) for points in turned])[:-1])
+    boundaries = [[int(n) for n, _ in groupby(part)] for part in parts]
+    boundaries = [loop[:-1] if loop[0] == loop[-1] else loop for loop in boundaries]
+    ties = _ties(boundaries, places, snap)
+    ties |= _bends(boundaries, places, ties, snap)
+    places = _settled(places, ties)
+    moved = np.linalg.norm(places[number] - given, axis=1)
+    owners = [name for name, points in zip(names, turned, strict=True) for _ in points]
+    _check_moved(moved, given, owners, snap)
+    found = [places[loop] for loop in boundaries]
+    for name, points, loop in zip(names, found, boundaries, strict=True):
+        if len(loop) < 3:
+            raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
+        check_simple(points, name)
+    check_apart(found, names, NEARLY * snap)
+    _check_gaps(places, boundaries, names, snap)
+    return found, float(moved.max())
+
+
+def _area(points: Array) -> float:
+    """Area of a polygon, positive anticlockwise."""
+    x, y = (points - points[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
+    """Number of a loop, and the two points of each edge of it."""
+    for number, loop in enumerate(boundaries):
+        for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
+            yield number, a, b
+
+
+def _beside(places: Array, a: int, b: int) -> tuple[Array, Array, float]:
+    """How far all places lie along and to the left of an edge, and its length."""
+    step = places[b] - places[a]
+    length = float(np.linalg.norm(step))
+    x, y = (places - places[a]).T
+    return (x * step[0] + y * step[1]) / length, (step[0] * y - step[1] * x) / length, length
+
+
+def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
+    """Places where vertices are made one (n, 2), and the number of each vertex's place."""
+    points = np.concatenate(outlines)
+    pairs = [cKDTree(points).query_pairs(snap, output_type="ndarray")]
+    starts = np.cumsum([0, *map(len, outlines)])
+    owner = np.repeat(np.arange(len(outlines)), [len(points) for points in outlines])
+    vertices = [list(range(a, b)) for a, b in pairwise(starts)]
+    for number, a, b in _edges(vertices):
+        along, off, length = _beside(points, a, b)
+        near = (np.abs(off) <= snap) & (owner != number)
+        for end, away in ((a, along), (b, length - along)):
+            others = np.flatnonzero(near & (away >= 0.0) & (away <= snap))
+            pairs.append(np.column_stack([others, np.full(len(others), end)]))
+    one, two = np.concatenate(pairs).T
+    graph = sparse.coo_matrix((np.ones(len(one)), (one, two)), (len(points), len(points)))
+    count, number = connected_components(graph, directed=False)
+    sums = np.array([np.bincount(number, weights=x, minlength=count) for x in points.T])
+    places = (sums / np.bincount(number)).T
+    return places, number
+
+
+def _ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, Edge]:
+    """Places near the edge of an outline they do not belong to, and the nearest such edge."""
+    best: dict[int, tuple[float, Edge]] = {}
+    for number, a, b in _edges(boundaries):
+        along, off, length = _beside(places, a, b)
+        inside = (np.abs(off) <= snap) & (along > 0.0) & (along < length)
+        for place in set(np.flatnonzero(inside).tolist()) - set(boundaries[number]):
+            found = (float(abs(off[place])), (a, b))
+            best[place] = min(best.get(place, found), found)
+    return {place: edge for place, (_, edge) in best.items()}
+
+
+def _bends(
+    boundaries: Boundaries, places: Array, ties: dict[int, Edge], snap: float
+) -> dict[int, Edge]:
+    """Places in the middle of a joint that is straight but for the tolerance, and its ends."""
+    on: dict[frozenset[int], list[int]] = {}
+    for place, edge in ties.items():
+        on.setdefault(frozenset(edge), []).append(place)
+    whole: Boundaries = [[] for _ in boundaries]
+    for number, a, b in _edges(boundaries):
+        along = _beside(places, a, b)[0]
+        whole[number] += [a, *sorted(on.get(frozenset((a, b)), []), key=lambda n: along[n])]
+    across = {(a, b): number for number, a, b in _edges(whole)}
+    found: dict[int, Edge] = {}
+    for loop in whole:
+        beyond = [across.get((b, a), -1) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+        turn = next((k for k in range(len(loop)) if beyond[k] != beyond[k - 1]), 0)
+        nodes, beyond = loop[turn:] + loop[:turn], beyond[turn:] + beyond[:turn]
+        for other, run in groupby(range(len(loop)), beyond.__getitem__):
+            which = list(run)
+            ends = nodes[which[0]], nodes[(which[-1] + 1) % len(nodes)]
+            middle = [nodes[k] for k in which[1:]]
+            if other >= 0 and middle and ends[0] != ends[1]:
+                _, off, _ = _beside(places, *ends)
+                if np.abs(off[middle]).max() <= snap:
+                    found |= {place: ends for place in middle if place not in ties}
+    return found
+
+
+def _settled(places: Array, ties: dict[int, Edge]) -> Array:
+    """Places with those tied put onto their edges, whose ends may be tied to others in turn."""
+    hold = sparse.identity(len(places), format="lil")
+    free = places.copy()
+    for place, (a, b) in ties.items():
+        along, _, length = _beside(places, a, b)
+        share = along[place] / length
+        hold[place, a], hold[place, b] = share - 1.0, -share
+        free[place] = 0.0
+    return np.asarray(splu(hold.tocsc()).solve(free))
+
+
+def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float) -> None:
+    """Refuse to move vertices by much more than the tolerance, in steps below it."""
+    worst = int(np.argmax(moved))
+    if moved[worst] > 2.0 * snap:
+        x, y = given[worst]
+        raise InvalidStructure(
+            f"the vertex of '{owners[worst]}' at ({x:.3f}, {y:.3f}) would move by "
+            f"{1e3 * moved[worst]:.3g} mm until all nearer than snap = {snap:.3g} m touch: raise "
+            "snap if the survey is rougher than that; lower it, or leave out vertices, if they "
+            "follow one another so closely"
+        )
+
+
+def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], snap: float) -> None:
+    """Refuse blocks that nearly touch."""
+    import shapely
+
+    near = TOUCHING * float(np.linalg.norm(np.ptp(places, axis=0)))
+    polygons = [shapely.Polygon(places[loop]) for loop in boundaries]
+    tree = shapely.STRtree(polygons)
+    first = {place: number for number, loop in reversed([*enumerate(boundaries)]) for place in loop}
+    found = []
+    for number, a, b in _edges(boundaries):
+        along, off, length = _beside(places, a, b)
+        beside = (off < -near) & (off >= -NEARLY * snap)
+        beside &= (along > -near) & (along < length + near)
+        for place in set(np.flatnonzero(beside).tolist()) - set(boundaries[number]):
+            foot = places[a] + along[place] / length * (places[b] - places[a])
+            middle = shapely.Point(0.5 * (foot + places[place]))
+            if not len(tree.query(middle, predicate="within")):
+                found.append((float(-off[place]), number, place))
+    if not found:
+        return
+    width, number, place = max(found)
+    x, y = places[place]
+    more = f" ({len(found)} such places, this is the widest)" if len(found) > 1 else ""
+    raise InvalidStructure(
+        f"'{names[first[place]]}' and '{names[number]}' are {1e3 * width:.3g} mm apart at "
+        f"({x:.3f}, {y:.3f}){more}, just more than snap: raise snap = {snap:.3g} m above that if "
+        f"they touch; if not, draw a gap of more than {NEARLY * snap:.3g} m"
+    )

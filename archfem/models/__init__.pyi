@@ -1,0 +1,3 @@
+from .discretisation import Discretisation as Discretisation
+from .model import Model as Model
+from .model import Prediction as Prediction

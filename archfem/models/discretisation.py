@@ -1,0 +1,114 @@
+"""What a structure is modelled by: a rung of the ladder, a mesh, and a rule on its joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from archfem.arguments import real, row, whole
+from archfem.errors import InvalidInput
+from archfem.joints.quadrature import Quadrature
+
+RUNGS = ("rigid", "faces", "condensed", "full")
+"""What a block may be, the cheapest first."""
+
+FIDELITIES = (*RUNGS, "monolithic")
+"""What a whole structure may be: the ladder, and the slow reference."""
+
+SHAPES = ("quadrilateral", "triangle")
+"""Of cells."""
+
+MOST = 1000
+"""Cells across a block, either way, beyond which nobody means it."""
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """A rung of the ladder, a mesh and a rule on the joints, checked when made.
+
+    Numbers of cells are least ones: a side gets more where a neighbour needs them, where it bends
+    or is touched at more points, or where cells of a polygon would be longer than twice its
+    thickness.
+
+    Attributes:
+        fidelity: one of `FIDELITIES`, or one of `RUNGS` by block name or part, with "rest" for
+            all others.
+        cells: through the thickness (facets on a joint) and along each block (a sector's faces get
+            as many chords).
+        cell: "quadrilateral" or "triangle".
+        coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
+            given, half of the block's mean thickness 2 A / P, A its area and P its perimeter.
+        degree: of the elements, 1 or 2.
+        quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
+        points: on each facet, 3 where not given.
+    """
+
+    fidelity: str | Mapping[str, str] = "full"
+    cells: tuple[int, int] = (4, 4)
+    cell: str = "quadrilateral"
+    coarse: float | None = None
+    degree: int = 1
+    quadrature: str = "lobatto"
+    points: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse unknown words, impossible numbers, and what does not go together."""
+        _check_fidelity(self.fidelity)
+        object.__setattr__(self, "cells", _two(self.cells))
+        if self.cell not in SHAPES:
+            raise InvalidInput(f"cell '{self.cell}' is not known: use one of {SHAPES}")
+        if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
+            raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
+        if self.degree not in (1, 2):
+            raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")
+        if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):
+            raise InvalidInput(
+                "exact quadrature needs openings that are linear along a facet, and is not written "
+                "in UFL: use degree 1 and a rung other than monolithic"
+            )
+
+    @property
+    def through(self) -> int:
+        """Cells through the thickness."""
+        return self.cells[0]
+
+    @property
+    def along(self) -> int:
+        """Cells along each block."""
+        return self.cells[1]
+
+    @property
+    def rule(self) -> Quadrature:
+        """The rule on each joint facet."""
+        return Quadrature(self.quadrature, self.points)
+
+    @property
+    def name(self) -> str:
+        """The fidelity in words."""
+        if isinstance(self.fidelity, str):
+            return self.fidelity
+        return ", ".join(f"{block}: {rung}" for block, rung in self.fidelity.items())
+
+
+def _check_fidelity(fidelity: object) -> None:
+    """Refuse rungs that there are not."""
+    if isinstance(fidelity, Mapping):
+        unknown = sorted({str(rung) for rung in fidelity.values() if rung not in RUNGS})
+        if unknown:
+            raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
+    elif fidelity == "modal":
+        raise InvalidInput(
+            "fidelity 'modal' is no longer known, for 'faces' is faster and errs less: use one of "
+            f"{FIDELITIES}"
+        )
+    elif fidelity not in FIDELITIES:
+        raise InvalidInput(
+            f"fidelity {fidelity!r} is not known: use one of {FIDELITIES}, or 'auto' in `build`"
+        )
+
+
+def _two(cells: object) -> tuple[int, int]:
+    """Two whole numbers."""
+    through, along = row(cells, "cells through the thickness and along each block", 2)
+    for key, count in (("through", through), ("along", along)):
+        if whole(count, f"cells {key}") > MOST:
+            raise InvalidInput(f"cells {key} = {count!r}: give at most {MOST}")
+    return int(through), int(along)

@@ -1,0 +1,1 @@
+"""Meshes, spaces and forms: the one place that knows FEniCSx and gmsh."""

@@ -1,0 +1,10 @@
+from .design_spectra import DesignSpectrum as DesignSpectrum
+from .design_spectra import Eurocode8 as Eurocode8
+from .design_spectra import TableSpectrum as TableSpectrum
+from .design_spectra import Tbec2018 as Tbec2018
+from .matching import Match as Match
+from .matching import matched as matched
+from .motion import Motion as Motion
+from .spectra import response_spectrum as response_spectrum
+from .spectra import scaled_to_spectrum as scaled_to_spectrum
+from .suite import Suite as Suite

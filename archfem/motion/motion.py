@@ -1,0 +1,329 @@
+"""`Motion`: a ground acceleration, read, cut, filtered, rotated and scaled."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archfem.arguments import instance
+from archfem.arrays import Array
+from archfem.errors import InvalidInput
+from archfem.motion import signals
+from archfem.motion.records.read import read_components
+from archfem.motion.synthetic import accelerogram
+from archfem.units import STANDARD_GRAVITY
+
+COMPONENTS = ("horizontal", "vertical", "transverse")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The acceleration of the ground in up to three directions, which begin together.
+
+    Each component keeps its own length and is zero before and after. What changes a motion returns
+    a new one and does the same to every component.
+
+    Args:
+        horizontal: accelerations along the arch (n,) [m/s²].
+        dt: time between samples [s].
+        vertical: accelerations upwards (m,) [m/s²], or None.
+        name: what to call it.
+        transverse: the other horizontal (k,) [m/s²], or None; only `rotated` makes use of it.
+
+    Raises:
+        InvalidInput: a component is no row of finite numbers up to 5 g, or dt is not positive.
+    """
+
+    horizontal: Array
+    dt: float
+    vertical: Array | None = None
+    name: str = ""
+    transverse: Array | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
+            raise InvalidInput(f"dt {self.dt!r} s: the time between samples is a positive number")
+        instance(self.name, str, "name of a motion", "give words")
+        for component in COMPONENTS:
+            samples = getattr(self, component)
+            if samples is not None or component == "horizontal":
+                object.__setattr__(self, component, signals.checked(samples, component))
+
+    @classmethod
+    def read(
+        cls,
+        path: str | PathLike[str],
+        *,
+        vertical: str | PathLike[str] | None = None,
+        transverse: str | PathLike[str] | None = None,
+        column: int | None = None,
+        units: str | None = None,
+        dt: float | None = None,
+    ) -> "Motion":
+        """Return the motion of a record; the format is found by the content of the file.
+
+        A single component is the horizontal, whatever its direction. Of several, the first level
+        one is the horizontal, the second the transverse; the vertical is turned up.
+
+        Args:
+            path: PEER AT2, AFAD, ESM/ITACA, COSMOS V2, CSMIP/CDMG V2, USGS SMC, K-NET, or columns.
+            vertical: second file, with the vertical component and its own unit and step; one that
+                states neither is read by itself, and added by `with_vertical`.
+            transverse: another file, that holds the other horizontal, likewise.
+            column: take this component or plain column of `path` only, counted from 1.
+            units: unit of the plain columns of `path`: g, m/s2, cm/s2 or gal.
+            dt: time between samples of the plain columns of `path` [s].
+
+        Raises:
+            InvalidInput: what cannot be read without doubt, with file and line.
+        """
+        channels = read_components(path, column=column, units=units, dt=dt)
+        rows: dict[str, Any] = {name: channel.samples for name, channel in channels.items()}
+        try:
+            motion = cls(**rows, dt=channels["horizontal"].dt, name=Path(path).stem)
+        except InvalidInput as error:
+            raise InvalidInput(f"{path}: {error}") from error
+        if vertical is not None:
+            motion = motion.with_vertical(cls.read(vertical))
+        if transverse is not None:
+            motion = motion.with_transverse(cls.read(transverse))
+        return motion
+
+    @classmethod
+    def synthetic(
+        cls,
+        *,
+        duration: float = 20.0,
+        pga: float = 0.3 * STANDARD_GRAVITY,
+        seed: int = 0,
+        dt: float = 0.005,
+        vertical_ratio: float = 2.0 / 3.0,
+    ) -> "Motion":
+        """Return an artificial accelerogram without drift, as `synthetic` makes it from noise.
+
+        Args:
+            duration: time of the last sample [s].
+            pga: horizontal peak [m/s²].
+            seed: the same seed gives the same motion.
+            dt: time between samples [s].
+            vertical_ratio: vertical peak by horizontal peak [-]; 0 leaves the vertical out.
+
+        Raises:
+            InvalidInput: fewer than 50 samples, or pga, ratio or seed out of range.
+        """
+        level, upright = accelerogram(duration, dt, pga=pga, ratio=vertical_ratio, seed=seed)
+        return cls(level, dt, upright, name=f"synthetic {seed}")
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample of the longest component [s]."""
+        return (max(len(self.component(name)) for name in self.components) - 1) * self.dt
+
+    @property
+    def pga(self) -> float:
+        """Peak of the horizontal acceleration [m/s²]."""
+        return float(np.abs(self.horizontal).max())
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components there are."""
+        return tuple(name for name in COMPONENTS if getattr(self, name) is not None)
+
+    def component(self, name: str) -> Array:
+        """Return the accelerations of one component (n,) [m/s²].
+
+        Args:
+            name: horizontal, vertical or transverse.
+
+        Raises:
+            InvalidInput: the motion has no such component.
+        """
+        if name not in self.components:
+            raise InvalidInput(
+                f"motion {self.name!r} has no component {name!r}, only {', '.join(self.components)}"
+            )
+        samples: Array = getattr(self, name)
+        return samples
+
+    def times(self, component: str = "horizontal") -> Array:
+        """Return the times of the samples of one component (n,) [s].
+
+        Args:
+            component: horizontal, vertical or transverse.
+        """
+        return np.arange(len(self.component(component))) * self.dt
+
+    def velocity(self, component: str = "horizontal") -> Array:
+        """Return the ground velocity (n,) [m/s], at rest at first.
+
+        Args:
+            component: horizontal, vertical or transverse.
+        """
+        return signals.velocity(self.component(component), self.dt)
+
+    def displacement(self, component: str = "horizontal") -> Array:
+        """Return the ground displacement (n,) [m], at rest at first.
+
+        Args:
+            component: horizontal, vertical or transverse.
+        """
+        return signals.displacement(self.component(component), self.dt)
+
+    def at(self, times: float | Array) -> Array:
+        """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
+
+        Args:
+            times: times (n,) [s]; straight between samples, zero outside the record.
+        """
+        moments = np.atleast_1d(np.asarray(times, dtype=float))
+        both = np.zeros((len(moments), 2))
+        for axis, name in enumerate(COMPONENTS[:2]):
+            if name in self.components:
+                both[:, axis] = signals.between(self.component(name), moments / self.dt)
+        return both
+
+    def scaled(self, factor: float) -> "Motion":
+        """Return the motion with all components multiplied by a factor.
+
+        Args:
+            factor: what to multiply by [-]; a negative one turns the motion round.
+        """
+        return self._each(lambda samples: factor * samples)
+
+    def reversed(self) -> "Motion":
+        """Return the motion with its horizontals turned: as if the structure faced backwards."""
+        return replace(self.scaled(-1.0), vertical=self.vertical)
+
+    def scaled_to_pga(self, pga: float) -> "Motion":
+        """Return the motion with all components scaled by one factor, to a horizontal peak.
+
+        Args:
+            pga: peak of the horizontal to reach [m/s²].
+
+        Raises:
+            InvalidInput: the horizontal is at rest, or pga is not positive.
+        """
+        if self.pga == 0.0 or not pga > 0.0:
+            raise InvalidInput(f"scaling a peak of {self.pga:g} to {pga:g} m/s²: both must be > 0")
+        return self.scaled(pga / self.pga)
+
+    def cut(self, start: float, end: float | None = None) -> "Motion":
+        """Return the samples from start to end; a component that ended before keeps one zero.
+
+        Args:
+            start: time of the first sample kept [s].
+            end: time of the last [s]; None keeps all to the end.
+
+        Raises:
+            InvalidInput: the start is negative, or no sample of the horizontal is left.
+        """
+        stop = self.duration if end is None else end
+        first = np.ceil(round(start / self.dt, 6))
+        last = np.floor(round(min(stop, self.duration) / self.dt, 6))
+        if not (start >= 0.0 and first < len(self.horizontal) and first <= last):
+            raise InvalidInput(
+                f"cut from {start:g} to {stop:g} s: nothing of the {self.duration:g} s is left"
+            )
+        kept = slice(int(first), int(last) + 1)
+        return self._each(lambda samples: samples[kept] if len(samples[kept]) else np.zeros(1))
+
+    def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
+        """Return the part of significant duration, after Trifunac and Brady (1975).
+
+        Args:
+            low: fraction of the horizontal's Arias intensity at which it begins [-].
+            high: fraction at which it ends [-].
+
+        Raises:
+            InvalidInput: not 0 <= low < high <= 1, or the horizontal is at rest.
+        """
+        return self.cut(*signals.significant_window(self.horizontal, self.dt, low, high))
+
+    def resampled(self, dt: float) -> "Motion":
+        """Return the motion sampled anew by straight lines, with all its peaks and no filter.
+
+        Args:
+            dt: the new time between samples [s].
+
+        Raises:
+            InvalidInput: dt is not positive and finite.
+        """
+        return replace(self._each(lambda samples: signals.resampled(samples, self.dt, dt)), dt=dt)
+
+    def baseline_corrected(self, degree: int = 6) -> "Motion":
+        """Return the motion without drift, as `signals.baseline_corrected` does it.
+
+        Args:
+            degree: of the polynomial taken out of the displacement, at least 3.
+
+        Raises:
+            InvalidInput: the degree is below 3, or not below the number of samples.
+        """
+        return self._each(lambda samples: signals.baseline_corrected(samples, self.dt, degree))
+
+    def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
+        """Return the motion with its frequencies in a band, as `signals.band_passed` does it.
+
+        Args:
+            low: lowest frequency kept [Hz].
+            high: highest frequency kept [Hz].
+            order: of the filter, which runs forwards and backwards.
+
+        Raises:
+            InvalidInput: not 0 < low < high < half the sampling frequency, or the order below 1.
+        """
+        return self._each(lambda row: signals.band_passed(row, self.dt, low, high, order=order))
+
+    def rotated(self, angle: float) -> "Motion":
+        """Return the motion along horizontal axes turned from the horizontal to the transverse.
+
+        Args:
+            angle: by which the axes turn [rad].
+
+        Raises:
+            InvalidInput: there is no transverse.
+        """
+        level, across = signals.rotated(self.horizontal, self.component("transverse"), angle)
+        return replace(self, horizontal=level, transverse=across)
+
+    def with_vertical(self, other: "Motion | None") -> "Motion":
+        """Return the motion with the vertical of another one.
+
+        Args:
+            other: gives its vertical, or without one its horizontal; None leaves the vertical out.
+
+        Raises:
+            InvalidInput: the steps of the two differ.
+        """
+        if other is None:
+            return replace(self, vertical=None)
+        self._check_step(other)
+        upright = other.horizontal if other.vertical is None else other.vertical
+        return replace(self, vertical=upright)
+
+    def with_transverse(self, other: "Motion") -> "Motion":
+        """Return the motion with the horizontal of another one as its transverse.
+
+        Args:
+            other: gives its horizontal.
+
+        Raises:
+            InvalidInput: the steps of the two differ.
+        """
+        self._check_step(other)
+        return replace(self, transverse=other.horizontal)
+
+    def _check_step(self, other: "Motion") -> None:
+        if not np.isclose(other.dt, self.dt, rtol=1e-6):
+            raise InvalidInput(
+                f"{other.name!r} has a step of {other.dt:g} s and {self.name!r} of {self.dt:g} s: "
+                "bring one to the other's with resampled"
+            )
+
+    def _each(self, change: Callable[[Array], Array]) -> "Motion":
+        changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
+        return replace(self, **changed)

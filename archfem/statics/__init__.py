@@ -1,0 +1,18 @@
+"""A model at rest and about rest: dead load, pushover, modes, stress, free bodies.
+
+    newton       one equilibrium solve through PETSc SNES
+    equilibrium  dead load and other loads that stay
+    path         paths of equilibrium, step by step
+    pushover     a load grows until hardly anything resists
+    eigen        the lowest vibrations of sparse matrices, by SLEPc
+    modes        vibrations about a state
+    stress       principal stresses in the blocks
+    strength     use of the blocks' strength
+    freebody     one block cut free, and whether its forces balance
+
+It imports from `models` and what is left of it. Start reading at `equilibrium`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,9 @@
+from .equilibrium import Equilibrium as Equilibrium
+from .equilibrium import dead_load as dead_load
+from .equilibrium import self_weight as self_weight
+from .freebody import forces_on as forces_on
+from .modes import Modes as Modes
+from .newton import Newton as Newton
+from .path import Stop as Stop
+from .pushover import Pushover as Pushover
+from .strength import strength_use as strength_use

@@ -1,0 +1,126 @@
+"""Equilibrium under loads that stay: self-weight first of all."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from archfem.arguments import instance
+from archfem.arrays import Array
+from archfem.errors import DidNotConverge
+from archfem.joints.resultants import joint_dataset, one_joint
+from archfem.masonry.actions import BodyForce
+from archfem.models.model import Model, check_model
+from archfem.statics.newton import Newton, Solved, Solver, magnitude
+
+SMALLEST_STEP = 1.0 / 64.0
+"""Of a load or a settlement, to which steps are halved before giving up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A structure at rest.
+
+    Attributes:
+        model: whose equilibrium it is.
+        q: coordinates (n,).
+        iterations: of Newton's method, over all steps.
+        steps: in which the load, and then any motion of the supports, was brought on.
+    """
+
+    model: Model
+    q: Array
+    iterations: int
+    steps: int
+
+    @cached_property
+    def joints(self) -> xr.Dataset:
+        """N, V, M, eccentricity and friction over joint."""
+        return joint_dataset(self.model.structure, self.model.resultants(self.q))
+
+    def joint(self, joint: str | int) -> xr.Dataset:
+        """What one joint carries, given by name or number."""
+        return one_joint(self.joints, joint)
+
+
+def self_weight(model: Model) -> Array:
+    """Generalised forces of gravity (n,)."""
+    return model.load(BodyForce(0.0, -1.0))
+
+
+def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
+    """Find the equilibrium under self-weight.
+
+    Joints open as they must (nonlinear statics); steps of the load are halved where Newton's
+    method fails. Displacements are small: the structure keeps its shape.
+
+    Args:
+        model: any rung of the ladder.
+        newton: settings of the solves.
+
+    Raises:
+        InvalidInput: the model is none.
+        DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
+            equilibrium found on the way, under part of the weight.
+    """
+    check_model(model)
+    return equilibrium(model, self_weight(model), newton)
+
+
+def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
+    """Find the equilibrium under a load that is brought on from rest.
+
+    Supports that have moved do so after that, little by little: the joints follow.
+
+    Args:
+        model: any rung of the ladder.
+        load: generalised forces (n,).
+        newton: settings of the solves.
+
+    Raises:
+        DidNotConverge: there is none; `last` is the last one on the way.
+    """
+    if newton is not None:
+        instance(newton, Newton, "newton", "give Newton(tolerance=…)")
+    solver = Solver(model.size, newton)
+    before = model.moved(np.zeros_like(model.supports))
+    rest = Equilibrium(before, np.zeros(model.size), 0, 0)
+    carried = _grown(solver, rest, lambda part: (before, part * load), "load")
+    if not model.supports.any():
+        return carried
+    return _grown(
+        solver, carried, lambda part: (model.moved(part * model.supports), load), "settlement"
+    )
+
+
+def _grown(
+    solver: Solver,
+    found: Equilibrium,
+    at: Callable[[float], tuple[Model, Array]],
+    what: str,
+) -> Equilibrium:
+    """Follow an equilibrium while something grows, which gives a model and a load for each part."""
+    factor, step = 0.0, 1.0
+    while factor < 1.0:
+        target = min(1.0, factor + step)
+        model, load = at(target)
+        try:
+            solved = _solve(solver, model, load, found.q)
+        except DidNotConverge as error:
+            step /= 2.0
+            if step >= SMALLEST_STEP:
+                continue
+            raise DidNotConverge(
+                f"no equilibrium beyond {factor:.3f} of the {what} ({error}): the structure cannot "
+                "carry it; make it thicker, or check the outline, the supports and the load",
+                last=found,
+            ) from error
+        found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
+        factor = target
+    return found
+
+
+def _solve(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
+    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))

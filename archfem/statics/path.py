@@ -1,0 +1,295 @@
+"""Paths of equilibrium: a load that grows, or a support that moves, step by step."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from archfem.arrays import Array
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.joints.resultants import joint_dataset
+from archfem.limit.blocks import RigidBlocks
+from archfem.masonry.actions import BodyForce, PointLoad, Settlement
+from archfem.models.model import Model
+from archfem.statics.equilibrium import Equilibrium, self_weight
+from archfem.statics.newton import Solver, magnitude
+
+TOLERANCE, ROUGHLY, ITERATIONS = 1e-9, 1e-7, 30
+"""Force left out of balance, relative to the sum of all loads; the same where round-off of large
+motions is above that; Newton's iterations in a step."""
+
+FIRST, GROWTH, SMALLEST = 1e-6, 1.1, 1e-3
+"""First displacement relative to the structure's size, growth of steps, and the smallest step,
+relative to the first, to which they are halved before giving up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """When a pushover ends, whichever comes first.
+
+    Attributes:
+        slope: tangent of the curve relative to its initial tangent [-].
+        displacement: of the loaded point, relative to the structure's size [-].
+        hinges: number of hinged joints, or None not to count them.
+        steps: number of steps.
+    """
+
+    slope: float = 1e-6
+    displacement: float = 0.1
+    hinges: int | None = None
+    steps: int = 400
+
+    def __post_init__(self) -> None:
+        """Refuse what would stop at once, or never."""
+        if not 0.0 <= self.slope < 1.0:
+            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
+        if not (self.displacement > 0.0 and self.steps >= 1):
+            raise InvalidInput(
+                f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"
+            )
+
+
+@dataclass(eq=False)
+class LoadPath:
+    """Equilibria under a growing load found so far, and what is needed for the next.
+
+    Attributes:
+        model: what is loaded.
+        dead: generalised forces of the self-weight (n,).
+        live: of the load (n,).
+        probe: displacement of the load along itself is probe·(q - q_0) (n,).
+        unit: displacement and factor of the first step of an elastic structure.
+        states: coordinates at each step, the dead load's first (n,).
+        resisted: N, V, M of every joint at each step (n_joints, 3) [N, N, N m].
+        factors: of the load at each step [-].
+        iterations: of Newton's method in each step.
+    """
+
+    model: Model
+    dead: Array
+    live: Array
+    probe: Array
+    unit: tuple[float, float]
+    states: list[Array]
+    resisted: list[Array]
+    factors: list[float]
+    iterations: list[int]
+    units = "1"
+
+    @classmethod
+    def of(
+        cls, model: Model, actions: Sequence[BodyForce | PointLoad], start: Equilibrium
+    ) -> "LoadPath":
+        """Begin at the dead load's equilibrium.
+
+        Raises:
+            InvalidInput: the load is zero.
+        """
+        live = sum((model.load(action) for action in actions), np.zeros(model.size))
+        size = sum(_size(model, action) for action in actions)
+        if size == 0.0:
+            raise InvalidInput("the load is zero: give it a force or a multiple of g")
+        probe = live / size
+        first = FIRST * model.structure.size
+        give = float(probe @ splu(model.tangent(start.q).tocsc()).solve(live))
+        unit = (first, first / give)
+        resisted = [model.resultants(start.q)]
+        return cls(model, self_weight(model), live, probe, unit, [start.q], resisted, [0.0], [0])
+
+    @property
+    def displacements(self) -> Array:
+        """Of the load along itself, since the dead load (steps,) [m]."""
+        return np.array([self.probe @ (q - self.states[0]) for q in self.states])
+
+    @property
+    def resultants(self) -> Array:
+        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
+        return np.array(self.resisted)
+
+    def advance(self, border: Array, distance: float) -> bool:
+        """Add the equilibrium at a distance along the border's direction; whether there is one.
+
+        Args:
+            border: a and b of the further equation (2,).
+            distance: its right side, from the last state on.
+        """
+        along, up = border / np.array(self.unit)
+        row = sparse.csr_matrix(np.append(along * self.probe, up))
+        column = sparse.csr_matrix(-self.live[:, None])
+        x = np.append(self.states[-1], self.factors[-1])
+        target = row @ x + distance
+        for iteration in range(ITERATIONS):
+            tangent = self.model.tangent(x[:-1])
+            rest, ahead = self._rest(x), target - row @ x
+            if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
+                self.states.append(x[:-1])
+                self.resisted.append(self.model.resultants(x[:-1]))
+                self.factors.append(float(x[-1]))
+                self.iterations.append(iteration)
+                return True
+            matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
+            try:
+                x = x + splu(matrix).solve(np.append(rest, ahead))
+            except RuntimeError:  # SuperLU: exactly singular
+                return False
+        return False
+
+    def _rest(self, x: Array) -> Array:
+        """Forces out of balance at q and λ in one (n,)."""
+        return self.dead + x[-1] * self.live - self.model.force(x[:-1])
+
+    def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
+        """Whether forces are in balance, or off by no more than round-off of large motions."""
+        load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.live)
+        rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
+        return magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load)
+
+
+def _size(model: Model, action: BodyForce | PointLoad) -> float:
+    """Size of an action [N]."""
+    if isinstance(action, PointLoad):
+        return hypot(*action.force)
+    return model.structure.weight * hypot(action.horizontal, action.vertical)
+
+
+@dataclass(eq=False)
+class SupportPath:
+    """Equilibria under the dead load over a support that moves, as `LoadPath`.
+
+    Attributes:
+        model: before the support moves.
+        motion: of all blocks, per unit (n_blocks, 3) [m, m, rad].
+        dead: generalised forces of the self-weight (n,).
+        reach: displacement of the support's fastest corner, per unit [m].
+        unit: displacement, and change of the factor, in the first step.
+        parts: multiples of the motion at each step [-].
+        states: coordinates at each step (n,).
+        resisted: N, V, M of every joint at each step (n_joints, 3) [N, N, N m].
+        iterations: of Newton's method in each step.
+    """
+
+    model: Model
+    motion: Array
+    dead: Array
+    reach: float
+    unit: tuple[float, float]
+    parts: list[float]
+    states: list[Array]
+    resisted: list[Array]
+    iterations: list[int]
+    units = "N m"
+
+    @classmethod
+    def of(cls, model: Model, settlement: Settlement, start: Equilibrium) -> "SupportPath":
+        """Begin at the dead load's equilibrium.
+
+        Raises:
+            InvalidInput: the block is not a support, or does not move.
+        """
+        motion = settlement.added(model.structure, np.zeros_like(model.supports))
+        reach = RigidBlocks(model.structure).reach(motion)
+        if reach == 0.0:
+            raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
+        unit, first = (FIRST * model.structure.size, np.inf), model.resultants(start.q)
+        return cls(model, motion, self_weight(model), reach, unit, [0.0], [start.q], [first], [0])
+
+    @property
+    def displacements(self) -> Array:
+        """Of the support's fastest corner, since the dead load (steps,) [m]."""
+        return self.reach * np.array(self.parts)
+
+    @property
+    def resultants(self) -> Array:
+        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
+        return np.array(self.resisted)
+
+    @property
+    def factors(self) -> Array:
+        """Work of the weights on a unit of the motion (steps,) [N m].
+
+        It is F·o - V·s, with o and s the openings and slips that the motion alone would cause and
+        F the compressions at both ends of each joint.
+        """
+        blocks = RigidBlocks(self.model.structure)
+        intrados, extrados, slip = blocks.gaps(self.motion)
+        normal, shear, moment = np.moveaxis(self.resultants, -1, 0)
+        middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.structure.depths
+        return normal @ middle + moment @ turn - shear @ slip
+
+    def advance(self, border: Array, distance: float) -> bool:
+        """Move the support on by a distance in units of the first; whether there is equilibrium."""
+        part = self.parts[-1] + distance * self.unit[0] / self.reach
+        model = self.model.moved(self.model.supports + part * self.motion)
+        try:
+            solved = Solver(model.size).solve(
+                lambda q: model.force(q) - self.dead,
+                model.tangent,
+                self.states[-1],
+                magnitude(self.dead),
+            )
+        except DidNotConverge:
+            return False
+        self.parts.append(part)
+        self.states.append(solved.q)
+        self.resisted.append(model.resultants(solved.q))
+        self.iterations.append(solved.iterations)
+        if len(self.parts) == 2:
+            before, after = self.factors
+            change = abs(float(after - before))
+            self.unit = (self.unit[0], change if change > TOLERANCE * abs(before) else np.inf)
+        return True
+
+
+Path = LoadPath | SupportPath
+
+
+def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
+    """Add states until a rule ends it, and say which.
+
+    Args:
+        path: that begins with the dead load.
+        control: "displacement", "arc length" or "force".
+        stop: the rules.
+        criteria: what makes a joint hinge.
+    """
+    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
+    fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
+    while True:
+        if not path.advance(fixed.get(control, direction), distance):
+            distance /= 2.0
+            if distance < SMALLEST:
+                return _stuck(path, control)
+            continue
+        last = np.array([path.displacements[-2:], path.factors[-2:]])
+        moved = np.diff(last)[:, 0] / np.array(path.unit)
+        direction = moved / np.linalg.norm(moved)
+        if reason := _finished(path, stop, criteria, moved):
+            return reason
+        distance *= GROWTH
+
+
+def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:
+    """The rule that is met, in words, or None."""
+    slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
+    if slope <= stop.slope:
+        return f"the slope fell to {slope:.2g} of the initial one"
+    if reached >= stop.displacement * path.model.structure.size:
+        return f"the load moved by {reached:.3g} m"
+    if stop.hinges is not None:
+        joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
+        count = int((joints["hinge"] != 0).sum())
+        if count >= stop.hinges:
+            return f"{count} joints hinge"
+    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
+
+
+def _stuck(path: Path, control: str) -> str:
+    """Say that no further equilibrium was found; under force control that is the limit."""
+    if len(path.states) == 1:
+        raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
+    what = "the load cannot grow beyond" if control == "force" else "no equilibrium was found past"
+    return f"{what} a factor of {path.factors[-1]:.5g}"

@@ -1,0 +1,14 @@
+from .accuracy import draw_accuracy as draw_accuracy
+from .envelopes import draw_eccentricity as draw_eccentricity
+from .envelopes import draw_envelope as draw_envelope
+from .films.scenes import picture as picture
+from .freebody import draw_free_body as draw_free_body
+from .joints import draw_joint as draw_joint
+from .joints import draw_joint_histories as draw_joint_histories
+from .modes import draw_modes as draw_modes
+from .pushover import draw_pushover as draw_pushover
+from .stress import draw_stress as draw_stress
+from .structure import draw_instants as draw_instants
+from .structure import draw_structure as draw_structure
+from .studies import draw_study as draw_study
+from .style import save as save

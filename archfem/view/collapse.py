@@ -1,0 +1,159 @@
+"""Pictures of limit analysis: thrust line and mechanism in one, and the capacity of rings."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from archfem.arrays import Array
+from archfem.joints.resultants import thrust_line
+from archfem.limit.collapse import Collapse, Outcome
+from archfem.masonry.rigid_motion import motion_of
+from archfem.masonry.structure import Structure
+from archfem.view.films.colours import LIGHT_TO_DARK
+from archfem.view.marks import displaced, swung
+from archfem.view.structure import draw_structure
+from archfem.view.style import (
+    COLUMN,
+    EDGE,
+    HINGE,
+    INK,
+    MOVED,
+    NORMAL,
+    SLIP,
+    SMALL,
+    THRUST,
+    dress,
+    legend,
+)
+
+LEVELS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]
+"""Horizontal accelerations between which the map of capacity changes its colour [g]."""
+
+NEVER = 1e3
+"""Height of the map where no acceleration overturns a ring [g]."""
+
+
+def collapse_figure(structure: Structure, found: Collapse) -> Figure:
+    """Draw the thrust line in the structure as it stands, over the mechanism that it becomes.
+
+    Args:
+        structure: as it stands.
+        found: what limit analysis found for it.
+    """
+    figure = draw_structure(structure)
+    axes = figure.axes[0]
+    if found.motion.any():
+        motion = swung(structure, found.motion)
+        _draw_motion(axes, structure, motion)
+        _mark_hinges(axes, structure, found, motion)
+        _mark_sliding(axes, structure, found)
+    _draw_thrust(axes, structure, found.joints)
+    axes.set_title(_caption(found), fontsize=NORMAL, color=INK)
+    legend(axes)
+    return figure
+
+
+def capacity_figure(
+    capacity: xr.DataArray,
+    thinnest: Mapping[float, float],
+    known: Mapping[tuple[float, float], float],
+) -> Figure:
+    """Draw what rings withstand over embrace and thickness, with known values on it.
+
+    Args:
+        capacity: horizontal acceleration at collapse over embrace [degrees] and ratio, t/R [g];
+            undefined (NaN) where a ring does not stand.
+        thinnest: least t/R under self-weight over embrace [degrees], the edge of the map.
+        known: accelerations over (embrace [degrees], t/R) that are known from elsewhere [g]; zero
+            at the least t/R.
+    """
+    figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
+    axes = figure.add_subplot()
+    embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
+    values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=NEVER)
+    filled = axes.contourf(embraces, ratios, values, LEVELS, cmap=LIGHT_TO_DARK, extend="max")
+    axes.contour(embraces, ratios, values, LEVELS[1:], colors="white", linewidths=0.5)
+    edge = np.array(sorted(thinnest.items()))
+    axes.fill_between(edge[:, 0], 0.0, edge[:, 1], color="white", zorder=2)
+    axes.plot(*edge.T, color=INK, lw=1.6, zorder=3, label="thinnest that stands")
+    _mark_known(axes, known)
+    dress(axes, "embrace [°]", "thickness / radius, t/R [-]")
+    axes.set_xlim(embraces[0], embraces[-1])
+    axes.set_ylim(0.0, ratios[-1])
+    legend(axes)
+    bar = figure.colorbar(filled)
+    bar.set_label("horizontal acceleration at collapse [g]", fontsize=SMALL)
+    bar.ax.tick_params(labelsize=SMALL, color=EDGE)
+    return figure
+
+
+def _draw_motion(axes: Axes, structure: Structure, motion: Array) -> None:
+    """Draw the blocks that move where a motion (n_blocks, 3) takes them."""
+    moved = PolyCollection(
+        displaced(structure, motion),
+        facecolors=f"{MOVED}30",
+        edgecolors=MOVED,
+        linewidths=0.8,
+        zorder=2,
+    )
+    moved.set_label("mechanism")
+    axes.add_collection(moved)
+    axes.autoscale_view()
+
+
+def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Array) -> None:
+    """Mark each hinge on the face where its blocks stay in contact, as moved."""
+    points = []
+    for number, side in found.hinges:
+        joint = structure.joints[number]
+        end = joint.ends[0 if side == "intrados" else 1]
+        carrier = motion_of(end[None, :], structure.blocks[joint.lower].centroid)[0]
+        points.append(end + carrier @ motion[joint.lower])
+    if points:
+        x, y = np.array(points).T
+        axes.plot(x, y, "o", mfc=HINGE, mec="white", mew=0.8, ms=7.5, zorder=6, label="hinge")
+
+
+def _mark_sliding(axes: Axes, structure: Structure, found: Collapse) -> None:
+    """Draw sliding joints as heavy lines, where they were."""
+    for count, number in enumerate(found.sliding):
+        label = "_" if count else "sliding joint"
+        axes.plot(*structure.joints[number].ends.T, color=SLIP, lw=2.4, zorder=4, label=label)
+
+
+def _draw_thrust(axes: Axes, structure: Structure, joints: xr.Dataset) -> None:
+    """Draw the line through the points where the thrust crosses the joints."""
+    line = thrust_line(structure, joints).values
+    if np.isfinite(line).any():
+        axes.plot(*line.T, color=THRUST, lw=1.5, marker=".", ms=3, zorder=4, label="thrust line")
+
+
+def _caption(found: Collapse) -> str:
+    """Outcome, and the factor where there is one."""
+    sentence = found.outcome.sentence
+    if found.outcome is Outcome.COLLAPSES:
+        sentence += f" at a factor of {found.factor:.4g}"
+    return sentence[0].upper() + sentence[1:]
+
+
+def _mark_known(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
+    """Put known values on the map of capacity."""
+    thin = [point for point, factor in known.items() if factor == 0.0]
+    strong = [point for point, factor in known.items() if factor > 0.0]
+    for points, label, mark in (
+        (thin, "known thinnest", {"marker": "D", "mfc": "white", "mec": INK, "ms": 6}),
+        (strong, "known factor", {"marker": "o", "mfc": HINGE, "mec": "white", "ms": 7}),
+    ):
+        if points:
+            axes.plot(*np.array(points).T, ls="", zorder=5, clip_on=False, label=label, **mark)
+    for point, factor in known.items():
+        text = f"{factor:.3f}".rstrip("0") if factor else f"{point[1]:.4g}"
+        note = axes.annotate(
+            text, point, (-8, 3), textcoords="offset points", fontsize=SMALL, ha="right", zorder=6
+        )
+        note.set_path_effects([withStroke(linewidth=2.0, foreground="white")])

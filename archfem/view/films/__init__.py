@@ -1,0 +1,1 @@
+"""Films and stills of structures that move: the one place that knows pyvista."""

@@ -1,0 +1,186 @@
+"""Films and stills of a structure that moves: how hinges form."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+from tqdm import tqdm
+
+from archfem.arrays import Array
+from archfem.dynamics.history import History
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.joints.resultants import joint_dataset
+from archfem.limit.verified import VerifiedMechanism
+from archfem.models.model import Model
+from archfem.view.films.colours import check_colour
+from archfem.view.films.page import Page
+from archfem.view.films.stage import Setting, Stage
+from archfem.view.films.writer import Image, film_path, write_film
+from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
+
+SMALLEST = (480, 320)
+"""Least width and height of a picture [pixels]: type would not fit into less."""
+
+
+def animate(  # noqa: PLR0913  (what is filmed, and how)
+    model: Model,
+    run: History,
+    path: str | Path,
+    *,
+    magnification: float | None = None,
+    colour: str = "displacement",
+    fps: float = 20.0,
+    seconds: float | None = None,
+    size: tuple[int, int] = (1280, 720),
+    mechanism: VerifiedMechanism | None = None,
+) -> Path:
+    """Film a time history: blocks move, the thrust line wanders, hinges come and go.
+
+    Displacements are magnified. Blocks are coloured by displacement or by least principal
+    stress. A red disc marks a hinge on the face where its blocks stay in contact, and leaves a
+    faint trace; two opposite arrows mark a joint that slides. Below runs the acceleration of the
+    ground. The film is written in one stroke: a killed one leaves the old file or none.
+
+    Args:
+        model: that made the run.
+        run: with fields.
+        path: the film, .mp4 or .gif; folders are made.
+        magnification: of displacements [-]; by default a round number that shows them well.
+        colour: "displacement" or, for blocks that are not rigid, "stress".
+        fps: frames a second, at most; fewer where the run has fewer fields.
+        seconds: how long the film lasts [s]; by default as long as the run.
+        size: width and height, even numbers [pixels].
+        mechanism: as found by `first_verified_mechanism`: from its instant on, the outlines of the
+            blocks that it moves are drawn where it takes them.
+
+    Raises:
+        InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
+    """
+    target = film_path(path)
+    _check_picture(model, colour, magnification, size)
+    _check_run(model, run)
+    frames, fps = _frames(run.dataset["frame_time"].values, fps, seconds)
+    setting = Setting.of(model, run.dataset["q"].values[frames], colour, magnification)
+    return write_film(target, _shots(_with(setting, mechanism), run, frames, size), fps)
+
+
+def picture(
+    model: Model,
+    q: Array,
+    *,
+    magnification: float | None = None,
+    colour: str = "displacement",
+    size: tuple[int, int] = (1280, 720),
+    criteria: Criteria | None = None,
+) -> Image:
+    """Take one picture of a structure at rest or in motion.
+
+    Args:
+        model: what stands.
+        q: coordinates (n,), e.g. of the dead load.
+        magnification: of displacements [-]; by default a round number that shows them well.
+        colour: "displacement" or, for blocks that are not rigid, "stress".
+        size: width and height, even numbers [pixels].
+        criteria: what makes a joint fail; by default the usual ones.
+
+    Returns:
+        The picture (height, width, 3), red, green and blue from 0 to 255.
+
+    Raises:
+        InvalidInput: q is another model's, or an option cannot be meant.
+    """
+    _check_picture(model, colour, magnification, size)
+    _check_size(model, len(q))
+    setting = Setting.of(model, q[None], colour, magnification)
+    joints = joint_dataset(model.structure, model.resultants(q), criteria=criteria)
+    shift = _shift(setting, joint_ends(model), q)
+    page = Page(setting, size)
+    with Stage(setting, page.room) as stage:
+        marks = joint_marks(model.structure, joints, shift=shift)
+        return page.compose(stage.photograph(q, marks, np.zeros((0, 2))), joints)
+
+
+def _with(setting: Setting, mechanism: VerifiedMechanism | None) -> Setting:
+    """Let a mechanism be seen from its instant on."""
+    if mechanism is None or not mechanism.moved.blocks:
+        return setting
+    structure = setting.model.structure
+    outlines = displaced(structure, swung(structure, mechanism.motion))
+    return setting.with_outlines(outlines, mechanism.moved.time or 0.0)
+
+
+def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
+    """Every frame of a film, one after another; on a terminal a bar shows progress."""
+    structure, carriers = setting.model.structure, joint_ends(setting.model)
+    times = run.dataset["frame_time"].values[frames]
+    steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
+    been = _been(run.joints, structure.judged)
+    page = Page(setting, size, run)
+    shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
+    bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
+    with Stage(setting, page.room) as stage:
+        for time, step, q in bar:
+            joints = run.joints.isel(time=int(step))
+            shift = _shift(setting, carriers, q)
+            marks = joint_marks(structure, joints, shift=shift)
+            past = (structure.ends + shift)[been[step]]
+            moving = setting.outlines if time >= setting.since else ()
+            yield page.compose(stage.photograph(q, marks, past, moving), joints)
+
+
+def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
+    """Displacements of the joints' ends, as drawn (n_joints, 2, 2) [m]."""
+    moved = (carriers @ q).reshape(-1, 2, 2) + support_shift(setting.model)
+    return setting.magnification * moved
+
+
+def _been(joints: xr.Dataset, judged: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
+    side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
+    return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
+
+
+def _frames(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
+    """Numbers of the fields to show, and the frames a second that make them last as asked."""
+    for key, value in (("fps", fps), ("seconds", seconds)):
+        if value is not None and not 0.0 < value < 1e4:
+            raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
+    lasting = seconds or max(float(times[-1] - times[0]), 1.0 / fps)
+    count = min(len(times), max(1, round(lasting * fps)))
+    return np.linspace(0, len(times) - 1, count).round().astype(int), count / lasting
+
+
+def _check_picture(
+    model: Model, colour: str, magnification: float | None, size: tuple[int, int]
+) -> None:
+    """Refuse what cannot be drawn."""
+    check_colour(model.cells, colour)
+    if magnification is not None and not 0.0 < magnification < 1e12:
+        raise InvalidInput(f"magnification {magnification:.4g} is not above 0")
+    if len(size) != 2 or any(n % 2 or n < least for n, least in zip(size, SMALLEST, strict=True)):
+        raise InvalidInput(
+            f"size {size}: give an even width and height of at least {SMALLEST} pixels"
+        )
+
+
+def _check_run(model: Model, run: History) -> None:
+    """A run must have fields, and they must be the model's."""
+    if "q" not in run.dataset:
+        raise InvalidInput(
+            "the run has no fields to draw: record them with "
+            "time_history(..., record=Record(fields_every=10))"
+        )
+    _check_size(model, run.dataset.sizes["coordinate"])
+
+
+def _check_size(model: Model, size: int) -> None:
+    """Coordinates must be as many as the model has."""
+    if size != model.size:
+        raise InvalidInput(
+            f"there are {size} coordinates, and the model has {model.size}: give the model, of the "
+            "same cells and degree, that they were computed with"
+        )

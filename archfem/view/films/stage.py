@@ -1,0 +1,282 @@
+"""A structure in front of a camera: moved, photographed, and moved again."""
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from archfem.arrays import Array
+from archfem.masonry.structure import Structure
+from archfem.models.cells import Cells
+from archfem.models.model import Model
+from archfem.view.films.colours import Scale, scale_for, shade
+from archfem.view.films.writer import Image
+from archfem.view.marks import SWING, Marks, support_outlines
+from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
+
+Numbers = NDArray[np.intp]
+
+DISC = 0.0125
+"""Radius of a hinge in a picture, relative to the size of the structure."""
+
+SNUG = 0.3
+"""The same at most, relative to the depth of the shallowest joint that is drawn."""
+
+FULL = 1100.0
+"""Width of a photograph at which lines are as wide as given [pixels]."""
+
+MARGIN = 0.02
+"""Room around the structure, relative to its size."""
+
+TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
+
+REST, EDGES, MOTION, PAST, HALO, LINE, ARROWS, RIMS, HINGES = -1, *range(1, 9)
+"""Layers of a picture, from the blocks upwards."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What stays the same over a whole film.
+
+    Attributes:
+        model: what is filmed.
+        magnification: of its displacements [-].
+        scale: from a number to a colour.
+        low: lower left corner of what is seen (2,) [m].
+        high: upper right corner of what is seen (2,) [m].
+        outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+        since: when they are first shown [s].
+    """
+
+    model: Model
+    magnification: float
+    scale: Scale
+    low: Array
+    high: Array
+    outlines: tuple[Array, ...] = ()
+    since: float = 0.0
+
+    @classmethod
+    def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
+        """Choose a scale, a magnification where none is given, and a view that fits all frames.
+
+        Args:
+            model: what is filmed.
+            fields: coordinates (frames, n).
+            colour: one of `COLOURS`.
+            magnification: of displacements, or None.
+        """
+        cells, structure = model.cells, model.structure
+        moves = np.array([cells.displacement(q) for q in fields])
+        by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
+        still = support_outlines(model, by)
+        moved = cells.places + by * moves
+        points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
+        room = MARGIN * structure.size
+        scale = scale_for(cells, fields, colour)
+        return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
+
+    def with_outlines(self, outlines: list[Array], since: float) -> Self:
+        """The same with outlines, each (k, 2) [m], to be shown from a time on [s]."""
+        points = np.concatenate([[self.low, self.high], *outlines])
+        low, high = points.min(axis=0), points.max(axis=0)
+        return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
+
+
+def _magnification(displacement: float) -> float:
+    """One of 1, 2, 5, 10, … that brings a relative displacement nearest to `SWING`."""
+    if displacement * 1.5 >= SWING or displacement == 0.0:
+        return 1.0
+    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])
+
+
+class Stage:
+    """Blocks, supports and marks before a camera that looks along -z.
+
+    Use it as a context: leaving it frees what VTK holds.
+    """
+
+    def __init__(self, setting: Setting, size: tuple[int, int]) -> None:
+        _go_headless()
+        self._setting = setting
+        cells = setting.model.cells
+        self._pen = max(0.6, size[0] / FULL)
+        self._height = 1e-3 * setting.model.structure.size
+        self._disc = _disc(setting.model.structure)
+        self._blocks = _surface(cells)
+        self._edges = cells.rims
+        self._outlines = _lines(self._flat(cells.places, EDGES), self._edges)
+        self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
+        self._plotter.background_color = pv.Color("white")
+        self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
+        self._paint(np.zeros(setting.model.size))
+        self._plotter.add_mesh(
+            self._blocks,
+            scalars="shade",
+            cmap=setting.scale.shades,
+            clim=(setting.scale.low, setting.scale.high),
+            lighting=False,
+            show_scalar_bar=False,
+        )
+        self._build()
+        self._aim(size)
+
+    def __enter__(self) -> Self:
+        """The stage itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Free the plotter."""
+        self._plotter.close()
+
+    def photograph(
+        self, q: Array, marks: Marks, past: Array, outlines: Sequence[Array] = ()
+    ) -> Image:
+        """Move the structure and take a picture (height, width, 3).
+
+        Args:
+            q: coordinates (n,).
+            marks: of the joints, as moved.
+            past: where hinges have been, as moved (n, 2) [m].
+            outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+        """
+        setting, cells = self._setting, self._setting.model.cells
+        places = cells.places + setting.magnification * cells.displacement(q)
+        self._blocks.points = self._flat(places, 0)
+        self._outlines.points = self._flat(places, EDGES)
+        self._paint(q)
+        pairs = np.arange(2 * len(marks.links)).reshape(-1, 2)
+        for name, layer in (("halo", HALO), ("thrust", LINE)):
+            points = self._flat(marks.links.reshape(-1, 2), layer)
+            self._meshes[name].dataset = _lines(points, pairs)
+        dots = marks.thrust[np.isfinite(marks.thrust[:, 0])]
+        self._meshes["dots"].dataset = self._discs(dots, LINE, 0.35)
+        self._meshes["motion"].dataset = self._loops(outlines)
+        self._meshes["past"].dataset = self._discs(past, PAST, 1.0)
+        self._meshes["slips"].dataset = self._polygons(marks.slips, ARROWS)
+        self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
+        self._meshes["hinges"].dataset = self._discs(marks.hinges, HINGES, 1.0)
+        self._plotter.render()
+        return np.asarray(self._plotter.screenshot(return_img=True), dtype=np.uint8)
+
+    def _build(self) -> None:
+        """Put everything on the stage, marks still empty."""
+        for outline in support_outlines(self._setting.model, self._setting.magnification):
+            self._add(self._polygons(outline[None], 0), SUPPORT)
+            around = np.arange(len(outline))
+            edges = np.column_stack([around, np.roll(around, -1)])
+            self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
+        rest = _lines(self._flat(self._setting.model.cells.places, REST), self._edges)
+        self._add(rest, GHOST)
+        self._add(self._outlines, EDGE, 1.5)
+        self._meshes = {
+            "motion": self._add(pv.PolyData(), MOVED, 3.0),
+            "past": self._add(pv.PolyData(), HINGE, opacity=0.3),
+            "halo": self._add(pv.PolyData(), "white", 6.0),
+            "thrust": self._add(pv.PolyData(), THRUST, 3.0),
+            "dots": self._add(pv.PolyData(), THRUST),
+            "slips": self._add(pv.PolyData(), SLIP),
+            "rims": self._add(pv.PolyData(), "white"),
+            "hinges": self._add(pv.PolyData(), HINGE),
+        }
+
+    def _paint(self, q: Array) -> None:
+        """Give the blocks the values by which they are coloured."""
+        scale = self._setting.scale
+        shades = shade(self._setting.model.cells, q, scale.colour)
+        if scale.colour == "stress":
+            self._blocks.cell_data["shade"] = shades[self._blocks.cell_data["cell"]]
+        else:
+            self._blocks.point_data["shade"] = shades
+
+    def _add(
+        self, mesh: pv.PolyData, colour: str, width: float = 1.0, opacity: float = 1.0
+    ) -> pv.DataSetMapper:
+        """Add a mesh, which may be empty, in one flat colour."""
+        mapper = pv.DataSetMapper(mesh)
+        actor = pv.Actor(mapper=mapper)
+        actor.prop.color, actor.prop.opacity = colour, opacity
+        actor.prop.line_width, actor.prop.lighting = width * self._pen, False
+        self._plotter.add_actor(actor, render=False)
+        return mapper
+
+    def _aim(self, size: tuple[int, int]) -> None:
+        """Look at all of the view, from the front, without perspective."""
+        low, high = self._setting.low, self._setting.high
+        middle, extent = 0.5 * (low + high), high - low
+        camera = self._plotter.camera
+        camera.focal_point = (*middle, 0.0)
+        camera.position = (*middle, 2.0 * self._setting.model.structure.size)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_projection = True
+        camera.parallel_scale = 0.5 * max(extent[1], extent[0] * size[1] / size[0])
+        self._plotter.reset_camera_clipping_range()
+
+    def _flat(self, points: Array, layer: float) -> Array:
+        """Points of the plane, in a layer of the picture (n, 3) [m]."""
+        return np.column_stack([points, np.full(len(points), layer * self._height)])
+
+    def _polygons(self, outlines: Array, layer: float) -> pv.PolyData:
+        """Polygons of equally many corners (n, corners, 2)."""
+        if not len(outlines):
+            return pv.PolyData()
+        count, corners = outlines.shape[:2]
+        numbers = np.arange(count * corners).reshape(count, corners)
+        faces = np.insert(numbers, 0, corners, axis=1).ravel()
+        return pv.PolyData(self._flat(outlines.reshape(-1, 2), layer), faces=faces).triangulate()
+
+    def _loops(self, outlines: Sequence[Array]) -> pv.PolyData:
+        """Closed lines, each (k, 2) [m]."""
+        if not outlines:
+            return pv.PolyData()
+        starts = np.cumsum([0, *map(len, outlines)])
+        pairs = [
+            np.column_stack([np.arange(a, b), np.roll(np.arange(a, b), -1)])
+            for a, b in pairwise(starts)
+        ]
+        return _lines(self._flat(np.concatenate(outlines), MOTION), np.concatenate(pairs))
+
+    def _discs(self, centres: Array, layer: float, size: float) -> pv.PolyData:
+        """Discs about points (n, 2), of a size relative to a hinge's."""
+        return self._polygons(centres[:, None] + size * self._disc * CIRCLE, layer)
+
+
+def _disc(structure: Structure) -> float:
+    """Radius of a hinge [m]."""
+    depths = structure.depths[structure.judged]
+    return min(DISC * structure.size, SNUG * float(depths.min()))
+
+
+def _go_headless() -> None:
+    """Let VTK draw without a display where there is none."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def _surface(cells: Cells) -> pv.PolyData:
+    """The blocks' cells, cut into triangles that know the number of their cell."""
+    listed = np.concatenate([[len(cell), *cell] for cell in cells.polygons])
+    places = np.column_stack([cells.places, np.zeros(len(cells.places))])
+    surface = pv.PolyData(places, faces=listed)
+    surface.cell_data["cell"] = np.arange(len(cells.polygons))
+    return surface.triangulate()
+
+
+def _lines(points: Array, pairs: Numbers) -> pv.PolyData:
+    """Straight lines between pairs of points (n, 3)."""
+    twos = np.full(len(pairs), 2)
+    return pv.PolyData(points, lines=np.column_stack([twos, pairs]).ravel())

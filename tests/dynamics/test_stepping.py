@@ -1,0 +1,128 @@
+"""The stepper and its loop, apart from the strategies that archfem has."""
+
+import os
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numba.extending import overload
+
+from archfem.dynamics.ladder import build
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.loop import advance, begin, forget_stale, measure, settle
+from archfem.dynamics.stepping.stepper import BATCH, Stepper
+from archfem.dynamics.time_history import time_history
+from archfem.masonry.shapes import column
+from archfem.motion.motion import Motion
+
+GRAVITY = 9.81
+FRICTION = 0.5
+
+
+class SlidingSystem(NamedTuple):
+    """A block that slides on the ground, whose joint remembers how far it has slid."""
+
+    mass: float
+    dt: float
+    slid: np.ndarray
+
+
+class Sliding:
+    """Coulomb's friction: neither linear nor elastic, and with one coordinate instead of three."""
+
+    name = "sliding"
+    setup = 0.0
+
+    def __init__(self, equation):
+        self.mass = equation.model.mass[0, 0]
+        self.slid = np.zeros(1)
+
+    @classmethod
+    def of(cls, equation):
+        return cls(equation)
+
+    def enter(self, vectors):
+        return vectors[:, :1]
+
+    def leave(self, vectors):
+        return np.hstack([vectors, np.zeros((3, 2))])
+
+    def system(self, dt):
+        return SlidingSystem(self.mass, dt, self.slid)
+
+
+def slides(system):
+    return getattr(system, "instance_class", None) is SlidingSystem
+
+
+@overload(begin)
+def _begin(system, state):
+    if slides(system):
+        return lambda system, state: np.zeros(1)  # the friction that acts
+
+
+@overload(settle)
+def _settle(system, kept, step, states, ground):
+    if slides(system):
+
+        def slide(system, kept, step, states, ground):
+            (before, after), dt = states, system.dt
+            free = before[1, 0] - dt * ground[0]
+            after[1, 0] = np.sign(free) * max(abs(free) - FRICTION * GRAVITY * dt, 0.0)
+            moved = 0.5 * dt * (before[1, 0] + after[1, 0])
+            after[0, 0] = before[0, 0] + moved
+            after[2, 0] = (after[1, 0] - before[1, 0]) / dt
+            kept[0] = -system.mass * (after[2, 0] + ground[0])
+            system.slid[0] += abs(moved)
+            return 1
+
+        return slide
+
+
+@overload(measure)
+def _measure(system, kept, step, states, ground, resultants, energy):
+    if slides(system):
+
+        def measured(system, kept, step, states, ground, resultants, energy):
+            moved = states[1, 0, 0] - states[0, 0, 0]
+            resultants[0, 0] = system.mass * GRAVITY
+            resultants[0, 1] = kept[0]
+            energy[1] = 0.0
+            energy[0] = 0.5 * system.mass * states[1, 1, 0] ** 2
+            energy[2] = -system.mass * ground[0] * moved
+            energy[3] = kept[0] * moved
+
+        return measured
+
+
+def test_a_strategy_with_memory_and_friction_is_stepped_by_the_same_loop():
+    """Newmark's block: a pulse a for a time t slides it by ½ (a - μ g) t² a/(μ g)."""
+    model = build(column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    dt, pulse, lasts = 1e-4, 0.8 * GRAVITY, 0.3
+    ground = np.where(np.arange(10_001) * dt < lasts, -pulse, 0.0)
+    equation = Equation(model, Motion(ground, dt))
+    sliding = Sliding.of(equation)
+    loop = numba.njit(advance.py_func)  # not kept: this file may change
+    stepper = Stepper(equation, sliding, advance=loop)
+    run = time_history(model, equation.motion, dt=dt, method=stepper)
+    over = pulse - FRICTION * GRAVITY
+    slid = 0.5 * over * lasts**2 * pulse / (FRICTION * GRAVITY)
+    assert len(run.time) > 10 * BATCH
+    assert run.dataset.attrs["method"] == "sliding"
+    assert run.dataset["last_q"].values[0] == pytest.approx(slid, rel=1e-3)
+    assert sliding.slid[0] == pytest.approx(slid, rel=1e-3)
+    assert np.abs(run.joints["V"]).max() <= FRICTION * run.joints["N"].max() * (1.0 + 1e-9)
+    lost = FRICTION * sliding.mass * GRAVITY * slid
+    assert abs(run.dataset["energy_drift"].values[-1]) < 0.01 * lost
+
+
+def test_compiled_code_older_than_any_source_is_forgotten(tmp_path):
+    cache = tmp_path / "__pycache__"
+    cache.mkdir()
+    old, young, other = cache / "loop.nbi", cache / "band.1.nbc", cache / "loop.pyc"
+    for path, when in ((old, 1.0), (tmp_path / "modal.py", 2.0), (young, 3.0), (other, 1.0)):
+        path.touch()
+        os.utime(path, (when, when))
+    forget_stale(tmp_path)
+    assert sorted(cache.iterdir()) == [young, other]

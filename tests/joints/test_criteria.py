@@ -1,0 +1,233 @@
+"""Resultants and criteria on joints whose state is known by construction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from archfem.cases.summary import joint_table
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import (
+    Criteria,
+    envelope,
+    failed,
+    first_time,
+    flagged,
+    judged,
+    longest_duration,
+)
+from archfem.joints.resultants import joint_dataset, thrust_line
+from archfem.limit.counted import counted_mechanism, counted_mechanisms
+from archfem.limit.verified import verified_mechanism
+from archfem.masonry.materials import STONE_TO_STONE
+from archfem.masonry.roles import judged_parts
+from archfem.masonry.shapes import column
+
+DEPTH = 0.55
+
+
+@pytest.fixture
+def joints(ring):
+    """Five steps: joint 3 hinges at the intrados, 7 slides, 11 opens, at different times."""
+    resultants = np.zeros((5, 18, 3))
+    resultants[..., 0] = 1000.0
+    resultants[1:3, 3, 2] = -0.48 * 1000.0 * DEPTH
+    resultants[2:, 7, 1] = -700.0
+    resultants[2, 11] = 0.0
+    resultants[2, 14, 2] = 0.47 * 1000.0 * DEPTH
+    resultants[4, 14, 2] = 0.45 * 1000.0 * DEPTH
+    return joint_dataset(ring, resultants, np.arange(5) * 0.1)
+
+
+def test_eccentricity_and_friction(joints):
+    assert float(joints["eccentricity"][1, 3]) == pytest.approx(-0.48)
+    assert float(joints["friction"][2, 7]) == pytest.approx(0.7)
+    assert np.isnan(joints["eccentricity"][2, 11])
+    assert np.isnan(joints["friction"][2, 11])
+    assert joints["N"].attrs["units"] == "N"
+
+
+def test_flags(joints):
+    assert joints["hinge"][1, 3] == -1
+    assert joints["hinge"][2, 14] == 1
+    assert joints["hinge"][4, 14] == 0
+    assert joints["slide"].sum() == 3
+    assert joints["open"].sum() == 1
+    assert joints["judged"].all()
+    assert [joints[name].dtype for name in ("hinge", "slide", "open")] == [np.int8, bool, bool]
+    assert failed(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-9, 1.0, 1.0 + 1e-9])
+def test_friction_at_its_limit_is_used_up_whatever_the_round_off(ring, share):
+    normal = 1000.0 * 1.1 ** np.arange(18)  # V / N is then μ only to a few digits of the last
+    resultants = np.stack([normal, 0.6 * share * normal, np.zeros(18)], axis=1)
+    assert joint_dataset(ring, resultants)["slide"].all()
+    resultants[:, 1] *= 1.0 - 1e-5
+    assert not joint_dataset(ring, resultants)["slide"].any()
+
+
+def test_a_joint_without_friction_slides_either_way():
+    """A plain stack on a frictionless bed: nothing but the bed lets it move."""
+    slippery = replace(STONE_TO_STONE, friction=0.0)
+    stack = column(breadth=1.0, heights=[1.0], contact=slippery)
+    joints = joint_dataset(stack, np.array([[1000.0, 0.0, 0.0]]))
+    assert verified_mechanism(stack, joints).moved.blocks == (1,)
+
+
+def test_first_times_and_durations(joints):
+    first, longest = first_time(joints["slide"]), longest_duration(joints["slide"])
+    assert float(first[7]) == pytest.approx(0.2)
+    assert float(longest[7]) == pytest.approx(0.3)
+    assert np.isnan(first[0])
+    assert float(longest[0]) == 0.0
+    assert float(longest_duration(joints["hinge"] != 0)[3]) == pytest.approx(0.2)
+
+
+def test_envelope(joints):
+    span = envelope(joints)
+    assert float(span["lowest"][3]) == pytest.approx(-0.48)
+    assert float(span["highest"][14]) == pytest.approx(0.47)
+    assert float(span["highest"][11]) == 0.0
+
+
+def test_mechanism_needs_four_joints_at_once(joints):
+    found = counted_mechanism(joints)
+    assert found.time == pytest.approx(0.2)
+    assert found.joints == (3, 7, 11, 14)
+    assert counted_mechanism(joints.isel(time=[0, 1, 3, 4])) is None
+
+
+def test_thrust_line_passes_the_faces_at_half(ring):
+    resultants = np.zeros((18, 3))
+    resultants[:, 0] = 1.0
+    resultants[:9, 2], resultants[9:, 2] = 0.5 * DEPTH, -0.5 * DEPTH
+    resultants[5] = 0.0
+    line = thrust_line(ring, joint_dataset(ring, resultants)).values
+    radii = np.hypot(*line.T)
+    assert radii[:5] == pytest.approx(2.95 + DEPTH / 2)
+    assert radii[9:] == pytest.approx(2.95 - DEPTH / 2)
+    assert np.isnan(line[5]).all()
+
+
+def test_table_says_when_and_how_long(joints):
+    lines = joint_table(joints).splitlines()
+    assert len(lines) == 19
+    assert lines[8].split()[8:12] == ["0.200", "s", "0.300", "s"]
+    assert lines[1].split()[-6:] == ["-"] * 6
+
+
+PARTS = ["arch 1"] * 5 + ["pier 1"] * 4 + ["arch 2"] * 5 + ["backfill"] * 6
+ROLES = ["ring"] * 5 + ["pier"] * 4 + ["ring"] * 5 + ["other"] * 6
+
+
+def joints_of(failing):
+    """Twenty joints of two rings, a pier and soil; those failing at each instant slide."""
+    friction = np.zeros((len(failing), 20))
+    for instant, joints in enumerate(failing):
+        friction[instant, list(joints)] = 0.6
+    joints = xr.Dataset(
+        {
+            "N": (("time", "joint"), np.ones_like(friction)),
+            "eccentricity": (("time", "joint"), np.zeros_like(friction)),
+            "friction": (("time", "joint"), friction),
+        },
+        {
+            "time": np.arange(len(failing), dtype=float),
+            "joint": np.arange(20),
+            "part": ("joint", PARTS),
+            "role": ("joint", ROLES),
+            "friction_limit": ("joint", np.full(20, 0.6)),
+        },
+    )
+    return flagged(joints)
+
+
+def test_definitions_of_a_counted_mechanism():
+    soil, three = range(14, 20), {0, 1, 9}
+    states = [soil, three | set(soil), three | {10}, {0, 5, 6, 7}, {0, 5, 6, 9}, {1, 2, 3, 4, 5}]
+    found = counted_mechanisms(joints_of(states))
+    anywhere, ring, mixed = found.values()
+    assert list(found) == ["any four joints", "four in a ring", "ring and pier"]
+    assert (anywhere.time, anywhere.kind, anywhere.joints) == (2.0, "global", (0, 1, 9, 10))
+    assert (mixed.time, mixed.part, mixed.joints) == (3.0, "arch 1 + pier 1", (0, 5, 6, 7))
+    assert (ring.time, ring.kind, ring.joints) == (5.0, "local", (1, 2, 3, 4))
+    assert (ring.part, mixed.kind) == ("arch 1", "semi-global")
+
+
+def test_four_in_a_pier_are_no_four_in_a_ring():
+    found = counted_mechanisms(joints_of([{5, 6, 7, 8}]))
+    assert found["any four joints"].kind == "local"
+    assert found["four in a ring"] is None
+    assert found["ring and pier"] is None  # no joint of a ring
+
+
+def test_four_of_two_rings_and_a_pier_are_of_no_pair():
+    found = counted_mechanisms(joints_of([{0, 5, 9, 10}]))
+    assert found["any four joints"].kind == "global"
+    assert found["ring and pier"] is None
+
+
+def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
+    joints = joints_of([{0}])
+    assert judged(joints)["joint"].values.tolist() == list(range(14))
+    turned = judged(joints.isel(joint=slice(None, None, -1)))
+    assert turned["joint"].values.tolist() == list(range(13, -1, -1))
+    soil = flagged(joints.isel(joint=slice(14, None)), Criteria())
+    assert judged(soil).identical(soil)  # there is nothing else to judge
+    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
+    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
+
+
+def test_a_wall_by_itself_is_counted():
+    joints = joints_of([{14, 15, 16, 17}]).isel(joint=slice(14, None))
+    found = counted_mechanism(joints)
+    assert (found.kind, found.part) == ("local", "backfill")
+
+
+def test_table_holds_judged_joints_only():
+    names = [f"joint {k}" for k in range(20)]
+    joints = joints_of([{0}, {15}]).assign_coords(name=("joint", names))
+    lines = joint_table(joints, joints.isel(time=0)).splitlines()
+    assert len(lines) == 15
+    assert "joint 15" not in "".join(lines)
+
+
+def test_limits_are_those_of_the_criteria(joints):
+    wide = flagged(joints, Criteria(hinge=0.475))
+    assert wide["hinge"][1, 3] == -1
+    assert wide["hinge"][2, 14] == 0  # at 0.47
+    assert counted_mechanism(wide) is None
+    assert counted_mechanism(joints, Criteria(failures=5)) is None
+    assert counted_mechanism(joints, Criteria(hinge=0.475, failures=3)).joints == (3, 7, 11)
+
+
+def test_friction_of_the_criteria_stands_for_that_of_every_joint(joints):
+    assert flagged(joints, Criteria(friction=0.75))["slide"].sum() == 0
+    assert flagged(joints, Criteria(friction=0.7))["slide"].sum() == 3
+    assert flagged(joints, Criteria(friction=0.0))["slide"].sum() == 5 * 18 - 1  # one is open
+
+
+def test_joints_tell_by_which_criteria_they_were_judged(joints):
+    ours = Criteria(hinge=0.4, failures=3, friction=0.5)
+    judged_so = flagged(joints, ours)
+    assert Criteria.of(judged_so) == Criteria.of(judged_so.isel(time=2)) == ours
+    assert flagged(judged_so) is judged_so
+    again = flagged(judged_so, Criteria())
+    assert again.identical(joints)
+    assert "criteria_friction" not in again.attrs
+
+
+@pytest.mark.parametrize("hinge", [0.0, -0.46, 0.51, np.nan, np.inf, "0.46", None, True])
+def test_a_hinge_lies_within_its_joint(hinge):
+    with pytest.raises(InvalidInput, match="criteria hinge"):
+        Criteria(hinge=hinge)
+
+
+@pytest.mark.parametrize(
+    "given", [{"failures": 0}, {"failures": 4.0}, {"friction": -0.1}, {"friction": "none"}]
+)
+def test_criteria_that_cannot_be_meant(given):
+    with pytest.raises(InvalidInput, match=f"criteria {next(iter(given))}"):
+        Criteria(**given)

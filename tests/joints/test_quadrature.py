@@ -1,0 +1,45 @@
+"""Rules along a joint: what they integrate exactly, and where their points are."""
+
+import numpy as np
+import pytest
+
+from archfem.errors import InvalidInput
+from archfem.joints.quadrature import Quadrature
+
+BREAKS = np.array([-0.3, -0.1, 0.05, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("rule", "points", "exact"),
+    [("lobatto", 2, 1), ("lobatto", 3, 3), ("lobatto", 4, 5), ("gauss", 2, 3), ("gauss", 3, 5)],
+)
+def test_polynomials_are_integrated_exactly_up_to_the_degree(rule, points, exact):
+    x, w = Quadrature(rule, points).on_joint(BREAKS)
+    for degree in range(exact + 2):
+        integral = (0.3 ** (degree + 1) - (-0.3) ** (degree + 1)) / (degree + 1)
+        error = abs(w @ x**degree - integral)
+        assert (error < 1e-15) == (degree <= exact or (degree % 2 == 1 and error < 1e-15))
+
+
+def test_shared_points_are_given_once():
+    assert len(Quadrature().on_joint(BREAKS)[0]) == 7
+    assert len(Quadrature("nodal").on_joint(np.linspace(0, 1, 5))[0]) == 5  # the paper's springs
+    assert len(Quadrature("gauss").on_joint(BREAKS)[0]) == 9
+
+
+def test_lobatto_has_points_at_the_ends_and_gauss_has_not():
+    assert Quadrature("lobatto", 5).on_joint(BREAKS)[0][[0, -1]] == pytest.approx([-0.3, 0.3])
+    assert Quadrature("gauss").on_joint(BREAKS)[0][0] > -0.3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("simpson",), "'simpson' is not known"),
+        (("nodal", 4), "leave points out"),
+        (("lobatto", 1), "1 lobatto points"),
+    ],
+)
+def test_refusals(arguments, says):
+    with pytest.raises(InvalidInput, match=says):
+        Quadrature(*arguments)

@@ -1,0 +1,46 @@
+"""Joints and blocks found by name: in lists, and in case files before anything is run."""
+
+from pathlib import Path
+
+import pytest
+
+from archfem.cases.case import Case
+from archfem.errors import InvalidInput
+from archfem.masonry.naming import number_of
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
+
+
+def test_by_name_and_by_number():
+    assert number_of("joint", NAMES, "main arch, joint 5") == 2
+    assert number_of("joint", NAMES, 2) == 2
+
+
+@pytest.mark.parametrize(
+    ("joint", "says"),
+    [
+        ("main arhc, joint 5", "did you mean 'main arch, joint 5'"),
+        ("base of the north pier", "did you mean 'north pier, base'"),
+        ("", "did you mean"),
+        (3, "from 0 to 2, or a name such as 'north pier, base'"),
+        (-1, "there is no joint -1"),
+    ],
+)
+def test_near_misses(joint, says):
+    with pytest.raises(InvalidInput, match=says):
+        number_of("joint", NAMES, joint)
+
+
+def test_a_case_names_joints_or_numbers_them():
+    assert Case.read(RING, ['output.joints=["joint 5", 7]']).joints == (5, 7)
+    assert Case.read(RING, ["output.joints=[]"]).joints == ()
+
+
+@pytest.mark.parametrize(
+    ("joints", "says"),
+    [('["jint 5"]', "did you mean 'joint 5'"), ("[18]", "no joint 18"), ("[2.5]", "a word")],
+)
+def test_a_case_refuses_joints_that_are_not_there(joints, says):
+    with pytest.raises(InvalidInput, match=says):
+        Case.read(RING, [f"output.joints={joints}"])

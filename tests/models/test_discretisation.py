@@ -1,0 +1,72 @@
+"""What a structure is modelled by: said once, checked when said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.cases.case import Case
+from archfem.errors import InvalidInput
+from archfem.joints.quadrature import Quadrature
+from archfem.models.discretisation import FIDELITIES, RUNGS, Discretisation
+
+BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"fidelity": "exact"}, "fidelity 'exact' is not known: use one of .*'rigid'.*'auto'"),
+        ({"fidelity": 3}, "fidelity 3 is not known"),
+        ({"fidelity": ["full"]}, "is not known"),
+        ({"fidelity": "modal"}, "'modal' is no longer known, for 'faces' is faster.*'rigid'"),
+        ({"fidelity": {"rest": "modal"}}, r"rungs \['modal'\] are not known: use some of"),
+        ({"fidelity": {"rest": "monolithic"}}, r"rungs \['monolithic'\] are not known"),
+        ({"cells": 4}, "cells through the thickness and along each block = 4 is not a row"),
+        ({"cells": (4, 4, 4)}, r"= \(4, 4, 4\) has 3 values"),
+        ({"cells": "44"}, "= '44' is not a row of values"),
+        ({"cells": (0, 4)}, "cells through = 0 is not a whole number"),
+        ({"cells": (2.5, 4)}, "cells through = 2.5"),
+        ({"cells": (4, 2.5)}, "cells along = 2.5"),
+        ({"cells": (4, 1001)}, "cells along = 1001"),
+        ({"cell": "hexagon"}, "cell 'hexagon' is not known"),
+        ({"coarse": 0.0}, "coarse = 0.0 m: give a length above 0"),
+        ({"coarse": float("nan")}, "coarse \\[m\\] = nan"),
+        ({"degree": 3}, "degree 3: elements are of degree 1 or 2"),
+        ({"quadrature": "simpson"}, "quadrature 'simpson' is not known"),
+        ({"quadrature": "gauss", "points": 0}, "quadrature points = 0 is not a whole number"),
+        ({"quadrature": "nodal", "points": 3}, "nodal quadrature has points of its own"),
+        ({"quadrature": "exact", "degree": 2}, "linear along a facet"),
+        ({"quadrature": "exact", "fidelity": "monolithic"}, "linear along a facet"),
+    ],
+)
+def test_refusals(ring, given, says):
+    """Both where it is made and by the keywords of `build`, before anything is meshed."""
+    with pytest.raises(InvalidInput, match=says):
+        Discretisation(**given)
+    with pytest.raises(InvalidInput, match=says):
+        af.build(ring, **given)
+
+
+def test_what_is_asked_is_kept():
+    asked = Discretisation("faces", [2, np.int64(3)], quadrature="gauss", points=2)
+    assert asked.cells == (asked.through, asked.along) == (2, 3)
+    assert asked.rule == Quadrature("gauss", 2)
+    assert asked == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
+    assert [Discretisation(fidelity).name for fidelity in FIDELITIES] == list(FIDELITIES)
+    mixed = Discretisation({"backfill": "full", "rest": "faces"})
+    assert mixed.name == "backfill: full, rest: faces"
+    assert set(RUNGS) < set(FIDELITIES)
+
+
+def test_a_case_says_it():
+    changes = ["model={ fidelity = 'faces', cells = [2, 3], coarse = '50 cm', tolerance = 0.01 }"]
+    asked = Case.read(BRIDGE, changes).discretisation
+    assert asked == Discretisation("faces", (2, 3), coarse=0.5)
+
+
+def test_a_case_that_leaves_the_choice_may_still_say_its_mesh():
+    case = Case.read(BRIDGE, ["model.cells=[2, 2]"])
+    assert case.model["fidelity"] == "auto"
+    assert case.discretisation == Discretisation(cells=(2, 2))

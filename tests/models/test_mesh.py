@@ -1,0 +1,347 @@
+"""Meshes: what they cover, their files, and what is refused."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import meshio
+import numpy as np
+import pytest
+
+from archfem.errors import InvalidInput, MeshError
+from archfem.joints.quadrature import Quadrature
+from archfem.masonry.assembly import assembled
+from archfem.masonry.materials import STONE, STONE_TO_STONE
+from archfem.masonry.shapes import (
+    Arch,
+    Backfill,
+    Paving,
+    Pier,
+    Sidewall,
+    bridge,
+    circular_arch,
+)
+from archfem.masonry.structure import Block
+from archfem.models.discretisation import Discretisation
+from archfem.models.fem.division import divided
+from archfem.models.fem.mesh import mesh, read_mesh, write_mesh
+from archfem.models.fem.space import broken_space
+from archfem.models.full import full
+from archfem.statics.equilibrium import dead_load
+from archfem.statics.newton import Newton
+
+
+@pytest.mark.parametrize(
+    ("meshing", "cells", "facets"),
+    [
+        (Discretisation(), 17 * 16 + 2 * 4, 18 * 4),
+        (Discretisation(cells=(2, 3)), 17 * 6 + 2 * 2, 18 * 2),
+        (Discretisation(cells=(2, 3), cell="triangle"), 2 * (17 * 6 + 2 * 2), 18 * 2),
+    ],
+)
+def test_numbers_of_cells_and_joint_facets(ring, meshing, cells, facets):
+    made = mesh(ring, meshing)
+    assert len(made.blocks) == cells
+    assert np.bincount(made.joints[1]).tolist() == [facets // 18] * 18
+
+
+def test_nodes_lie_on_the_circle(ring):
+    """Four cells along a sector follow it by four chords: 1 - sin(φ/4)/(φ/4) is lost in weight."""
+    model = full(broken_space(mesh(ring)), Quadrature())
+    turn = np.radians(159.0) / 17 / 4
+    weight = model.body[:, 1].sum() * ring.gravity
+    assert weight / ring.weight == pytest.approx(np.sin(turn) / turn, rel=1e-10)
+
+
+def test_a_chorded_ring_keeps_its_own_weight():
+    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=2)
+    model = full(broken_space(mesh(ring, Discretisation(cells=(2, 6)))), Quadrature())
+    assert model.body[:, 1].sum() * ring.gravity == pytest.approx(ring.weight, rel=1e-10)
+
+
+def test_file_and_back(ring, tmp_path):
+    path = tmp_path / "ring.msh"
+    write_mesh(ring, path, Discretisation(cells=(2, 2)))
+    again, fresh = read_mesh(ring, path), mesh(ring, Discretisation(cells=(2, 2)))
+    assert np.array_equal(np.bincount(again.blocks), np.bincount(fresh.blocks))
+    assert np.array_equal(np.bincount(again.joints[1]), np.bincount(fresh.joints[1]))
+    outside = meshio.read(path)
+    assert set(outside.field_data) >= {"voussoir 9", "joint 8", "left abutment"}
+    assert outside.field_data["joint 8"].tolist() == [9, 1]
+
+
+def test_an_unstructured_block_conforms_to_its_neighbours(stack):
+    """A block without corners is meshed freely, with the nodes of the joints it shares."""
+    top = stack.blocks[2]
+    free = Block((*top.outline, (0.0, 2.5)), top.material, top.name, part=top.part)
+    made = mesh(
+        replace(stack, blocks=(*stack.blocks[:2], free)),
+        Discretisation(cells=(4, 4), cell="triangle"),
+    )
+    assert np.bincount(made.joints[1]).tolist() == [4, 4]
+    weight = full(broken_space(made), Quadrature()).body[:, 1].sum() * 9.81
+    assert weight == pytest.approx(20e3 * 2.25, rel=1e-10)
+
+
+def test_the_mesh_of_another_structure_is_refused(ring, stack, tmp_path):
+    path = tmp_path / "ring.msh"
+    write_mesh(ring, path, Discretisation(cells=(1, 1)))
+    with pytest.raises(MeshError, match="of another structure"):
+        read_mesh(stack, path)
+    narrower = circular_arch(radius=2.95, thickness=0.50, embrace=159.0, voussoirs=17)
+    with pytest.raises(MeshError, match="facets cover"):
+        read_mesh(narrower, path)
+
+
+def test_a_file_that_is_not_there(ring):
+    with pytest.raises(InvalidInput, match=r"no mesh file none\.msh"):
+        read_mesh(ring, "none.msh")
+
+
+def test_a_face_of_several_chords_gets_a_cell_for_each():
+    ring = circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
+    assert len(mesh(ring, Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2
+
+
+def test_a_file_that_is_no_mesh(stack, tmp_path):
+    path = tmp_path / "bad.msh"
+    path.write_text("not a mesh")
+    with pytest.raises(MeshError):
+        read_mesh(stack, path)
+
+
+def viaduct(**parts):
+    """Two spans with fill, piers and sidewalls that rise above the springing."""
+    return bridge(
+        arches=[
+            Arch(span=4.0, embrace=150.0, thickness=0.5, voussoirs=9, name="left arch"),
+            Arch(span=5.0, embrace=140.0, thickness=0.5, voussoirs=11, name="right arch"),
+        ],
+        piers=[Pier(gap=1.2, height=1.0, name="pier")],
+        sidewalls=[
+            Sidewall(length=2.0, height=1.0, name="left wall"),
+            Sidewall(length=6.0, height=1.0, above=0.8, setback=0.1, name="right wall"),
+        ],
+        backfill=Backfill(cover=0.4),
+        **parts,
+    )
+
+
+def one_arch(**parts):
+    """One span between fixed abutments, with fill that ends in wedges on the springings."""
+    ring = Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
+    return bridge(arches=[ring], backfill=Backfill(cover=0.3), **parts)
+
+
+def scaled_jacobians(made):
+    """Least scaled Jacobian of each cell: 1 for squares and equilateral triangles, 0 for lines."""
+    cells = full(broken_space(made), Quadrature()).cells
+    points = cells.places[np.array(cells.polygons)]
+    ahead = np.roll(points, -1, axis=1) - points
+    behind = np.roll(ahead, 1, axis=1)
+    turn = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
+    sine = turn / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
+    best = 1.0 if points.shape[1] == 4 else np.sqrt(3.0) / 2.0
+    return sine.min(axis=1) / best
+
+
+@pytest.mark.parametrize("make", [viaduct, one_arch])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
+def test_meshes_of_bridges_are_sound(make, cell, count):
+    """Sharp wedges and strips between stones included; slender triangles lie in slender stones."""
+    structure = make(paving=Paving(thickness=0.2))
+    made = mesh(structure, Discretisation(cells=(count, count), cell=cell))
+    quality = scaled_jacobians(made)
+    stones = [b.corners is not None for b in structure.blocks]
+    stones = np.array(stones)[made.blocks[np.isin(made.blocks, structure.free)]]
+    assert quality[~stones].min() > 0.15
+    assert quality.min() > (0.15 if cell == "quadrilateral" else 0.05)
+
+
+def outer_edges(cells, places):
+    """Edges that only one cell has, as pairs of places (e, 2)."""
+    own = places[np.array(cells.polygons)]
+    pairs = np.sort(np.stack([own, np.roll(own, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, times = np.unique(pairs, axis=0, return_counts=True)
+    assert times.max() == 2
+    return edges[times == 1]
+
+
+@pytest.mark.parametrize("make", [viaduct, one_arch])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_cells_of_touching_blocks_meet(make, cell):
+    """Patch test, all of stone and stuck together: a uniform strain needs forces at the rim alone.
+
+    The rim, edges of one cell, is as long as the blocks' outlines less twice the joints.
+    """
+    structure = make()
+    blocks = tuple(replace(block, material=STONE) for block in structure.blocks)
+    structure = replace(structure, blocks=blocks)
+    model = full(
+        broken_space(mesh(structure, Discretisation(cells=(3, 4), cell=cell))), Quadrature()
+    )
+    points, places = np.unique(model.cells.places.round(9), axis=0, return_inverse=True)
+    rim = outer_edges(model.cells, places.ravel())
+    length = np.linalg.norm(points[rim[:, 0]] - points[rim[:, 1]], axis=1).sum()
+    free = set(structure.free)
+    outlines = [structure.blocks[number].points for number in free]
+    around = sum(np.linalg.norm(np.roll(p, 1, axis=0) - p, axis=1).sum() for p in outlines)
+    inner = sum(joint.depth for joint in structure.joints if free.issuperset(joint.blocks))
+    assert length == pytest.approx(around - 2.0 * inner, rel=1e-9)
+    stretched = model.cells.places @ np.array([[1e-3, 2e-4], [-5e-4, 3e-4]])
+    forces = np.zeros((len(points), 2))
+    np.add.at(forces, places.ravel(), (model.blocks @ stretched.ravel()).reshape(-1, 2))
+    inside = np.setdiff1d(np.arange(len(points)), rim)
+    assert np.abs(forces[inside]).max() < 1e-9 * np.abs(forces).max()
+    held = [not free.issuperset(joint.blocks) for joint in structure.joints]
+    between = ~np.array(held)[model.operator.points.joint]
+    for gaps in (model.operator.opening, model.operator.slip):
+        assert np.abs((gaps @ stretched.ravel())[between]).max() < 1e-12
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_supports_of_a_bridge_carry_its_weight(cell):
+    structure = viaduct(paving=Paving(thickness=0.2))
+    made = full(
+        broken_space(mesh(structure, Discretisation(cells=(2, 2), cell=cell))), Quadrature()
+    )
+    joints, carried = dead_load(made, Newton(tolerance=1e-13)).joints, np.zeros(2)
+    for k, joint in enumerate(structure.joints):
+        fixed = [structure.blocks[number].fixed for number in (joint.lower, joint.higher)]
+        if any(fixed):
+            push = float(joints["N"][k]) * structure.normals[k]
+            push -= float(joints["V"][k]) * joint.tangent  # both act on the higher block
+            carried += push if fixed[0] else -push
+    assert carried == pytest.approx([0.0, structure.weight], abs=1e-9 * structure.weight)
+
+
+def test_soil_has_the_cells_that_its_stones_impose():
+    """Four on each extrados, and cells inside that grow to no more than was asked."""
+    structure = viaduct()
+    soil = next(k for k, block in enumerate(structure.blocks) if block.name == "backfill")
+    stones = {k for k, block in enumerate(structure.blocks) if block.part.endswith("arch")}
+    pairs = [set(joint.blocks) for joint in structure.joints]
+    extrados = [k for k, pair in enumerate(pairs) if soil in pair and pair & stones]
+    assert len(extrados) == 20
+    counts = []
+    for coarse in (None, 0.3, 0.15):
+        made = mesh(structure, Discretisation(coarse=coarse))
+        assert set(np.bincount(made.joints[1])[extrados]) == {4}
+        counts.append(np.sum(made.blocks == soil))
+    area = structure.blocks[soil].area
+    assert counts[0] < counts[1] < counts[2]
+    assert counts[1] > 0.8 * area / 0.3**2
+    assert counts[2] > 0.8 * area / 0.15**2
+
+
+def block(name, *outline, corners=(0, 1, 2, 3), fixed=False):
+    """A stone with a structured mesh unless it is told otherwise."""
+    return Block(outline, STONE, name, fixed=fixed, corners=corners)
+
+
+def box(name, left, right, low, high, **given):
+    """A rectangular stone."""
+    return block(name, (left, high), (left, low), (right, low), (right, high), **given)
+
+
+def wall_in_bond():
+    """Stones across the joints of the course below, one three times as wide as its neighbour."""
+    rows = ([0.0, 1.0, 4.0], [0.0, 2.0, 4.0], [0.0, 0.7, 2.5, 4.0])
+    stones = [box("ground", 0.0, 4.0, -0.3, 0.0, fixed=True)]
+    for k, ends in enumerate(rows):
+        stones += [
+            box(f"stone {k}.{n}", left, right, 0.5 * k, 0.5 * k + 0.5)
+            for n, (left, right) in enumerate(pairwise(ends))
+        ]
+    return assembled(stones, STONE_TO_STONE)
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("cells", [(1, 1), (4, 4), (2, 5)])
+def test_stones_in_bond_fit(cell, cells):
+    """Opposite sides agree although a long side faces two short ones."""
+    made = mesh(wall_in_bond(), Discretisation(cells=cells, cell=cell))
+    of_block = np.bincount(made.blocks)[1:]
+    assert of_block.min() >= cells[0] * cells[1] * (1 if cell == "quadrilateral" else 2)
+    assert scaled_jacobians(made).min() > (0.3 if cell == "quadrilateral" else 0.05)
+
+
+def cells_on_edges(structure, meshing):
+    """Middles of the edges of blocks that can move (m, 2), and the cells on each (m,)."""
+    division = divided(structure, meshing)
+    own = np.unique(np.concatenate([division.edges.around[k] for k in structure.free]))
+    middles = division.edges.points[division.edges.ends[own]].mean(axis=1)
+    return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
+
+
+@pytest.mark.parametrize("cells", [(2, 2), (3, 5), (4, 4)])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize("make", ["ring of 16", "ring in chords", "fill", "fill on chords"])
+def test_mirror_images_are_cut_alike(make, cell, cells):
+    lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 16}
+    made = {
+        "ring of 16": lambda: circular_arch(**lengths),
+        "ring in chords": lambda: circular_arch(**lengths, chords=2),
+        "fill": one_arch,
+        "fill on chords": lambda: one_arch(chords=3),
+    }[make]()
+    middles, counts = cells_on_edges(made, Discretisation(cells=cells, cell=cell))
+    x = middles[:, 0]
+    turned = middles * [-1.0, 1.0] + [x.min() + x.max(), 0.0]
+    away = np.linalg.norm(middles[:, None] - turned, axis=2)
+    assert away.min(axis=0).max() < 1e-9
+    assert counts[away.argmin(axis=0)].tolist() == counts.tolist()
+
+
+def test_cells_forced_by_another_side_are_dealt_evenly():
+    """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
+    made = one_arch(chords=3)
+    division = divided(made, Discretisation(cells=(2, 2)))
+    keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
+    faces = division.edges.sides[keystone]
+    found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
+    assert sorted(found) == [[2], [2], [2, 2, 2], [2, 2, 2]]
+
+
+def test_neighbours_that_wish_different_numbers_take_the_larger():
+    """The side of one stone is the bed of another."""
+    low, high = box("low", 0.0, 1.0, 0.0, 1.0), box("high", 0.0, 1.0, 1.0, 2.0)
+    high = replace(high, corners=(1, 2, 3, 0))
+    ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
+    made = mesh(assembled([ground, low, high], STONE_TO_STONE), Discretisation(cells=(2, 5)))
+    assert np.bincount(made.blocks).tolist() == [5, 25, 10]
+    assert np.bincount(made.joints[1]).tolist() == [5, 5]
+
+
+def test_cells_of_a_long_stone_are_not_absurdly_long():
+    """No longer than twice its thickness: ten cells in eight metres of 0.4 m."""
+    ground = box("ground", 0.0, 8.0, -0.3, 0.0, fixed=True)
+    made = mesh(
+        assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], STONE_TO_STONE),
+        Discretisation(cells=(2, 2)),
+    )
+    assert np.bincount(made.joints[1]).tolist() == [10]
+
+
+def test_sides_that_cannot_agree():
+    """Round a spiral a stone's end is one side of its beginning and another stone besides."""
+    turns = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
+    rays = [[(r * x, r * y) for r in (1.0, 2.0)] for x, y in turns]
+    stones = [
+        block(f"stone {k}", a[0], a[1], b[1], b[0]) for k, (a, b) in enumerate(pairwise(rays))
+    ]
+    stones.append(block("last", rays[3][0], rays[3][1], (3.0, 0.0), rays[0][0]))
+    stones.append(block("rest", (2.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.5, 1.0), fixed=True))
+    with pytest.raises(MeshError, match="leaving out their corners"):
+        mesh(assembled(stones, STONE_TO_STONE), Discretisation(cells=(2, 2)))
+    free = replace(stones[3], corners=None)
+    assert mesh(
+        assembled([*stones[:3], free, stones[4]], STONE_TO_STONE), Discretisation(cells=(2, 2))
+    )
+
+
+def test_an_outline_that_crosses_itself():
+    ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
+    bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
+    with pytest.raises(MeshError, match="cannot mesh block 'bow'"):
+        mesh(assembled([ground, bow], STONE_TO_STONE), Discretisation(cells=(2, 2)))

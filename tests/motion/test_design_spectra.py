@@ -1,0 +1,102 @@
+"""Code spectra at their corner periods, against values worked out by hand from the tables."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion.design_spectra import Eurocode8, TableSpectrum, Tbec2018
+
+ROUND_OFF = 1e-12
+
+
+def test_tbec_at_its_corners():
+    spectrum = Tbec2018(ss=1.140, s1=0.315, site="ZD")
+    # F_S = 1.1 - 0.1 * 0.14/0.25 = 1.044, F_1 = 2.0 - 0.1 * 0.15 = 1.985.
+    sds, sd1 = 1.044 * 1.140, 1.985 * 0.315
+    assert spectrum.sds == pytest.approx(sds, rel=ROUND_OFF)
+    assert spectrum.sd1 == pytest.approx(sd1, rel=ROUND_OFF)
+    corner = sd1 / sds
+    periods = [0.0, 0.1 * corner, 0.2 * corner, corner, 1.0, 6.0, 12.0]
+    expected = [0.4 * sds, 0.7 * sds, sds, sds, sd1, sd1 / 6.0, sd1 * 6.0 / 144.0]
+    assert spectrum.horizontal(periods) == pytest.approx(expected, rel=ROUND_OFF)
+    periods = [0.0, 0.1 * corner / 3, 0.2 * corner / 3, corner / 3, 1.0, 3.0]
+    level = 0.8 * sds
+    expected = [0.32 * sds, 0.56 * sds, level, level, level * corner / 3, level * corner / 9]
+    assert spectrum.vertical(periods) == pytest.approx(expected, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("site", "ss", "s1", "sds", "sd1"),
+    [
+        ("ZA", 0.1, 0.05, 0.08, 0.04),
+        ("ZB", 2.0, 0.9, 1.8, 0.72),
+        ("ZC", 0.625, 0.55, 0.625 * 1.25, 0.55 * 1.45),
+        ("ZD", 0.2, 0.05, 0.32, 0.12),
+        ("ZE", 0.5, 0.2, 0.85, 0.66),
+        ("ZE", 1.9, 0.7, 1.52, 1.4),
+    ],
+)
+def test_tbec_site_factors(site, ss, s1, sds, sd1):
+    spectrum = Tbec2018(ss=ss, s1=s1, site=site)
+    assert (spectrum.sds, spectrum.sd1) == pytest.approx((sds, sd1), rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("ag", "ground", "type_", "periods", "expected"),
+    [
+        # T = 0, T_B, T_C, T_D and 4 s: a_g S (1, 2.5, 2.5, 2.5 T_C/T_D, 2.5 T_C T_D/16).
+        (0.3, "A", 1, (0, 0.15, 0.4, 2, 4), (0.3, 0.75, 0.75, 0.15, 0.0375)),
+        (0.3, "C", 1, (0, 0.2, 0.6, 2, 4), (0.345, 0.8625, 0.8625, 0.25875, 0.0646875)),
+        (0.2, "D", 2, (0, 0.1, 0.3, 1.2, 4), (0.36, 0.9, 0.9, 0.225, 0.02025)),
+        (0.2, "E", 2, (0, 0.05, 0.25, 1.2, 4), (0.32, 0.8, 0.8, 1 / 6, 0.015)),
+        (0.1, "B", 1, (0.075, 0.5, 1.0), (0.21, 0.3, 0.15)),
+    ],
+)
+def test_eurocode_horizontal_at_its_corners(ag, ground, type_, periods, expected):
+    spectrum = Eurocode8(ag=ag, ground=ground, type=type_)
+    assert spectrum.horizontal(periods) == pytest.approx(expected, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize(("type_", "ratio"), [(1, 0.9), (2, 0.45)])
+def test_eurocode_vertical_at_its_corners(type_, ratio):
+    found = Eurocode8(ag=0.3, ground="D", type=type_).vertical([0, 0.05, 0.15, 1, 4])
+    # No soil factor: a_vg (1, 3, 3, 3 * 0.15, 3 * 0.15/16).
+    assert found == pytest.approx(np.array([1, 3, 3, 0.45, 0.028125]) * 0.3 * ratio, rel=ROUND_OFF)
+
+
+def test_eurocode_damping_lowers_all_but_the_start():
+    spectrum = Eurocode8(ag=0.2, ground="A", damping=0.15)
+    reduction = np.sqrt(10.0 / 20.0)
+    assert spectrum.horizontal([0.0, 0.3]) == pytest.approx([0.2, 0.5 * reduction], rel=ROUND_OFF)
+    assert Eurocode8(ag=0.2, ground="A", damping=0.5).horizontal(0.3) == pytest.approx(
+        0.2 * 2.5 * 0.55
+    )
+
+
+def test_table_is_straight_between_its_points():
+    table = TableSpectrum([0.0, 1.0, 2.0], [1.0, 3.0, 2.0], [0.5, 1.0, 1.0])
+    assert table.horizontal([0.5, 1.5, 2.0]) == pytest.approx([2.0, 2.5, 2.0])
+    assert table.vertical(0.5) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZF"), "needs a site study"),
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="C"), "ground class 'C' is unknown"),
+        (lambda: Tbec2018(ss=-1.0, s1=0.3, site="ZC"), "both are > 0"),
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").vertical(3.01), "defined up to 3 s"),
+        (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").horizontal(-0.1), "from 0 s upwards"),
+        (lambda: Eurocode8(ag=0.2, ground="S1"), "expected type 1 or 2 on ground A"),
+        (lambda: Eurocode8(ag=0.2, ground="A", type=3), "expected type 1 or 2"),
+        (lambda: Eurocode8(ag=0.0, ground="A"), "expected more than 0"),
+        (lambda: Eurocode8(ag=0.2, ground="A").horizontal(4.5), "defined up to 4 s"),
+        (lambda: TableSpectrum([0.0, 0.0], [1.0, 1.0]), "a row that grows"),
+        (lambda: TableSpectrum([0.0, 1.0], [1.0, -1.0]), "2 positive values"),
+        (lambda: TableSpectrum([0.0, 1.0], [1.0, 1.0]).vertical(0.5), "has no vertical"),
+        (lambda: TableSpectrum([0.1, 1.0], [1.0, 1.0]).horizontal(0.05), "below the table's"),
+    ],
+)
+def test_what_the_codes_do_not_define_is_refused(build, message):
+    with pytest.raises(af.errors.InvalidInput, match=message):
+        build()

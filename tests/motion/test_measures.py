@@ -1,0 +1,39 @@
+"""Intensity measures of motions, against closed forms."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion.measures import measures
+
+
+def test_measures_of_a_sine_are_the_closed_forms():
+    omega, duration, dt = 2.0 * np.pi * 2.0, 10.0, 0.001
+    times = np.arange(0.0, duration + dt / 2, dt)
+    found = measures(af.Motion(np.sin(omega * times), dt))
+    # Whole periods; straight lines miss a sine by (ω dt)²/12 = 1.3e-5.
+    assert found.pga == pytest.approx(1.0, rel=1e-4)
+    assert found.pgv == pytest.approx(2.0 / omega, rel=1e-4)
+    assert found.pgd == pytest.approx(duration / omega, rel=1e-3)
+    arias = np.pi / (2 * af.units.STANDARD_GRAVITY) * duration / 2
+    assert found.arias == pytest.approx(arias, rel=1e-4)
+    assert found.cav == pytest.approx(2.0 / np.pi * duration, rel=1e-4)
+    # Energy grows evenly but for the half periods of sin².
+    assert found.significant_duration == pytest.approx(0.9 * duration, abs=0.1)
+    assert found.duration == pytest.approx(duration)
+
+
+def test_housner_intensity_sums_the_pseudo_velocity():
+    motion = af.Motion.synthetic(seed=2, duration=8.0)
+    periods = np.linspace(0.1, 2.5, 800)
+    velocity = af.response_spectrum(motion, periods) * periods / (2.0 * np.pi)
+    expected = np.sum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(periods))
+    # 97 periods in place of 800.
+    assert measures(motion).housner == pytest.approx(expected, rel=3e-3)
+
+
+def test_a_motion_at_rest_measures_nothing():
+    found = measures(af.Motion(np.zeros(100), 0.01))
+    assert (found.pga, found.arias, found.housner, found.significant_duration) == (0, 0, 0, 0)
+    with pytest.raises(af.errors.InvalidInput, match="no component 'vertical'"):
+        measures(af.Motion(np.zeros(100), 0.01), "vertical")

@@ -1,0 +1,323 @@
+"""The record readers: every format by content, every doubt refused with file and line."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion.records.read import read_channels, read_components
+
+DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "mutated_records.py"))
+SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
+
+RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
+
+# File, samples, step [s] and peak [g] of each component, as published with the files.
+TABLE = [
+    ("peer_at2/RSN1158_KOCAELI_DZC180.AT2", 0.005, [(5437, 0.3119)]),
+    ("peer_at2/RSN1158_KOCAELI_DZC270.AT2", 0.005, [(5437, 0.3642)]),
+    ("peer_at2/RSN1158_KOCAELI_DZC-UP.AT2", 0.005, [(5437, 0.2063)]),
+    ("peer_at2/RSN6_IMPVALL.I_I-ELC180.AT2", 0.01, [(5372, 0.2808)]),
+    ("peer_at2/RSN6_IMPVALL.I_I-ELC270.AT2", 0.01, [(5346, 0.2107)]),
+    ("peer_at2/RSN6_IMPVALL.I_I-ELC-UP.AT2", 0.01, [(5378, 0.1781)]),
+    ("peer_at2/RSN125_FRIULI.A_A-TMZ000.AT2", 0.005, [(7277, 0.3571)]),
+    ("peer_at2/RSN125_FRIULI.A_A-TMZ270.AT2", 0.005, [(7279, 0.3151)]),
+    ("peer_at2/RSN125_FRIULI.A_A-TMZ-UP.AT2", 0.005, [(7278, 0.2770)]),
+    ("peer_at2/RSN126_GAZLI_GAZ000.AT2", 0.0066, [(2048, 0.7017)]),
+    ("peer_at2/RSN126_GAZLI_GAZ090.AT2", 0.0066, [(1984, 0.8639)]),
+    ("peer_at2/RSN126_GAZLI_GAZ-UP.AT2", 0.0066, [(2080, 1.6982)]),
+    ("peer_at2/RSN77_SFERN_PUL164.AT2", 0.01, [(4172, 1.2190)]),
+    ("peer_at2/RSN77_SFERN_PUL254.AT2", 0.01, [(4172, 1.2383)]),
+    ("peer_at2/RSN77_SFERN_PULDWN.AT2", 0.01, [(4172, 0.6874)]),
+    ("peer_at2/RSN181_IMPVALL.H_H-E06140.AT2", 0.005, [(7817, 0.4473)]),
+    ("peer_at2/RSN181_IMPVALL.H_H-E06230.AT2", 0.005, [(7818, 0.4490)]),
+    ("peer_at2/RSN181_IMPVALL.H_H-E06-UP.AT2", 0.005, [(7815, 1.8950)]),
+    ("peer_at2/RSN763_LOMAP_GIL067.AT2", 0.005, [(7999, 0.3585)]),
+    ("peer_at2/RSN763_LOMAP_GIL337.AT2", 0.005, [(7999, 0.3266)]),
+    ("peer_at2/NIS090.AT2", 0.01, [(4096, 0.5027)]),
+    ("plain_columns/erzikan.txt", 0.005, [(4260, 0.5154), (4260, 0.4957)]),
+    (
+        "other_formats/20170720223109_0921.txt",
+        0.01,
+        [(28683, 0.0135), (28683, 0.0124), (28683, 0.0100)],
+    ),
+    ("other_formats/HL.DLFA..HNE.D.20190728.160908.C.ACC.ASC", 0.005, [(13876, 0.00023)]),
+    ("other_formats/HL.DLFA..HNN.D.20190728.160908.C.ACC.ASC", 0.005, [(13876, 0.00019)]),
+    ("other_formats/HL.DLFA..HNZ.D.20190728.160908.C.ACC.ASC", 0.005, [(13876, 0.00021)]),
+    ("other_formats/ce36456p_CE36456.V2", 0.02, [(3251, 0.2732), (3250, 0.0967), (3250, 0.2613)]),
+    (
+        "other_formats/us1000hyfh_akbmrp_AKBMR--n.1000hyfh.BNZ.--.acc.V2c",
+        0.005,
+        [(42000, 0.0070)],
+    ),
+    ("other_formats/0111a.smc", 0.005, [(6001, 0.1065)]),
+    ("other_formats/CHB0031412312349.EW", 0.01, [(6000, 0.0082)]),
+    ("other_formats/CHB0031412312349.NS", 0.01, [(6000, 0.0083)]),
+    ("other_formats/CHB0031412312349.UD", 0.01, [(6000, 0.0025)]),
+]
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(content, name="record.txt", encoding="utf-8"):
+        path = tmp_path / name
+        path.write_bytes(content.encode(encoding))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def recorded():
+    if not RECORDS.is_dir():
+        pytest.skip(f"no records in {RECORDS}")
+    return RECORDS
+
+
+@pytest.mark.parametrize(("name", "dt", "components"), TABLE, ids=[row[0] for row in TABLE])
+def test_real_records_have_their_published_count_and_peak(recorded, name, dt, components):
+    channels = read_channels(recorded / name)
+    assert [len(channel.samples) for channel in channels] == [count for count, _ in components]
+    for channel, (_, peak) in zip(channels, components, strict=True):
+        assert channel.dt == dt
+        # Half of the last digit of the table.
+        digits = 0.5e-5 if peak < 0.001 else 0.5e-4
+        reached = np.abs(channel.samples).max() / af.units.STANDARD_GRAVITY
+        assert reached == pytest.approx(peak, abs=digits * 1.001)
+
+
+def test_a_downward_vertical_is_turned_up(recorded):
+    # The first sample of the file is -0.4595648E-03 g, positive downwards.
+    motion = af.Motion.read(
+        recorded / "peer_at2/RSN77_SFERN_PUL164.AT2",
+        vertical=recorded / "peer_at2/RSN77_SFERN_PULDWN.AT2",
+    )
+    assert motion.vertical[0] == pytest.approx(0.4595648e-3 * af.units.STANDARD_GRAVITY)
+    assert motion.horizontal[0] == pytest.approx(-0.4486975e-3 * af.units.STANDARD_GRAVITY)
+
+
+def test_two_horizontals_of_two_files_can_be_rotated(recorded):
+    files = [recorded / f"peer_at2/RSN125_FRIULI.A_A-TMZ{angle}.AT2" for angle in ("000", "270")]
+    motion = af.Motion.read(files[0], transverse=files[1])
+    turned = motion.rotated(0.5 * np.pi)
+    assert turned.pga == pytest.approx(0.3151 * af.units.STANDARD_GRAVITY, rel=2e-4)
+    # Each keeps its own length until they are mixed; then the longer one counts.
+    assert (len(motion.horizontal), len(turned.horizontal)) == (7277, 7279)
+
+
+def test_three_components_of_one_file_are_kept_together(recorded):
+    motion = af.Motion.read(recorded / "other_formats/ce36456p_CE36456.V2")
+    peaks = [np.abs(motion.component(name)).max() for name in motion.components]
+    assert motion.components == ("horizontal", "vertical", "transverse")
+    assert peaks == pytest.approx([2.67957, 0.948, 2.5626], rel=2e-3)
+    assert len(motion.horizontal) == 3251
+    assert len(motion.vertical) == 3250
+
+
+def test_one_component_is_chosen_by_its_number(recorded):
+    path = recorded / "plain_columns/erzikan.txt"
+    motion = af.Motion.read(path, column=2)
+    assert motion.components == ("horizontal",)
+    assert motion.pga == pytest.approx(0.4957 * af.units.STANDARD_GRAVITY, rel=1e-4)
+    with pytest.raises(af.errors.InvalidInput, match="choose from 1 to 2"):
+        af.Motion.read(path, column=3)
+    with pytest.raises(af.errors.InvalidInput, match="has 1 components"):
+        af.Motion.read(recorded / "peer_at2/NIS090.AT2", column=2)
+    with pytest.raises(af.errors.InvalidInput, match="leave out"):
+        af.Motion.read(recorded / "peer_at2/NIS090.AT2", dt=0.01)
+
+
+def test_components_are_told_by_their_directions(write):
+    rows = "1 2 3\n-4 5 6\n0 8 8.5\n"
+    path = write("# gal, dt = 0.01 s: N-S, E-W, U-D\n" + rows)
+    found = read_components(path)
+    assert {name: channel.direction for name, channel in found.items()} == {
+        "horizontal": "N-S",
+        "transverse": "E-W",
+        "vertical": "U-D",
+    }
+    assert read_components(path, column=3).keys() == {"horizontal"}
+    for directions in ("N-S, E-W, NS", "N-S, U-D, UP"):
+        with pytest.raises(af.errors.InvalidInput, match="not those of one instrument"):
+            read_components(write(f"# gal, dt = 0.01 s: {directions}\n" + rows))
+
+
+VALUES = "  .1000000E+00 -.2000000E+00  .3000000E+00\n  .0500000E+00\n"
+TITLE = "PEER NGA RECORD\nFriuli, 5/6/1976, Tolmezzo, 0\nACCELERATION TIME SERIES IN UNITS OF G\n"
+
+
+@pytest.mark.parametrize(
+    "counted",
+    [
+        "NPTS=   4, DT=   .0100 SEC,   ",
+        "NPTS=  4, DT= .01000 SEC",
+        "npts = 4, dt = 1.0E-2 sec",
+        "   4    0.0100    NPTS, DT",
+        "4 .0100 NPTS, DT",
+        "DT=  .0100, NPTS=   4",
+        "NPTS: 4 DT: 0.01",
+        "NPTS=4,DT=.01 SEC",
+        "4, .01, NPTS, DT",
+        "NPTS, DT:  4  .0100 SEC",
+        "NPTS=    4\nDT=   .0100 SEC",
+    ],
+)
+def test_peer_headers_of_all_kinds(write, counted):
+    for blank, end in (("", "\n"), ("\n\n", "\r\n")):
+        path = write((blank + TITLE + counted + "\n" + VALUES).replace("\n", end))
+        motion = af.Motion.read(path)
+        expected = np.array([0.1, -0.2, 0.3, 0.05]) * af.units.STANDARD_GRAVITY
+        assert motion.dt == 0.01
+        assert motion.horizontal == pytest.approx(expected)
+
+
+def test_numbers_run_together_and_fortran_exponents(write):
+    values = "-.1000000D+00-.2000000D+00 .3000000D+00-.5000000D-01\n"
+    motion = af.Motion.read(write(TITLE + "NPTS= 4, DT= .01 SEC\n" + values))
+    assert motion.horizontal / af.units.STANDARD_GRAVITY == pytest.approx([-0.1, -0.2, 0.3, -0.05])
+
+
+@pytest.mark.parametrize("direction", ["DWN", "DOWN (USGS STATION 279)", "DN"])
+def test_downward_words(write, direction):
+    text = TITLE.replace("Tolmezzo, 0", f"Dam (upper, left), {direction}")
+    channel = read_channels(write(text + "NPTS= 4, DT= .01 SEC\n" + VALUES))[0]
+    assert channel.is_vertical
+    assert channel.samples[0] == pytest.approx(-0.1 * af.units.STANDARD_GRAVITY)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (TITLE + "NPTS= 5, DT= .01 SEC\n" + VALUES, "states 5 samples, the file holds 4"),
+        (TITLE + "NPTS= 3, DT= .01 SEC\n" + VALUES, "line 6: more follows after the 3 samples"),
+        (TITLE + "NPTS= 2, DT= .01 SEC\n" + VALUES, "line 5: the header states 2 samples"),
+        (TITLE + "NPTS= 4, DT= .00 SEC\n" + VALUES, "line 4: sampling interval 0 s"),
+        (TITLE + "NPTS= 4, DT= 5.0 SEC\n" + VALUES, "line 4: sampling interval 5 s"),
+        (TITLE + "NPTS= 4, DT=    SEC\n" + VALUES, "no line tells"),
+        (TITLE + "NPTS= **, DT= .01 SEC\n" + VALUES, "no line tells"),
+        (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES[:-3], "'.0500000E+' is cut off|not a number"),
+        (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("-.2", "-x2"), "line 5: numbers exp"),
+        (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace(".3", ".3.3"), "line 5: not a number"),
+        (TITLE + "NPTS= 40, DT= .01 SEC\n" + VALUES * 9 + VALUES.replace(".3000", ".3"), "digits"),
+        (
+            TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace(".3000000E+00", "NaN"),
+            "line 5: numbers",
+        ),
+        (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("+00", "+03", 1), "wrong unit"),
+        (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("E+00", "E999", 1), "too large"),
+        (TITLE.replace("OF G", "") + "NPTS= 4, DT= .01 SEC\n" + VALUES, "does not tell one unit"),
+        (
+            TITLE.replace("ACCELERATION", "VELOCITY") + "NPTS= 4, DT= .01 SEC\n" + VALUES,
+            "does not tell of an acceleration",
+        ),
+        (TITLE + f"NPTS= {'9' * 5000}, DT= .01 SEC\n" + VALUES, "no line tells"),
+        (SAMPLES["knet"].replace("100Hz", "1e999Hz"), "are positive numbers"),
+        (SAMPLES["knet"].replace("(gal)   5", "(gal)   9"), "states a peak of"),
+        (SAMPLES["esm"].replace("s^2\nPGA", "s\nPGA"), "UNITS is not a unit"),
+        (SAMPLES["esm"].replace("0.40", "0.80"), "do not last 0.80 s"),
+        (SAMPLES["esm"].replace("ACCEL", "VEL"), "DATA_TYPE is 'VELERATION'"),
+        (SAMPLES["csmip"].replace("END OF DATA FOR CHANNEL  3", ""), "no line tells"),
+        (SAMPLES["smc"].replace("|made", "made"), "comment lines expected"),
+        (SAMPLES["cosmos"].replace("units=cm/sec2", "units=counts"), "no single unit"),
+        (SAMPLES["afad"].replace("(gal)", ""), "unit of the peaks|no line tells"),
+        ("", "is empty"),
+        ("\0\1", "not a text file"),
+        ("just words\nand more\n", "no line of numbers"),
+    ],
+)
+def test_doubtful_files_are_refused_by_name_and_line(write, content, message):
+    path = write(content)
+    with pytest.raises(af.errors.InvalidInput, match=message) as caught:
+        af.Motion.read(path)
+    assert path.name in str(caught.value)
+
+
+def test_files_that_are_not_there_are_refused(tmp_path):
+    for path in (tmp_path / "missing.AT2", tmp_path, "a\0b", None):
+        with pytest.raises(af.errors.InvalidInput, match="cannot read the record"):
+            af.Motion.read(path)
+
+
+def test_time_and_acceleration_in_columns(write):
+    rows = "".join(f"{0.02 * i:.3f}\t{0.1 * (-1) ** i:.4f}\n" for i in range(50))
+    for header, given, unit in (
+        ("# time (s), acceleration (m/s^2)\n", {}, 1.0),
+        ("time [s], acc [g]\n", {}, af.units.STANDARD_GRAVITY),
+        ("% acc. in cm/sec^2\n", {}, 0.01),
+        ("", {"units": "gal"}, 0.01),
+        ("", {"units": "g", "column": 2, "dt": 0.02}, af.units.STANDARD_GRAVITY),
+    ):
+        motion = af.Motion.read(write(header + rows), **given)
+        assert motion.dt == pytest.approx(0.02)
+        assert motion.pga == pytest.approx(0.1 * unit)
+        assert len(motion.horizontal) == 50
+
+
+@pytest.mark.parametrize(
+    "told", ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"]
+)
+def test_the_step_told_in_a_comment(write, told):
+    motion = af.Motion.read(write(f"% gal, {told}\n1\n-2\n3\n"))
+    assert motion.dt == pytest.approx(0.005)
+    assert motion.pga == pytest.approx(0.03)
+
+
+def test_rounded_times_still_tell_the_step(write):
+    rows = "".join(f"{0.0066 * i:.3f} {i % 7}\n" for i in range(200))
+    # Times are rounded to 0.0005 s, over 199 steps: 4e-4 of the step.
+    assert af.Motion.read(write(rows), units="gal").dt == pytest.approx(0.0066, rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("content", "given", "message"),
+    [
+        ("0.0 1\n0.01 2\n0.02 3\n", {}, "state no unit"),
+        ("1\n2\n3\n", {"units": "gal"}, "give dt="),
+        ("1\n2\n3\n", {"units": "furlong", "dt": 0.01}, "units 'furlong' are unknown"),
+        ("# in g\n1\n2\n", {"units": "gal", "dt": 0.01}, "contradicts the unit"),
+        ("# dt = 0.02 s\n1\n2\n", {"units": "gal", "dt": 0.01}, "told twice"),
+        ("0 1\n.01 2\n.02 3\n.04 2\n.05 1\n.06 0\n", {"units": "gal"}, "line 4: .*0.02 to 0.04 s"),
+        ("1 2\n3 4\n1 5\n", {"units": "gal", "dt": 0.01}, "2 columns could be"),
+        ("0.00 1 2\n0.01 4 1\n0.02 5 1\n", {"units": "gal"}, "2 columns could be"),
+        ("0.00 1\n0.01 4\n0.02 5\n", {"units": "gal", "column": 1}, "choose from 2 to 2"),
+        ("1 2\n3\n1 5\n", {"units": "gal", "dt": 0.01, "column": 1}, "line 2: 1 columns"),
+        ("0,1\n0,2\n", {"units": "gal", "dt": 0.01, "column": 1}, "decimal commas"),
+        ("5\n", {"units": "gal", "dt": 0.01}, "one row is no accelerogram"),
+        ("1\n2\n", {"units": "gal", "dt": "fast"}, "a number in seconds"),
+        ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),
+        ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s"),
+    ],
+)
+def test_doubtful_columns_are_refused(write, content, given, message):
+    with pytest.raises(af.errors.InvalidInput, match=message):
+        af.Motion.read(write(content), **given)
+
+
+def test_an_error_names_the_turkish_file_too(write):
+    content = SAMPLES["afad"].replace("GAZIANTEP", "AYDIN").replace("AYDIN", "AYDİN")
+    motion = af.Motion.read(write(content, encoding="cp1254"))
+    assert motion.components == ("horizontal", "vertical", "transverse")
+
+
+@pytest.mark.parametrize("form", SAMPLES)
+def test_shipped_samples_of_all_formats_are_read(write, form):
+    channels = read_channels(write(SAMPLES[form]))
+    for channel in channels:
+        assert channel.dt == 0.01
+        # Every sample holds this wave, to the digits of its format.
+        assert channel.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
+def test_damaged_files_raise_no_foreign_error(tmp_path):
+    path = tmp_path / "damaged.txt"
+    refused = 0
+    for content in mutants(200, seed=1):
+        path.write_bytes(content)
+        try:
+            assert af.Motion.read(path).pga > 0.0
+        except af.errors.InvalidInput as error:
+            refused += path.name in str(error)
+    # Not every change damages; most do.
+    assert 50 < refused < 200

@@ -1,0 +1,103 @@
+"""What is done to one sampled acceleration, against closed forms and its own promises."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion import signals
+
+
+def sine(frequency=2.0, duration=4.0, dt=0.01, amplitude=1.0):
+    return amplitude * np.sin(2.0 * np.pi * frequency * np.arange(0.0, duration + dt / 2.0, dt))
+
+
+@pytest.fixture(scope="module")
+def shaking():
+    return af.Motion.synthetic(duration=10.0, pga=3.0, seed=4)
+
+
+def test_integrals_of_a_sine_match_the_closed_form():
+    omega, dt = 2.0 * np.pi, 0.001
+    times = np.arange(4001) * dt
+    samples = np.sin(omega * times)
+    # Straight lines between samples miss a sine by (ω dt)²/12 = 3e-6 of its amplitude.
+    exact_velocity = (1.0 - np.cos(omega * times)) / omega
+    assert signals.velocity(samples, dt) == pytest.approx(exact_velocity, abs=1e-5)
+    exact = (times - np.sin(omega * times) / omega) / omega
+    assert signals.displacement(samples, dt) == pytest.approx(exact, abs=1e-5)
+
+
+def test_baseline_correction_takes_out_an_offset_and_a_slope(shaking):
+    dt, times = shaking.dt, shaking.times()
+    drifting = shaking.horizontal + 0.05 + 0.01 * times
+    corrected = signals.baseline_corrected(drifting, dt)
+    assert abs(signals.displacement(drifting, dt)[-1]) > 3.0
+    # The ends are conditions of the fit: zero to round-off.
+    assert signals.velocity(corrected, dt)[-1] == pytest.approx(0.0, abs=1e-10)
+    assert signals.displacement(corrected, dt)[-1] == pytest.approx(0.0, abs=1e-10)
+    # The polynomial also takes a little of the motion's own slow displacement.
+    assert np.abs(corrected - shaking.horizontal).max() < 0.05 * shaking.pga
+
+
+@pytest.mark.parametrize(("count", "degree"), [(100, 2), (6, 6)])
+def test_base_lines_that_cannot_be_fitted_are_refused(count, degree):
+    with pytest.raises(af.errors.InvalidInput, match=f"degree {degree} for {count} samples"):
+        signals.baseline_corrected(np.ones(count), 0.01, degree)
+
+
+def test_band_pass_keeps_what_lies_inside_and_drops_what_lies_outside():
+    slow, middle, fast = (sine(f, duration=40.0) for f in (0.05, 2.0, 30.0))
+    passed = signals.band_passed(slow + middle + fast, 0.01, 0.5, 10.0)
+    inner = slice(1000, 3000)
+    # Fourth order both ways: 2 Hz is kept to 1e-3, 30 Hz and 0.05 Hz fall below 1e-3.
+    assert passed[inner] == pytest.approx(middle[inner], abs=3e-3)
+    with pytest.raises(af.errors.InvalidInput, match="band from"):
+        signals.band_passed(passed, 0.01, 0.5, 60.0)
+    for order in (0, -1):
+        with pytest.raises(af.errors.InvalidInput, match=f"filter of order {order}"):
+            signals.band_passed(passed, 0.01, 0.5, 10.0, order=order)
+
+
+@pytest.mark.parametrize("dt", [0.0025, 0.0013, 0.007, 0.02])
+def test_resampling_keeps_the_peaks(shaking, dt):
+    again = signals.resampled(shaking.horizontal, shaking.dt, dt)
+    assert again.max() == shaking.horizontal.max()
+    assert again.min() == shaking.horizontal.min()
+    assert (len(again) - 1) * dt == pytest.approx(shaking.duration, abs=dt)
+    assert shaking.resampled(dt).dt == dt
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf])
+def test_resampling_to_no_step_is_refused(dt):
+    with pytest.raises(af.errors.InvalidInput, match="positive number"):
+        signals.resampled(np.ones(5), 0.01, dt)
+
+
+def test_rotation_by_a_right_angle_changes_places():
+    level, across = signals.rotated(np.array([1.0, 2.0]), np.array([3.0, 4.0, 5.0]), 0.5 * np.pi)
+    assert level == pytest.approx([3.0, 4.0, 5.0])
+    assert across == pytest.approx([-1.0, -2.0, 0.0])
+
+
+def test_values_between_samples_are_straight_and_zero_outside():
+    values = signals.between(np.array([1.0, 3.0]), np.array([-0.1, 0.0, 0.25, 1.0, 1.1]))
+    assert values == pytest.approx([0.0, 1.0, 1.5, 3.0, 0.0])
+
+
+def test_arias_intensity_of_a_constant_grows_evenly():
+    growth = signals.arias(np.full(11, 2.0), 0.1)
+    exact = np.pi / (2.0 * af.units.STANDARD_GRAVITY) * 4.0 * np.arange(11) * 0.1
+    assert growth == pytest.approx(exact)
+
+
+def test_significant_duration_holds_nine_tenths_of_the_energy(shaking):
+    start, end = signals.significant_window(shaking.horizontal, shaking.dt)
+    part = shaking.significant()
+    assert part.duration == pytest.approx(end - start)
+    share = np.sum(part.horizontal**2) / np.sum(shaking.horizontal**2)
+    # One sample more or less at each end.
+    assert share == pytest.approx(0.9, abs=0.01)
+    with pytest.raises(af.errors.InvalidInput, match="a motion that moves"):
+        af.Motion(np.zeros(9), 0.01).significant()
+    with pytest.raises(af.errors.InvalidInput, match="fractions from 0 to 1"):
+        signals.significant_window(shaking.horizontal, shaking.dt, 0.9, 0.1)

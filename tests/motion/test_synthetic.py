@@ -1,0 +1,56 @@
+"""Artificial accelerograms."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion import synthetic
+
+
+def test_synthetic_motion_repeats_and_ends_at_rest():
+    first, second = (af.Motion.synthetic(seed=7) for _ in range(2))
+    other = af.Motion.synthetic(seed=8)
+    assert np.array_equal(first.horizontal, second.horizontal)
+    assert not np.array_equal(first.horizontal, other.horizontal)
+    assert first.pga == pytest.approx(0.3 * af.units.STANDARD_GRAVITY)
+    assert np.abs(first.vertical).max() == pytest.approx(0.2 * af.units.STANDARD_GRAVITY)
+    for component in first.components:
+        assert first.velocity(component)[-1] == pytest.approx(0.0, abs=1e-9)
+        assert first.displacement(component)[-1] == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
+        af.Motion.synthetic(duration=0.1)
+    with pytest.raises(af.errors.InvalidInput, match="seed of a synthetic motion = -1"):
+        af.Motion.synthetic(seed=-1)
+
+
+def test_a_motion_without_end_or_samples_is_refused():
+    for duration in (np.inf, np.nan):
+        with pytest.raises(af.errors.InvalidInput, match=r"duration .* is not a finite number"):
+            af.Motion.synthetic(duration=duration)
+    with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
+        af.Motion.synthetic(dt=0.0)
+
+
+@pytest.mark.parametrize("component", ["horizontal", "vertical"])
+def test_noise_has_a_peak_of_one_and_ends_at_rest(component):
+    random = np.random.default_rng(2)
+    noise = synthetic.enveloped_noise(1500, 0.01, random=random, component=component)
+    assert np.abs(noise).max() == 1.0
+    motion = af.Motion(noise, 0.01)
+    assert motion.velocity()[-1] == pytest.approx(0.0, abs=1e-9)
+    assert motion.displacement()[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_envelope_rises_stays_and_fades():
+    shape = synthetic.envelope(1001)
+    assert shape[[0, 75, 150, 500]] == pytest.approx([0.0, 0.25, 1.0, 1.0])
+    assert shape[[700, 1000]] == pytest.approx(np.exp([-1.0, -2.5]))
+
+
+def test_the_horizontal_does_not_depend_on_the_vertical():
+    options = {"pga": 2.0, "seed": 4}
+    level, upright = synthetic.accelerogram(5.0, 0.01, ratio=0.5, **options)
+    alone, nothing = synthetic.accelerogram(5.0, 0.01, ratio=0.0, **options)
+    assert nothing is None
+    assert np.array_equal(level, alone)
+    assert np.abs(upright).max() == pytest.approx(1.0)

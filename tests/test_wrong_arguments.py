@@ -1,0 +1,143 @@
+"""Arguments of a wrong kind end in an error of ours that says what was given, and what to give."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.events import EveryMechanism, MovingMechanism
+
+RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
+QUAKE = af.Motion(np.zeros(11), dt=0.01)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return af.build(RING, fidelity="rigid")
+
+
+MADE = [
+    (lambda: af.BodyForce("x"), r"horizontal \[g\] = 'x' is not a finite number"),
+    (lambda: af.BodyForce(0.1, (0.0, 1.0)), r"vertical \[g\] = \(0.0, 1.0\) is not a finite"),
+    (lambda: af.PointLoad(0, -1), r"force \(x, y\) \[N\] = -1 is not a row of values: give \(a, b"),
+    (lambda: af.PointLoad(0, (0, -1, 2)), r"has 3 values: give \(a, b\)"),
+    (lambda: af.PointLoad("crown", (0, -1)), r"x \[m\] = 'crown' is not a finite number"),
+    (lambda: af.PointLoad(0, (0, float("nan"))), r"\[N\]\[1\] = nan is not a finite number"),
+    (lambda: af.Settlement(0, 0.01), r"motion .* = 0.01 is not a row of values: give \(a, b, c\)"),
+    (lambda: af.Settlement(0, (0.01, 0.0)), r"has 2 values: give \(a, b, c\)"),
+    (lambda: af.Settlement(1.5, (0.0, 0.0, 0.0)), "block = 1.5 is not a whole number"),
+    (lambda: af.CountedMechanism(limit=2), r"criteria hinge = 2: \|e\| of a hinge is above 0 and"),
+    (lambda: af.CountedMechanism(limit="0.46"), "criteria hinge .* = '0.46' is not a finite"),
+    (lambda: af.CountedMechanism(failures=2.5), "criteria failures = 2.5 is not a whole number"),
+    (lambda: af.CountedMechanism(kinds="local"), "kinds = 'local': give some of"),
+    (lambda: af.CountedMechanism(kinds=3), "kinds = 3: give some of"),
+    (lambda: af.CountedMechanism(criteria=0.46), "criteria is a float: give Criteria"),
+    (lambda: MovingMechanism(kinds=("all",)), r"kinds = \('all',\): give some of"),
+    (lambda: EveryMechanism(limit=0), "criteria hinge = 0"),
+    (lambda: EveryMechanism(criteria=af.Criteria(), limit=0.4), "not both"),
+    (lambda: af.Rayleigh("5 %", (8.0, 16.0)), "damping ratio .* = '5 %' is not a finite number"),
+    (lambda: af.Rayleigh(0.05, 8.0), r"damping frequencies \[Hz\] = 8.0 is not a row of values"),
+    (lambda: af.Rayleigh(0.05, (8.0, 16.0, 24.0)), "has 3 values"),
+    (lambda: af.Rayleigh(0.05, (8.0, 16.0), joints=None), "damping joints = None: use one of"),
+    (lambda: af.HHT("x"), "HHT alpha .* = 'x' is not a finite number"),
+    (lambda: af.Newmark(None), "Newmark beta .* = None is not a finite number"),
+    (lambda: af.Newton(tolerance="x"), "tolerance of a solve .* = 'x'"),
+    (lambda: af.Newton(petsc="pc_type"), "petsc is a str: give a dictionary"),
+    (lambda: af.Record(every="2"), "record every = '2' is not a whole number"),
+    (lambda: af.Record(every=0), "record every = 0 is not a whole number of at least 1"),
+    (lambda: af.Record(fields_every=2.5), "record fields_every = 2.5 is not a whole number"),
+    (lambda: af.Motion("x", 0.01), "horizontal acceleration is not a row of numbers"),
+    (lambda: af.Motion(np.zeros(5), "0.01"), "dt '0.01' s"),
+    (lambda: af.Motion(np.zeros(5), 0.01, vertical=3.0), "vertical acceleration of shape"),
+    (lambda: af.Motion(np.zeros(5), 0.01, name=3), "name of a motion is a int: give words"),
+    (lambda: af.Motion.synthetic(pga="0.3 g"), "pga .* = '0.3 g' is not a finite number"),
+    (
+        lambda: af.Motion.synthetic(seed=1.5),
+        "seed of a synthetic motion = 1.5 is not a whole number",
+    ),
+    (lambda: af.Material("30 GPa", 0.2, 2e4), "young of 'material' = '30 GPa' is not a finite"),
+    (lambda: af.Contact(1e9, None), "shear_stiffness of 'contact' = None is not a finite number"),
+    (lambda: af.Tbec2018("1", 0.3, "ZC"), "map value S_S .* = '1' is not a finite number"),
+    (lambda: af.Eurocode8("x", "B"), "design ground acceleration .* = 'x' is not a finite number"),
+    (lambda: af.circular_arch(radius="x", thickness=0.5, embrace=90, voussoirs=5), "radius .* 'x'"),
+    (
+        lambda: af.circular_arch(radius=3, thickness=0.5, embrace=90, voussoirs=5, width="x"),
+        "width .* 'x'",
+    ),
+    (
+        lambda: af.circular_arch(radius=3, thickness=0.5, embrace=90, voussoirs="five"),
+        "voussoirs = 'five' is not a finite number",
+    ),
+    (lambda: af.column(breadth=1.0, heights=2.0), "heights of the blocks .* = 2.0 is not a row"),
+    (
+        lambda: af.shapes.Arch(name="arch", span="3 m", thickness=0.5, embrace=150, voussoirs=9),
+        "span = '3 m' is a str: give a length",
+    ),
+    (lambda: af.response_spectrum(QUAKE, "x"), "periods 'x' s are no numbers"),
+    (lambda: af.response_spectrum(3.0, [0.1]), "motion is a float: give a Motion"),
+    (lambda: af.response_spectrum(QUAKE, [0.1], damping="5 %"), "damping ratio .* = '5 %'"),
+    (lambda: af.collapse_factor(RING, live=0.1), r"load 0.1 is none: give BodyForce"),
+    (lambda: af.collapse_factor(RING, live=[]), r"load \[\] is none"),
+    (lambda: af.stands("ring"), "structure is a str"),
+    (lambda: af.verified_mechanism(RING, None), "joints is a NoneType: give those of an instant"),
+    (lambda: af.first_mechanisms(None), "run is a NoneType: give what time_history returns"),
+    (lambda: af.dead_load(RING), "model is a Structure: build one"),
+    (lambda: af.modes(RING, 3), "model is a Structure: build one"),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), MADE, ids=range(len(MADE)))
+def test_what_is_made_of_wrong_arguments(make, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        make()
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize(
+    "cells", [4, None, "44", 2.5, (4,), (4, 4, 4), (4.0, 4), (0, 4), (4, -1), ("4", 4), (True, 4)]
+)
+def test_cells_are_two_whole_numbers(fidelity, cells):
+    with pytest.raises(af.InvalidInput, match="cells"):
+        af.build(RING, fidelity=fidelity, cells=cells)
+
+
+def test_cells_of_any_integer_and_row():
+    assert af.build(RING, fidelity="rigid", cells=np.array([2, 2])).size == 3 * 7
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"motion": 0.3}, "motion is a float: give a Motion"),
+        ({"model": RING}, "model is a Structure: build one"),
+        ({"dt": "0.005"}, r"dt \[s\] = '0.005' is not a finite number"),
+        ({"dt": 5}, "dt 5 s is not between 0 and 0.1 s"),
+        ({"start": "rest"}, "start is a str: give dead_load"),
+        ({"damping": 0.05}, r"damping is a float: give Rayleigh\(0.05"),
+        ({"scheme": "hht"}, "scheme is a str: give Newmark"),
+        ({"record": 10}, "record is a int: give Record"),
+        ({"newton": 1e-8}, "newton is a float: give Newton"),
+        ({"criteria": 0.46}, "criteria is a float: give Criteria"),
+        ({"until": "mechanism"}, "until = 'mechanism' is no event"),
+        ({"until": af.CountedMechanism}, "until = <class .*> is no event"),
+        ({"method": "fast"}, "fast"),
+    ],
+)
+def test_time_history(model, given, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        af.time_history(**{"model": model, "motion": QUAKE} | given)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"load": 0.1}, "load 0.1 is none: give BodyForce"),
+        ({"load": [af.BodyForce(0.1), 3]}, "is none: give BodyForce"),
+        ({"model": RING}, "model is a Structure"),
+        ({"start": 3}, "equilibrium is a int"),
+        ({"stop": 3}, "stop is a int: give a Stop"),
+        ({"criteria": 3}, "criteria is a int: give a Criteria"),
+    ],
+)
+def test_pushover(model, given, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        af.pushover(**{"model": model, "load": af.BodyForce(0.1)} | given)

@@ -1,0 +1,61 @@
+"""Pictures of limit analysis: what they show, not how they look."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from archfem.limit.collapse import collapse_factor
+from archfem.masonry.actions import BodyForce, PointLoad
+from archfem.masonry.shapes import circular_arch
+from archfem.view.collapse import capacity_figure, collapse_figure
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+
+
+def lines_of(axes):
+    return {line.get_label(): line.get_xydata() for line in axes.lines}
+
+
+def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
+    found = collapse_factor(ring, live=BodyForce(1.0))
+    figure = collapse_figure(ring, found)
+    axes = figure.axes[0]
+    lines = lines_of(axes)
+    assert len(lines["thrust line"]) == 18
+    assert len(lines["hinge"]) == 4
+    np.testing.assert_allclose(lines["hinge"][0], ring.joints[0].intrados)  # lower block stays
+    stones, moved = axes.collections
+    assert (len(stones.get_paths()), len(moved.get_paths())) == (19, 17)
+    assert "0.4571" in axes.get_title()
+    figure.savefig(tmp_path / "collapse.png")
+
+
+def test_a_load_that_never_overturns_shows_no_mechanism(ring):
+    found = collapse_factor(ring, live=[PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
+    axes = collapse_figure(ring, found).axes[0]
+    assert set(lines_of(axes)) == {"thrust line"}
+    assert len(axes.collections) == 1
+    assert "never overturns" in axes.get_title()
+
+
+def test_an_arch_that_falls_has_no_thrust_line():
+    thin = circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
+    axes = collapse_figure(thin, collapse_factor(thin, live=BodyForce(1.0))).axes[0]
+    assert set(lines_of(axes)) == {"hinge"}
+
+
+def test_map_of_capacity_carries_known_values(tmp_path):
+    capacity = xr.DataArray(
+        [[0.26, 0.92, 1.6], [0.0, 0.45, 0.9], [np.nan, 0.15, 0.42]],
+        {"embrace": [120.0, 150.0, 180.0], "ratio": [0.05, 0.15, 0.25]},
+        ("embrace", "ratio"),
+    )
+    known = {(180.0, 0.1075): 0.0, (120.0, 0.02285): 0.0, (120.0, 0.1): 0.58, (120.0, 0.2): 1.264}
+    figure = capacity_figure(capacity, {120.0: 0.023, 150.0: 0.054, 180.0: 0.107}, known)
+    axes = figure.axes[0]
+    assert {text.get_text() for text in axes.texts} >= {"0.1075", "0.02285", "0.58", "1.264"}
+    assert axes.get_ylim() == (0.0, 0.25)
+    figure.savefig(tmp_path / "capacity.png")

@@ -1,0 +1,57 @@
+"""The picture of a pushover: curves, hinges in order, limits."""
+
+import numpy as np
+import pytest
+
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.masonry.actions import BodyForce, Settlement
+from archfem.masonry.shapes import circular_arch
+from archfem.models.rigid import rigid
+from archfem.statics.pushover import hinge_order, pushover
+from archfem.view.pushover import draw_pushover
+
+RING = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+
+
+@pytest.fixture(scope="module")
+def push():
+    return pushover(rigid(RING), BodyForce(1.0))
+
+
+def test_curve_hinges_and_limit_are_drawn(push, tmp_path):
+    figure = draw_pushover({"sideways": push}, limits={"limit analysis": 0.457})
+    axes = figure.axes[0]
+    curve = next(line for line in axes.lines if line.get_label() == "sideways")
+    np.testing.assert_allclose(curve.get_ydata(), push.curve["factor"])
+    np.testing.assert_allclose(curve.get_xdata(), 1e3 * push.curve["displacement"])
+    words = [text.get_text() for text in axes.texts]
+    assert "limit analysis: 0.457" in words
+    assert [word for word in words if word.startswith("6 ")] == ["6 extrados"]
+    figure.savefig(tmp_path / "push.png")
+
+
+def test_several_curves_keep_their_discs_and_lose_the_words(push):
+    other = pushover(rigid(RING), BodyForce(-1.0))
+    axes = draw_pushover({"right": push, "left": other}).axes[0]
+    assert not axes.texts
+    discs = [line for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())]
+    assert len(discs) == len({*push.hinge_steps}) + len({*other.hinge_steps})
+
+
+def test_a_settlement_says_what_it_measures():
+    push = pushover(rigid(RING), Settlement("left abutment", (-1.0, 0.0, 0.0)))
+    assert "settlement" in draw_pushover({"spread": push}).axes[0].get_ylabel()
+
+
+def test_hinges_come_in_order_and_depend_on_what_counts_as_one(push):
+    assert list(push.hinge_steps) == sorted(push.hinge_steps)
+    strict, late = hinge_order(push.joints, Criteria(hinge=0.4999))
+    assert set(strict) <= set(push.hinges)
+    assert max(late) >= max(push.hinge_steps)
+
+
+def test_one_to_six_curves_fit_a_picture(push):
+    for pushes in ({}, {str(k): push for k in range(7)}):
+        with pytest.raises(InvalidInput, match="give 1 to 6"):
+            draw_pushover(pushes)
