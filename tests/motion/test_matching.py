@@ -68,7 +68,7 @@ def test_other_spectra_and_bands(shaking):
 
 def test_a_table_that_begins_above_zero_will_do(shaking):
     periods = np.geomspace(0.05, 2.0, 60)
-    table = af.TableSpectrum(periods, CASE_STUDY.horizontal(periods))
+    table = af.motion.TableSpectrum(periods, CASE_STUDY.horizontal(periods))
     assert matched(shaking.with_vertical(None), table).misfit["horizontal"] < 0.05
 
 
@@ -82,7 +82,7 @@ def test_what_cannot_be_matched_is_refused(shaking):
     for band in ((0.0, 1.0), (0.1, np.inf)):
         with pytest.raises(af.errors.InvalidInput, match="0 < first < second"):
             misfit(shaking, CASE_STUDY, band=band)
-    spike = af.TableSpectrum([0.01, 0.5, 0.51, 0.52, 5.0], [1e-3, 1e-3, 1.0, 1e-3, 1e-3])
+    spike = af.motion.TableSpectrum([0.01, 0.5, 0.51, 0.52, 5.0], [1e-3, 1e-3, 1.0, 1e-3, 1e-3])
     with pytest.raises(af.errors.DidNotConverge, match="misfit") as caught:
         matched(shaking.with_vertical(None), spike, tolerance=0.02)
     assert caught.value.last.misfit["horizontal"] > 0.02

@@ -218,10 +218,9 @@ assert af.dead_load(model).iterations > 0
 
 def test_what_cannot_be_asked_for():
     model, other = block(), build(column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
-    with pytest.raises(InvalidInput, match="number of modes = 0 is not a whole number"):
-        modes(model, 0)
-    with pytest.raises(InvalidInput, match="4 modes of a model with 3 coordinates"):
-        modes(model, 4)
+    for count in (0, 4):
+        with pytest.raises(InvalidInput, match=f"{count} modes of a model with 3 coordinates"):
+            modes(model, count)
     with pytest.raises(InvalidInput, match="with 6 coordinates, the modes of 'rigid' with 3"):
         modes(model, 1, about=dead_load(other))
 
