@@ -18,7 +18,7 @@ from stepping import Run, warm_up
 from timing import least, table, watched
 
 import archfem as af
-from archfem.dynamics.stepping import linear
+from archfem.dynamics.stepping import linear, loop
 from archfem.dynamics.stepping.choice import METHODS
 
 LINES = 12
@@ -53,10 +53,16 @@ def _name(path: str, line: int, function: str) -> str:
 
 
 @numba.njit
+def _begun(system, state):
+    """What is carried from step to step."""
+    return loop.begin(system, state)
+
+
+@numba.njit
 def _settled(system, kept, states, ground, times):
     """Take the first step again and again."""
     for _ in range(times):
-        linear.settled(system, kept, 0, states, ground)
+        loop.settle(system, kept, 0, states, ground)
 
 
 @numba.njit
@@ -71,7 +77,7 @@ def _solved(system, kept, contact, times):
 def _measured(system, kept, states, ground, room, times):
     """Take resultants and energies of the first step again and again."""
     for _ in range(times):
-        linear.measured(system.linear, kept, 0, states, ground, room[0], room[1])
+        loop.measure(system, kept, 0, states, ground, room[0], room[1])
 
 
 def parts(run: Run, repeat: int) -> str:
@@ -79,7 +85,7 @@ def parts(run: Run, repeat: int) -> str:
     times = 2000
     ends = run.start.time + DT * np.arange(1, 3)
     series, results, _, system = run.stepper.prepared(run.start, DT, ends)
-    kept = linear.started(system.linear, series[0])
+    kept = _begun(system, series[0])
     room, still = (results[0][0], results[2][0]), np.zeros(2)
     actions = {
         "settle": lambda: _settled(system, kept, series[:2], still, times),

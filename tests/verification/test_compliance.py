@@ -216,6 +216,18 @@ def test_released_forces_leave_no_tension(rule):
     assert closed @ gap - force == pytest.approx(law.forces(gap), abs=1e-12)
 
 
+@pytest.mark.parametrize("others", [1, 20])
+def test_a_facet_that_hardly_opens_is_released(others):
+    """By so little that the integral of its nearer end is all rounding; directly and by CG."""
+    size = 2 * others + 2
+    law = Law(True, np.full(size, 2.0), np.zeros(size), np.zeros(size, dtype=int))
+    start, force, rows = np.full(size, -1.0), np.zeros(size), np.arange(size)
+    for part in np.geomspace(1e-9, 1e-5, 200):
+        start[0], start[1] = -1.0, part / (1.0 - part)
+        assert release(start, rows, 0.1 * np.eye(size), law, force, 1e-13) > 0
+        assert force == pytest.approx(0.0, abs=2.0 * part)
+
+
 def test_images_follow_the_state():
     """Of a random matrix, under HHT, against its products with the state."""
     rng = np.random.default_rng(4)

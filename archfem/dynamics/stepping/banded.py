@@ -132,12 +132,10 @@ def banded(matrix: sparse.csr_matrix, width: int) -> Array:
 
 @overload(solve)
 def _solve(system, vector, gap, before, force):  # type: ignore
-    if getattr(system, "instance_class", None) is BandedSystem:
-        return lambda system, vector, gap, before, force: solved(system, vector, gap, force)
+    return _solved if getattr(system, "instance_class", None) is BandedSystem else None
 
 
-@numba.njit(cache=True)
-def solved(system, vector, gap, force):  # type: ignore
+def _solved(system, vector, gap, before, force):  # type: ignore
     """Solve a step: from its right side to the contact, in place; leaves gaps and λ.
 
     Begins with the factor of the last step.

@@ -53,8 +53,10 @@ def open_part(a, b):  # type: ignore
 @numba.njit(cache=True)
 def integrals(low, high):  # type: ignore
     """∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2)."""
-    squares, cubes = 0.5 * (high**2 - low**2), (high**3 - low**3) / 3.0
-    return high - low - 2.0 * squares + cubes, squares - cubes, cubes
+    length, near, far = high - low, 1.0 - low, 1.0 - high  # no small difference of large numbers
+    first = length * (near**2 + near * far + far**2) / 3.0
+    second = length * (high**2 + high * low + low**2) / 3.0
+    return first, 0.5 * length * (high + low) - second, second
 
 
 @numba.njit(cache=True)
@@ -72,9 +74,9 @@ def pull(gap, other, stiffness, facets):  # type: ignore
 @numba.njit(cache=True)
 def pulls(gap, law, force):  # type: ignore
     """λ at all points."""
+    facets, stiffness, _, _ = law
     for row in range(len(gap)):
-        other = gap[row ^ 1] if law.facets else 0.0
-        force[row] = pull(gap[row], other, law.stiffness[row], law.facets)
+        force[row] = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
 
 
 @numba.njit(cache=True)
@@ -99,15 +101,16 @@ def closed_stiffness(gap, law, stiffness):  # type: ignore
 @numba.njit(cache=True)
 def joint_resultants(result, gap, shear, law):  # type: ignore
     """N, V, M of every joint from the gaps at its points."""
+    facets, stiffness, arm, joint = law
     result[:] = 0.0
     result[:, 1] = shear
     for row in range(len(gap)):
         carried = 0.0  # from the closed part alone, so that an open joint carries exactly nothing
-        if not law.facets:
-            carried = law.stiffness[row] * min(gap[row], 0.0)
+        if not facets:
+            carried = stiffness[row] * min(gap[row], 0.0)
         elif gap[row] <= 0.0 or gap[row ^ 1] <= 0.0:
             low, high = open_part(gap[row], gap[row ^ 1])
             first, mixed, _ = integrals(high, 1.0) if low == 0.0 else integrals(0.0, low)
-            carried = law.stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
-        result[law.joint[row], 0] -= carried
-        result[law.joint[row], 2] -= carried * law.arm[row]
+            carried = stiffness[row] * (first * gap[row] + mixed * gap[row ^ 1])
+        result[joint[row], 0] -= carried
+        result[joint[row], 2] -= carried * arm[row]

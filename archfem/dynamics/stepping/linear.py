@@ -108,30 +108,22 @@ def is_linear(system: types.Type) -> bool:
 
 @overload(begin)
 def _begin(system, state):  # type: ignore
-    if is_linear(system):
-        return lambda system, state: started(system.linear, state)
+    return _started if is_linear(system) else None
 
 
 @overload(settle)
 def _settle(system, kept, step, states, ground):  # type: ignore
-    if is_linear(system):
-        return lambda system, kept, step, states, ground: settled(
-            system, kept, step, states, ground
-        )
+    return _settled if is_linear(system) else None
 
 
 @overload(measure)
 def _measure(system, kept, step, states, ground, resultants, energy):  # type: ignore
-    if is_linear(system):
-        return lambda system, kept, step, states, ground, resultants, energy: measured(
-            system.linear, kept, step, states, ground, resultants, energy
-        )
+    return _measured if is_linear(system) else None
 
 
-@numba.njit(cache=True)
-def started(linear, state):  # type: ignore
+def _started(system, state):  # type: ignore
     """Images of a state under M, K and R, its gaps and what the joints do there."""
-    size, points = state.shape[1], len(linear.law.stiffness)
+    linear, size, points = system.linear, state.shape[1], len(system.linear.law.stiffness)
     images, gaps = np.zeros((2, 3, 3, size)), np.zeros((2, 5, points))
     gap, force = np.empty(points), np.empty(points)
     for k in range(3):
@@ -142,16 +134,15 @@ def started(linear, state):  # type: ignore
         times(linear.opening, state[k], gaps[0, k])
     mix(gap, gaps[0], (1.0, linear.numbers.lag, 0.0))
     pulls(gap, linear.law, force)
-    _late(gaps[0], linear)
+    _late(gaps[0], linear.numbers.lag, linear.law)
     return Kept(images, gaps, gap, gap.copy(), force, np.empty(size), np.empty(size))
 
 
-@numba.njit(cache=True)
-def settled(system, kept, step, states, ground):  # type: ignore
+def _settled(system, kept, step, states, ground):  # type: ignore
     """Take a step, and let the images follow."""
     linear, right, contact = system.linear, kept.right, kept.contact
     old, new = kept.images[step % 2], kept.images[(step + 1) % 2]
-    _load(right, ground, linear)
+    _load(right, ground, linear.weight, linear.body)
     add_mixed(right, old[0], linear.numbers.pushed)
     if stored(linear.rest) > 0:
         add_mixed(right, old[2], linear.numbers.dragged)
@@ -164,14 +155,14 @@ def settled(system, kept, step, states, ground):  # type: ignore
     return passes
 
 
-@numba.njit(cache=True)
-def measured(linear, kept, step, states, ground, resultants, energy):  # type: ignore
+def _measured(system, kept, step, states, ground, resultants, energy):  # type: ignore
     """Resultants and energies at the end of a step."""
-    numbers, gap, contact = linear.numbers, kept.gap, kept.contact
+    linear, numbers = system.linear, system.linear.numbers
+    gap, contact = kept.gap, kept.contact
     turn, next_turn = step % 2, (step + 1) % 2
     old, new = kept.gaps[turn], kept.gaps[next_turn]
     follow(gap, old, new, numbers)
-    _late(new, linear)
+    _late(new, numbers.lag, linear.law)
     if numbers.share != 1.0:
         mix(gap, new, (1.0, numbers.lag, 0.0))
         mix(contact, states[1], (1.0, numbers.lag, 0.0))
@@ -179,14 +170,15 @@ def measured(linear, kept, step, states, ground, resultants, energy):  # type: i
     shear = np.empty(len(resultants))
     times(linear.shear, contact, shear)
     joint_resultants(resultants, gap, shear, linear.law)
-    _energies(states, (kept.images[turn], kept.images[next_turn]), linear, ground, energy)
+    images, forces = (kept.images[turn], kept.images[next_turn]), (linear.weight, linear.body)
+    _energies(states, images, forces, ground, (numbers.drag, numbers.lag), energy)
     _joint_energies(old, new, energy)
 
 
 @numba.njit(cache=True)
-def _load(result, ground, linear):  # type: ignore
+def _load(result, ground, weight, body):  # type: ignore
     """Forces of gravity and of the ground."""
-    weight, across, up = linear.weight, linear.body[0], linear.body[1]
+    across, up = body[0], body[1]
     x, y = ground[0], ground[1]
     for k in range(len(result)):
         result[k] = weight[k] - x * across[k] - y * up[k]
@@ -210,33 +202,33 @@ def _follow(contact, right, images, linear):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _late(gaps, linear):  # type: ignore
+def _late(gaps, lag, law):  # type: ignore
     """Tension taken out at the gaps as they are, and how much more where the law sees them."""
-    pulls(gaps[0], linear.law, gaps[3])
-    if linear.numbers.lag > 0.0:
+    pulls(gaps[0], law, gaps[3])
+    if lag > 0.0:
         seen, stays, late = np.empty(gaps.shape[1]), gaps[3], gaps[4]
-        mix(seen, gaps, (1.0, linear.numbers.lag, 0.0))
-        pulls(seen, linear.law, late)
+        mix(seen, gaps, (1.0, lag, 0.0))
+        pulls(seen, law, late)
         for row in range(len(late)):
             late[row] -= stays[row]
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc"})
-def _energies(states, images, linear, ground, energy):  # type: ignore
+def _energies(states, images, forces, ground, damping, energy):  # type: ignore
     """Energies of a step as if all joints were closed and held tension."""
-    old, new = images
-    weight, across, up = linear.weight, linear.body[0], linear.body[1]
+    (old, new), (weight, body), (drag, lag) = images, forces, damping
+    across, up = body[0], body[1]
     before, u, v = states[0, 0], states[1, 0], states[1, 1]
     inertia, late, rate = (old[0, 1], new[0, 1]), (old[1, 1], new[1, 1]), (old[2, 1], new[2, 1])
-    elastic, drag, lag = new[1, 0], linear.numbers.drag, linear.numbers.lag
+    elastic = new[1, 0]
     kinetic, potential, work, lost = 0.0, 0.0, 0.0, 0.0
     for k in range(len(u)):
         moved = u[k] - before[k]
         kinetic += 0.5 * v[k] * inertia[1][k]
         potential += u[k] * (0.5 * elastic[k] - weight[k])
         work -= moved * (ground[0] * across[k] + ground[1] * up[k])
-        damping = drag * (inertia[0][k] + inertia[1][k]) + lag * (late[0][k] + late[1][k])
-        lost += 0.5 * moved * (damping + rate[0][k] + rate[1][k])
+        held = drag * (inertia[0][k] + inertia[1][k]) + lag * (late[0][k] + late[1][k])
+        lost += 0.5 * moved * (held + rate[0][k] + rate[1][k])
     energy[0], energy[1], energy[2], energy[3] = kinetic, potential, work, lost
 
 

@@ -24,7 +24,10 @@ SETTLED = 1e-12
 """Error of a contact force, relative to the largest of all joints as if closed, that ends the
 passes."""
 
-EXACT = 1e-11
+ROUNDED = 10.0
+"""How much more may be left once it does not fall any further: near a mechanism rounding weighs."""
+
+EXACT = SETTLED * ROUNDED
 """The same that is left to rounding once the gaps of the whole structure are known."""
 
 AHEAD = 2.0
@@ -53,7 +56,7 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
     law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
     matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
     root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
-    gap, left, last = free + matrix @ own, ROUGH, 0.0
+    gap, left, last = free + matrix @ own, ROUGH, np.inf
     for passes in range(1, ITERATIONS + 1):
         _roots(gap, law, root)
         if len(rows) <= FEW:
@@ -62,11 +65,11 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
             gap = _solve(free, matrix, (root, law.facets), own, (left, 0.1 * enough))
         pulls(gap, law, wanted)
         off = np.max(np.abs(wanted - own))
-        if off <= enough:
+        if off <= enough or last <= off <= ROUNDED * enough:
             for i in range(len(rows)):
                 force[rows[i]] = own[i]
             return passes
-        left = min(ROUGH, (off / last) ** 2) if last > 0.0 else ROUGH
+        left = min(ROUGH, (off / last) ** 2) if last < np.inf else ROUGH
         last = off
     return -1
 
@@ -74,15 +77,15 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
 @numba.njit(cache=True)
 def exact(gap, force, near, law):  # type: ignore
     """Whether the gaps ask for the λ they were found with; points that open count as near."""
+    facets, stiffness, _, _ = law
     largest, off = 0.0, 0.0
     for row in range(len(gap)):
-        other = gap[row ^ 1] if law.facets else 0.0
-        wanted = pull(gap[row], other, law.stiffness[row], law.facets)
-        largest = max(largest, law.stiffness[row] * abs(gap[row]))
+        wanted = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
+        largest = max(largest, stiffness[row] * abs(gap[row]))
         off = max(off, abs(wanted - force[row]))
         if wanted > 0.0:
             near[row] = True
-            if law.facets:
+            if facets:
                 near[row ^ 1] = True
     return off <= EXACT * largest
 
@@ -131,9 +134,10 @@ def _roots(gap, law, root):  # type: ignore
             low, high = open_part(gap[i], gap[i + 1])
             first, mixed, second = integrals(low, high)
             corner = np.sqrt(max(first, 1e-300))
+            below = min(mixed / corner, np.sqrt(second))  # more is rounding of a tiny opening
             root[i, 0] = scale * corner
-            root[i, 1] = scale * mixed / corner
-            root[i + 1, 0] = scale * np.sqrt(max(second - (mixed / corner) ** 2, 0.0))
+            root[i, 1] = scale * below
+            root[i + 1, 0] = scale * np.sqrt(max(second - below**2, 0.0))
 
 
 @numba.njit(cache=True)
@@ -189,25 +193,31 @@ def _solve(free, matrix, roots, force, until):  # type: ignore
 @numba.njit(cache=True)
 def _direct(free, matrix, roots, force):  # type: ignore
     """Solve for μ with R given by Cholesky's factor; the gaps, and λ in place."""
-    size = len(free)
-    spread, across = np.empty((size, size)), np.empty((size, size))
-    for i in range(size):
-        spread[i] = _times_transposed(roots, matrix[i])  # F R
-    for j in range(size):
-        across[j] = _times_transposed(roots, spread[:, j])  # Rᵀ F R
-    solution = _times_transposed(roots, free)
+    (root, facets), size = roots, len(free)
+    factor, solution = np.empty((size, size)), _times_transposed(roots, free)
     for i in range(size):
         for j in range(i + 1):
-            total = -across[j, i]
+            total = -_between(root, matrix, (i, j), facets)
             for k in range(j):
-                total -= across[i, k] * across[j, k]
-            across[i, j] = total / across[j, j] if j < i else np.sqrt(1.0 + total)
+                total -= factor[i, k] * factor[j, k]
+            factor[i, j] = total / factor[j, j] if j < i else np.sqrt(1.0 + total)
         for k in range(i):
-            solution[i] -= across[i, k] * solution[k]
-        solution[i] /= across[i, i]
+            solution[i] -= factor[i, k] * solution[k]
+        solution[i] /= factor[i, i]
     for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            solution[i] -= across[k, i] * solution[k]
-        solution[i] /= across[i, i]
+        solution[i] /= factor[i, i]
+        for k in range(i):
+            solution[k] -= factor[i, k] * solution[i]
     force[:] = _times_root(roots, solution)
     return free + matrix @ force
+
+
+@numba.njit(cache=True)
+def _between(root, matrix, place, facets):  # type: ignore
+    """One entry of Rᵀ F R."""
+    i, j = place
+    if not facets:
+        return root[i, 0] * matrix[i, j] * root[j, 0]
+    own = matrix[i, j] * root[j, 0] + matrix[i, j ^ 1] * root[j, 1]
+    other = matrix[i ^ 1, j] * root[j, 0] + matrix[i ^ 1, j ^ 1] * root[j, 1]
+    return root[i, 0] * own + root[i, 1] * other

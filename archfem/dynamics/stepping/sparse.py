@@ -95,12 +95,10 @@ class Sparse(Reordered):
 
 @overload(solve)
 def _solve(system, vector, gap, before, force):  # type: ignore
-    if getattr(system, "instance_class", None) is SparseSystem:
-        return lambda system, vector, gap, before, force: solved(system, vector, gap, before, force)
+    return _solved if getattr(system, "instance_class", None) is SparseSystem else None
 
 
-@numba.njit(cache=True)
-def solved(system, vector, gap, before, force):  # type: ignore
+def _solved(system, vector, gap, before, force):  # type: ignore
     """Solve a step: from its right side to the contact, in place; leaves gaps and λ.
 
     Returns:
