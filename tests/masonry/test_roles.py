@@ -9,7 +9,7 @@ import pytest
 
 import archfem as af
 from archfem.cases.findings import of_run
-from archfem.masonry.roles import part_role
+from archfem.masonry.roles import judged_parts, part_role
 from archfem.masonry.softness import yielding_blocks
 from archfem.view.marks import joint_marks
 
@@ -211,6 +211,11 @@ def test_names_that_leave_a_role_open(part, role, why, told):
     (said,) = told()
     assert f"part '{part}' is taken for" in said
     assert why in said
+
+
+def test_rings_and_piers_are_judged_or_all_where_there_is_neither():
+    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
+    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
 
 
 def test_roles_that_contradict_one_another_are_refused():
