@@ -34,6 +34,7 @@ from .masonry import shapes as shapes
 from .masonry.actions import BodyForce as BodyForce
 from .masonry.actions import PointLoad as PointLoad
 from .masonry.actions import Settlement as Settlement
+from .masonry.block import Block as Block
 from .masonry.materials import STONE as STONE
 from .masonry.materials import Contact as Contact
 from .masonry.materials import Material as Material
@@ -41,7 +42,6 @@ from .masonry.shapes.bridges import bridge as bridge
 from .masonry.shapes.rings import arch_on_piers as arch_on_piers
 from .masonry.shapes.rings import circular_arch as circular_arch
 from .masonry.shapes.rings import column as column
-from .masonry.structure import Block as Block
 from .masonry.structure import Joint as Joint
 from .masonry.structure import Structure as Structure
 from .masonry.survey.survey import read_outlines as read_outlines

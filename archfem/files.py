@@ -8,12 +8,15 @@ from pathlib import Path
 
 @contextmanager
 def in_one_stroke(path: Path) -> Iterator[Path]:
-    """A draft of the same suffix to write to; it takes the file's place when all is written.
+    """Give a draft to write to, which takes the file's place when all is written.
 
     Whatever goes wrong, or ends the process, leaves the old file or the new one, never half of it.
 
     Args:
         path: the file; folders are made.
+
+    Yields:
+        Path of the draft, in the same folder and with the same suffix.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")

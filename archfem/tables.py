@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns of text, the first to the left, the others to the right.
+    """Return columns of text, the first to the left, the others to the right.
 
     Args:
         head: titles of the columns.

@@ -30,7 +30,7 @@ def _registry() -> Any:
 
 
 def in_unit(value: Any, unit: str, key: str) -> float:
-    """Turn a number, or a number with a unit, into a number in the given unit.
+    """Return a number, or a number with a unit, as a number in the given unit.
 
     Args:
         value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already.

@@ -2,6 +2,7 @@
 
     law         tractions from opening and slip
     quadrature  rules that integrate the traction along a joint
+    points      points on the joints, and forces there by springs or exact integrals
     operator    the joint operator G, from coordinates to forces
     rigid       G of rigid blocks
     sparsity    one sparsity pattern for a family of matrices

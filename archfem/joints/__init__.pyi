@@ -1,6 +1,7 @@
 from .criteria import Criteria as Criteria
 from .criteria import flags as flags
 from .criteria import judged as judged
+from .criteria import roles_of as roles_of
 from .operator import JointOperator as JointOperator
 from .quadrature import Quadrature as Quadrature
 from .resultants import joint_dataset as joint_dataset

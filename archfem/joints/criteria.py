@@ -57,7 +57,11 @@ class Criteria:
 
     @classmethod
     def of(cls, joints: xr.Dataset) -> "Criteria":
-        """Criteria by which joints were judged; the usual ones where they do not tell."""
+        """Return the criteria by which joints were judged; the usual ones where they do not tell.
+
+        Args:
+            joints: as made by `joint_dataset`, which tell them as attributes.
+        """
         kinds = {"hinge": float, "failures": int, "friction": float}
         told = {key: joints.attrs.get(PREFIX + key) for key in kinds}
         return cls(**{key: kinds[key](value) for key, value in told.items() if value is not None})
@@ -68,12 +72,16 @@ class Criteria:
         return {PREFIX + key: value for key, value in asdict(self).items() if value is not None}
 
     def coefficients(self, own: Any) -> Any:
-        """Coefficients of friction by which joints are judged, given the joints' own [-]."""
+        """Return the coefficients of friction by which joints are judged [-].
+
+        Args:
+            own: those of the joints' contacts, of any shape [-].
+        """
         return own if self.friction is None else np.full_like(own, self.friction)
 
 
 def chosen(criteria: Criteria | None, **single: Any) -> Criteria | None:
-    """Criteria that were given as a whole, or by single values beside the usual others.
+    """Return criteria that were given as a whole, or by single values beside the usual others.
 
     Args:
         criteria: or None.
@@ -96,7 +104,7 @@ def failing(
     coefficients: NDArray[np.float64],
     hinge: float,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which joints hinge, and which slide; an open joint, whose e is undefined, does neither.
+    """Return which joints hinge, and which slide; an open one, whose e is undefined, does neither.
 
     Args:
         eccentricity: M / (N h) (…, n_joints) [-].
@@ -114,7 +122,7 @@ def flags(
     coefficients: NDArray[np.float64],
     hinge: float,
 ) -> dict[str, tuple[Any, ...]]:
-    """Flags of failure, as variables of a dataset.
+    """Return flags of failure, as variables of a dataset.
 
     `hinge` is the face on which a joint hinges (1 extrados, -1 intrados, where it stays closed; 0
     none), `slide` says whether its mobilised friction has reached its coefficient, and `open`
@@ -137,7 +145,7 @@ def flags(
 
 
 def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
-    """Joints with the flags of some criteria, which the dataset then carries as attributes.
+    """Return joints with the flags of some criteria, which they then carry as attributes.
 
     Args:
         joints: N, eccentricity and friction, as made by `joint_dataset`.
@@ -161,24 +169,31 @@ def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
 
 
 def failed(joints: xr.Dataset) -> xr.DataArray:
-    """Whether each joint hinges, slides or has come apart, by the flags that it carries."""
+    """Return whether each joint hinges, slides or has come apart.
+
+    Args:
+        joints: with the flags of `flagged`, of one instant or of many.
+    """
     return ((joints["hinge"] != 0) | joints["slide"] | joints["open"]).rename("failed")
 
 
 def first_time(flags: xr.DataArray) -> xr.DataArray:
-    """First time at which each joint is flagged [s]; NaN where it never is.
+    """Return the first time at which each joint is flagged [s]; NaN where it never is.
 
     Args:
         flags: true or false over time and joint.
     """
-    found = flags["time"].values[flags.argmax("time").values]
-    return xr.where(flags.any("time"), found, np.nan).rename("first_time")
+    found, ever = flags["time"].values[flags.argmax("time").values], flags.any("time")
+    return ever.copy(data=np.where(ever, found, np.nan)).rename("first_time")
 
 
 def longest_duration(flags: xr.DataArray) -> xr.DataArray:
-    """Longest unbroken time for which each joint is flagged [s].
+    """Return the longest unbroken time for which each joint is flagged [s].
 
     A flag raised at a single instant lasts for one time step.
+
+    Args:
+        flags: true or false over time and joint.
     """
     time = flags["time"].values
     step = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(1)
@@ -189,7 +204,11 @@ def longest_duration(flags: xr.DataArray) -> xr.DataArray:
 
 
 def envelope(joints: xr.Dataset) -> xr.Dataset:
-    """Least and largest eccentricity, and largest friction, of each joint over a run."""
+    """Return the `lowest` and `highest` eccentricity and largest `friction` of each joint [-].
+
+    Args:
+        joints: over time and joint, as made by `joint_dataset`.
+    """
     return xr.Dataset(
         {
             "lowest": joints["eccentricity"].min("time"),
@@ -200,7 +219,7 @@ def envelope(joints: xr.Dataset) -> xr.Dataset:
 
 
 def roles_of(joints: xr.Dataset) -> dict[str, str]:
-    """Role of each part, by its name, in the order of the joints.
+    """Return the role of each part, by its name, in the order of the joints.
 
     Args:
         joints: as made by `joint_dataset`, with `part` and `role`.
@@ -212,5 +231,9 @@ def roles_of(joints: xr.Dataset) -> dict[str, str]:
 
 
 def judged(joints: xr.Dataset) -> xr.Dataset:
-    """Those joints that are judged, by the flag that they carry; they keep their numbers."""
+    """Return those joints that are judged; they keep their numbers.
+
+    Args:
+        joints: with the coordinate `judged`, as made by `joint_dataset` or `flagged`.
+    """
     return joints.isel(joint=joints["judged"].values)

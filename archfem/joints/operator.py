@@ -2,9 +2,8 @@
 
 With G the sparse operator that takes generalised coordinates q to (opening, slip) at points along
 the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G. Whatever the
-coordinates are (nodes, rigid motions, modes), the rest is the same. How the traction between and
-at the points becomes the forces f is the law's: springs at quadrature points, f = W t, or the exact
-integral over facets along which opening and slip are linear.
+coordinates are (nodes, rigid motions, modes), the rest is the same. How the traction becomes the
+forces f is told in `points`.
 """
 
 from collections.abc import Sequence
@@ -16,151 +15,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.law import is_closed, normal_traction
-from archfem.joints.quadrature import Quadrature
+from archfem.joints.law import is_closed
+from archfem.joints.points import Facets, JointPoints, Law
 from archfem.joints.sparsity import Pattern
-from archfem.masonry.structure import Structure
 
-Numbers = NDArray[np.intp]
 Status = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class JointPoints:
-    """Quadrature points on the joints of a structure.
-
-    Attributes:
-        joint: number of the joint each point lies on (p,).
-        arm: distance from the joint's mid-point toward the extrados (p,) [m].
-        weight: joint area that each point stands for, width included (p,) [m²].
-        normal_stiffness: k_n (p,) [Pa/m].
-        shear_stiffness: k_s (p,) [Pa/m].
-        count: number of joints.
-    """
-
-    joint: Numbers
-    arm: Array
-    weight: Array
-    normal_stiffness: Array
-    shear_stiffness: Array
-    count: int
-
-    @classmethod
-    def on(cls, structure: Structure, rules: list[tuple[Array, Array]]) -> "JointPoints":
-        """Put points on joints, given each joint's arms [m] and lengths [m]."""
-        sizes = [len(arms) for arms, _ in rules]
-        joint = np.repeat(np.arange(len(rules)), sizes)
-        contacts = [each.contact for each in structure.joints]
-        return cls(
-            joint,
-            np.concatenate([arms for arms, _ in rules]),
-            np.concatenate([lengths for _, lengths in rules]) * structure.width,
-            np.array([contact.normal_stiffness for contact in contacts])[joint],
-            np.array([contact.shear_stiffness for contact in contacts])[joint],
-            len(rules),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Springs:
-    """The traction integrated by a quadrature rule: each point is a spring of its own.
-
-    The stiffness of the points is all or nothing, so the tangent changes only with the status.
-
-    Attributes:
-        points: where the springs are.
-    """
-
-    points: JointPoints
-
-    @property
-    def entries(self) -> tuple[Numbers, Numbers]:
-        """Pairs of points whose forces and openings are coupled."""
-        number = np.arange(len(self.points.arm))
-        return number, number
-
-    @cached_property
-    def _normal(self) -> Array:
-        return self.points.weight * self.points.normal_stiffness
-
-    @cached_property
-    def shear(self) -> sparse.csr_matrix:
-        """Shear forces at the points from slips (p, p) [N/m]."""
-        return sparse.diags(self.points.weight * self.points.shear_stiffness).tocsr()
-
-    def forces(self, opening: Array) -> Array:
-        """Normal forces at the points, positive where they pull (p,) [N]."""
-        return normal_traction(opening, self._normal)
-
-    def stiffness(self, opening: Array) -> Array:
-        """Derivative of `forces`, one number for each of `entries` [N/m]."""
-        return np.where(is_closed(opening), self._normal, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """The traction integrated exactly over facets along which the opening is linear.
-
-    With φ the two linear functions of a facet and c the part of it that is closed,
-
-        f_i = K_ij g_j,   K_ij = ∫_c w k_n φ_i φ_j,
-
-    and because the traction vanishes at the end of c, K is the derivative of f as well.
-
-    Attributes:
-        points: two to a facet, its ends, in turn.
-    """
-
-    points: JointPoints
-
-    @property
-    def _starts(self) -> Numbers:
-        return np.arange(0, len(self.points.arm), 2)
-
-    @property
-    def entries(self) -> tuple[Numbers, Numbers]:
-        """Pairs of points whose forces and openings are coupled."""
-        a, b = self._starts, self._starts + 1
-        return np.concatenate([a, a, b, b]), np.concatenate([a, b, a, b])
-
-    @cached_property
-    def _normal(self) -> Array:
-        both = self.points.weight * self.points.normal_stiffness
-        return both[0::2] + both[1::2]
-
-    @cached_property
-    def shear(self) -> sparse.csr_matrix:
-        """Shear forces at the ends from slips, exact for linear slip (p, p) [N/m]."""
-        both = self.points.weight * self.points.shear_stiffness
-        whole = sparse.diags((both[0::2] + both[1::2]) / 6.0)
-        return sparse.kron(whole, [[2.0, 1.0], [1.0, 2.0]]).tocsr()
-
-    def _closed(self, opening: Array) -> tuple[Array, Array, Array]:
-        """∫_c φ_i φ_j over a facet of unit length, for (1, 1), (1, 2) and (2, 2)."""
-        a, b = opening[0::2], opening[1::2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            zero = np.where(a != b, np.clip(a / (a - b), 0.0, 1.0), 0.0)
-        start = np.where(is_closed(a), 0.0, zero)
-        end = np.where(is_closed(b), 1.0, zero)
-        closed = is_closed(a) | is_closed(b)
-        start, end = np.where(closed, start, 0.0), np.where(closed, end, 0.0)
-        squares, cubes = (end**2 - start**2) / 2.0, (end**3 - start**3) / 3.0
-        return (end - start) - 2.0 * squares + cubes, squares - cubes, cubes
-
-    def forces(self, opening: Array) -> Array:
-        """Normal forces at the ends of the facets, positive where they pull (p,) [N]."""
-        first, mixed, second = self._closed(opening)
-        a, b = opening[0::2], opening[1::2]
-        ends = self._normal * np.stack([first * a + mixed * b, mixed * a + second * b])
-        return ends.T.ravel()
-
-    def stiffness(self, opening: Array) -> Array:
-        """Derivative of `forces`, one number for each of `entries` [N/m]."""
-        first, mixed, second = self._closed(opening)
-        return np.concatenate([self._normal * k for k in (first, mixed, mixed, second)])
-
-
-Law = Springs | Facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,35 +57,70 @@ class JointOperator:
         return force, sparse.csr_matrix((points.arm, places), shape)
 
     def openings(self, q: Array) -> Array:
-        """Openings at the points (p,) [m]."""
-        return self.opening @ q if self.offset is None else self.opening @ q + self.offset[0]
+        """Return the openings at the points, positive where open (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        found: Array = self.opening @ q
+        return found if self.offset is None else found + self.offset[0]
 
     def slips(self, q: Array) -> Array:
-        """Slips at the points (p,) [m]."""
-        return self.slip @ q if self.offset is None else self.slip @ q + self.offset[1]
+        """Return the slips at the points, of the higher block toward the extrados (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        found: Array = self.slip @ q
+        return found if self.offset is None else found + self.offset[1]
 
     def force(self, q: Array) -> Array:
-        """Generalised forces that the joints exert, as internal forces (n,)."""
+        """Return the generalised forces that the joints exert, as internal forces (n,).
+
+        Args:
+            q: coordinates (n,).
+        """
         normal, shear = self._back
-        return normal @ self.law.forces(self.openings(q)) + shear @ self.slips(q)
+        force: Array = normal @ self.law.forces(self.openings(q)) + shear @ self.slips(q)
+        return force
 
     def energy(self, q: Array) -> float:
-        """Energy stored in the joints [J]; forces are homogeneous, so it is half of f·g."""
+        """Return the energy stored in the joints [J]: half of f·g, as forces are homogeneous.
+
+        Args:
+            q: coordinates (n,).
+        """
         opening, slip = self.openings(q), self.slips(q)
         return 0.5 * float(opening @ self.law.forces(opening) + slip @ (self.law.shear @ slip))
 
     def status(self, q: Array) -> Status:
-        """Which points are closed (p,)."""
+        """Return which points are closed (p,).
+
+        Args:
+            q: coordinates (n,).
+        """
         return is_closed(self.openings(q))
 
     def stiffness(self, q: Array) -> Array:
-        """The numbers on which the tangent depends, for `normal_stiffness` (entries,) [N/m]."""
+        """Return the numbers on which the tangent depends, as `matrices` takes them (m,) [N/m].
+
+        Args:
+            q: coordinates (n,).
+        """
         return self.law.stiffness(self.openings(q))
 
-    def normal_stiffness(self, pattern: Pattern) -> sparse.csr_matrix:
-        """The linear map from `stiffness` to the entries of the tangent on a pattern (nnz, m)."""
+    def matrices(self, pattern: Pattern) -> tuple[Array, sparse.csr_matrix]:
+        """Return the parts of the tangent on a pattern, as always + across @ `stiffness`.
+
+        Args:
+            pattern: that has all `couplings` (nnz entries).
+
+        Returns:
+            Entries that never change, of the slips (nnz,), and the linear map from `stiffness` to
+            the entries of the openings (nnz, m).
+        """
         first, second = (self.opening[side] for side in self.law.entries)
-        return pattern.outer(first, second)
+        return pattern.spread(self.shear_stiffness()).data, pattern.outer(first, second)
 
     def shear_stiffness(self) -> sparse.csr_matrix:
         """The part of the tangent that never changes (n, n)."""
@@ -244,9 +138,12 @@ class JointOperator:
         return (across + slip.T @ (_ones(self.law.shear) @ slip)).tocsr()
 
     def resultants(self, q: Array) -> Array:
-        """N, V, M of every joint (n_joints, 3) [N, N, N m].
+        """Return N, V, M of every joint (n_joints, 3) [N, N, N m].
 
         N = -∫ w t_n,   V = ∫ w t_s,   M = -∫ w t_n r
+
+        Args:
+            q: coordinates (n,).
         """
         normal = self.law.forces(self.openings(q))
         shear = self.law.shear @ self.slips(q)
@@ -254,13 +151,20 @@ class JointOperator:
         return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
 
     def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
-        """Express the same joints in the coordinates of a basis (n, m): G B."""
+        """Return the same joints in the coordinates of a basis, G B.
+
+        Args:
+            basis: what each new coordinate is in the old ones (n, m).
+        """
         return replace(self, opening=self.opening @ basis, slip=self.slip @ basis)
 
     def spanned(self, whole: Sequence[bool]) -> "JointOperator":
-        """One facet instead of several on each joint that moves as a plane (n_joints,).
+        """Return one facet instead of several on each joint whose faces stay plane.
 
         Only for `Facets`: the first and the last point of the joint become the facet's ends.
+
+        Args:
+            whole: whether they stay plane, for each joint (n_joints,).
         """
         points = self.points
         first = np.searchsorted(points.joint, np.arange(points.count))
@@ -288,8 +192,3 @@ class JointOperator:
 def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
     """A matrix of ones wherever another stores an entry, zero or not."""
     return sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), matrix.shape)
-
-
-def law_of(rule: Quadrature, points: JointPoints) -> Law:
-    """The law that a quadrature rule asks for."""
-    return Facets(points) if rule.rule == "exact" else Springs(points)

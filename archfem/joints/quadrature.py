@@ -1,13 +1,16 @@
 """Rules that integrate the traction along a joint."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from archfem.arguments import whole
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
+
+legendre: Any = np.polynomial.legendre
+"""Its functions have no types."""
 
 RULES = ("lobatto", "nodal", "gauss", "exact")
 
@@ -45,7 +48,11 @@ class Quadrature:
             )
 
     def count(self, degree: int) -> int:
-        """Points on one facet of an element of this degree."""
+        """Return the number of points on one facet.
+
+        Args:
+            degree: of the element, which only the nodal rule asks for.
+        """
         if self.rule == "exact":
             return 2
         if self.rule == "nodal":
@@ -53,7 +60,11 @@ class Quadrature:
         return self.points or 3
 
     def on_facet(self, degree: int) -> tuple[Array, Array]:
-        """Points (p,) and weights (p,) on the interval from 0 to 1, in ascending order."""
+        """Return points (p,) and weights (p,) on the interval from 0 to 1, in ascending order.
+
+        Args:
+            degree: of the element, which only the nodal rule asks for.
+        """
         n = self.count(degree)
         points, weights = legendre.leggauss(n) if self.rule == "gauss" else _lobatto(n)
         return 0.5 * (1.0 + points), 0.5 * weights

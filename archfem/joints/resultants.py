@@ -24,7 +24,7 @@ UNITS = {
 
 
 def ratios(resultants: Array, depth: Array) -> tuple[Array, Array]:
-    """Eccentricity and mobilised friction of joints; undefined (NaN) where they are open.
+    """Return eccentricity and mobilised friction of joints; undefined (NaN) where they are open.
 
     Args:
         resultants: N, V, M for the whole width (…, n_joints, 3) [N, N, N m].
@@ -44,7 +44,7 @@ def joint_dataset(
     time: Array | None = None,
     criteria: Criteria | None = None,
 ) -> xr.Dataset:
-    """Label resultants, and derive eccentricity, mobilised friction and flags of failure from them.
+    """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
     without compression is open: its eccentricity and friction are undefined (NaN).
@@ -103,7 +103,7 @@ def check_instant(structure: Structure, joints: xr.Dataset) -> None:
 
 
 def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
-    """What is known of one joint, over time where the joints are.
+    """Return what is known of one joint, over time where the joints are.
 
     Args:
         joints: as made by `joint_dataset`, all of them.
@@ -117,7 +117,7 @@ def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
 
 
 def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
-    """Points where the resultant crosses each joint, in space.
+    """Return the points where the resultant crosses each joint, in space.
 
     Args:
         structure: whose joints they are.
@@ -125,6 +125,9 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
 
     Returns:
         (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
+
+    Raises:
+        InvalidInput: either is something else.
     """
     instance(structure, Structure, "structure", "give that whose joints these are")
     instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")

@@ -4,14 +4,20 @@ import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.operator import JointOperator, JointPoints, law_of
+from archfem.joints.operator import JointOperator
+from archfem.joints.points import JointPoints, law_of
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
 
 
 def facets_of(depth: float, cells: int) -> Array:
-    """Ends of equal facets along a joint, from its mid-point toward the extrados [m]."""
+    """Return the ends of equal facets along a joint (cells + 1,), from its mid-point outwards [m].
+
+    Args:
+        depth: of the joint [m].
+        cells: number of facets.
+    """
     return depth * np.linspace(-0.5, 0.5, cells + 1)
 
 

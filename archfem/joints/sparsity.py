@@ -23,7 +23,11 @@ class Pattern:
 
     @classmethod
     def of(cls, *matrices: sparse.csr_matrix) -> "Pattern":
-        """The union of several patterns."""
+        """Return the union of the patterns of some matrices.
+
+        Args:
+            matrices: square and of one size, each (n, n).
+        """
         ones = [sparse.csr_matrix((np.ones(m.nnz), m.indices, m.indptr), m.shape) for m in matrices]
         union = sum(ones[1:], ones[0]).tocsr()
         union.sort_indices()
@@ -44,20 +48,28 @@ class Pattern:
         return places
 
     def matrix(self, data: Array) -> sparse.csr_matrix:
-        """A matrix of this pattern from its entries (nnz,)."""
+        """Return a matrix of this pattern.
+
+        Args:
+            data: its entries, which it shares (nnz,).
+        """
         result = sparse.csr_matrix((self.size, self.size))
         result.indptr, result.indices, result.data = self.indptr, self.indices, data
         return result
 
     def spread(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-        """The same matrix stored on this pattern."""
+        """Return the same matrix stored on this pattern.
+
+        Args:
+            matrix: whose entries all lie in the pattern (n, n).
+        """
         entries = matrix.tocoo()
         data = np.zeros(len(self.indices))
         np.add.at(data, self._places(entries.row, entries.col), entries.data)
         return self.matrix(data)
 
     def outer(self, left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
-        """Linear map (nnz, m) from factors d to the entries of Σ_k d_k l_k r_kᵀ.
+        """Return the linear map (nnz, m) from factors d to the entries of Σ_k d_k l_k r_kᵀ.
 
         Args:
             left: l_k (m, n).

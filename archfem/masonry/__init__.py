@@ -1,6 +1,7 @@
 """What stands and what acts on it: blocks, joints, materials, parts and their roles.
 
-    structure     `Block`, `Joint`, `Structure`: what stands and what touches
+    block         `Block`: a plane body, its outline, area and centroid
+    structure     `Joint`, `Structure`: what touches, and what both form
     materials     what blocks are made of and how they touch
     roles         which parts are rings, piers or neither
     actions       what acts besides self-weight: body forces, point loads, settlements

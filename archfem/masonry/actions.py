@@ -47,7 +47,10 @@ class PointLoad:
         object.__setattr__(self, "force", reals(self.force, "point load, force (x, y) [N]", 2))
 
     def place(self, structure: Structure) -> tuple[int, Array]:
-        """Number of the loaded block and the loaded point (2,) [m].
+        """Return the number of the loaded block and the loaded point (2,) [m].
+
+        Args:
+            structure: whose blocks that move may carry it.
 
         Raises:
             InvalidInput: no block that moves lies below or above x.
@@ -88,7 +91,10 @@ class Settlement:
         object.__setattr__(self, "motion", motion)
 
     def place(self, structure: Structure) -> int:
-        """Number of the block that settles.
+        """Return the number of the block that settles.
+
+        Args:
+            structure: whose fixed blocks are its supports.
 
         Raises:
             InvalidInput: there is no such block, or it is not a support.
@@ -102,7 +108,15 @@ class Settlement:
         return int(number)
 
     def added(self, structure: Structure, supports: Array) -> Array:
-        """Motions of all blocks with this one on top (n_blocks, 3) [m, m, rad]."""
+        """Return the motions of all blocks with this one on top (n_blocks, 3) [m, m, rad].
+
+        Args:
+            structure: one of whose supports settles.
+            supports: motions of its blocks so far (n_blocks, 3) [m, m, rad]; left as they are.
+
+        Raises:
+            InvalidInput: there is no such support.
+        """
         moved = supports.copy()
         moved[self.place(structure)] += self.motion
         return moved
@@ -112,7 +126,7 @@ Action = BodyForce | PointLoad
 
 
 def loads(given: Action | Sequence[Action]) -> list[Action]:
-    """One action, or several that grow together, as a list.
+    """Return one action, or several that grow together, as a list.
 
     Args:
         given: a `BodyForce`, a `PointLoad`, or some of them.

@@ -7,10 +7,11 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput, InvalidStructure
+from archfem.masonry.block import Block
 from archfem.masonry.direction import Direction, directions_of
 from archfem.masonry.materials import Contact
 from archfem.masonry.roles import with_roles
-from archfem.masonry.structure import TOUCHING, Block, Joint, Structure
+from archfem.masonry.structure import TOUCHING, Joint, Structure
 from archfem.units import G
 
 ContactOf = Callable[[Block, Block], Contact]
@@ -32,7 +33,7 @@ def assembled(
     gravity: float = G,
     name: str = "structure",
 ) -> Structure:
-    """Make a structure of blocks, with a joint along every line on which two of them touch.
+    """Return a structure of blocks, with a joint along every line on which two of them touch.
 
     Joints across a ring or a pier come first, named and counted along it: "main arch, joint 0" is
     its left springing, "north pier, base" its foot, "north pier, joint 1" the next one up. Their
@@ -80,12 +81,12 @@ def assembled(
 
 
 def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
-    """Tell how blocks touch by the names of their materials.
+    """Return how blocks touch, by the names of their materials.
 
     Args:
         contact: of two blocks of one material.
         pairs: contacts of two materials, "stone/backfill". Where a pair is missing, its blocks may
-            not touch.
+            not touch: asked for their contact, what is returned raises `InvalidInput`.
 
     Raises:
         InvalidInput: a key is no pair of names.
@@ -110,10 +111,13 @@ def by_materials(contact: Contact, pairs: Mapping[str, Contact]) -> ContactOf:
 
 
 def touching(blocks: Sequence[Block]) -> list[Touch]:
-    """Find the straight lines along which blocks touch, back to back.
+    """Return the straight lines along which blocks touch, back to back.
 
     Args:
         blocks: whose outlines may have points in the middle of a line; arcs touch nothing.
+
+    Raises:
+        InvalidStructure: there are no blocks.
     """
     starts, ends, owner = _edges(blocks)
     if not len(starts):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.masonry.structure import Block
+from archfem.masonry.block import Block
 
 STRAIGHT = 0.005
 """Spread of a ring's stones across its length, relative to that along it, up to which it has no
@@ -34,21 +34,35 @@ class Direction:
     upright: bool
 
     def outward(self, place: Array) -> Array:
-        """Unit vector (2,) from the inner to the outer face; to the right of one that stands."""
+        """Return the unit vector (2,) from the inner to the outer face; of one that stands, right.
+
+        Args:
+            place: on the ring or the pier (2,) [m].
+        """
         if self.centre is None:
             return np.array([1.0, 0.0] if self.upright else [0.0, 1.0])
         arm = place - self.centre
         return arm / np.linalg.norm(arm)
 
     def separates(self, line: Array) -> bool:
-        """Whether a line (2, 2) lies across, as the joints between its stones do."""
+        """Return whether a line lies across, as the joints between its stones do.
+
+        Args:
+            line: its two ends (2, 2) [m].
+        """
         step = line[1] - line[0]
         return bool(2.0 * (step @ self.outward(line.mean(axis=0))) ** 2 > step @ step)
 
     def along(self, place: Array) -> float:
-        """Where a place lies along: to the right, upwards, or clockwise about the centre.
+        """Return where a place lies along: to the right, upwards, or clockwise about the centre.
 
         Angles count from the gap that the ring leaves open, so from the left springing.
+
+        Args:
+            place: on the ring or the pier (2,) [m].
+
+        Returns:
+            A coordinate [m], of a ring an angle [rad], that grows from joint to joint.
         """
         if self.centre is None:
             return float(place[1] if self.upright else place[0])
@@ -60,11 +74,11 @@ class Direction:
 def directions_of(
     blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]
 ) -> dict[str, Direction]:
-    """Find which way rings and piers run, by the names of their parts; only named ones are found.
+    """Return which way rings and piers run, by the names of their parts; only of named ones.
 
     Args:
         blocks: of a structure, with their roles.
-        lines: on which two of them touch, and the numbers of the two.
+        lines: on which two of them touch (2, 2) [m], after the numbers of the two.
     """
     stones: dict[str, list[Array]] = {}
     beds: dict[str, list[Array]] = {}

@@ -7,7 +7,7 @@ from archfem.errors import InvalidInput
 
 
 def number_of(kind: str, names: Sequence[str], wanted: str | int) -> int:
-    """Number of a thing, given by its name or by that number.
+    """Return the number of a thing, given by its name or by that number.
 
     Args:
         kind: what it is, "joint" or "block".
@@ -30,7 +30,7 @@ def number_of(kind: str, names: Sequence[str], wanted: str | int) -> int:
 
 
 def did_you_mean(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
-    """A question after the known word nearest to a misspelt one; empty where none is near.
+    """Return a question after the known word nearest to a misspelt one; empty where none is near.
 
     Args:
         word: which is not known.

@@ -10,7 +10,11 @@ from archfem.masonry.structure import TOUCHING
 
 
 def check_simple(outline: Array, name: str) -> None:
-    """Refuse an outline (n, 2) that crosses or touches itself.
+    """Refuse an outline that crosses or touches itself.
+
+    Args:
+        outline: vertices of a block, either way round (n, 2) [m].
+        name: of the block.
 
     Raises:
         InvalidStructure: names the block.
@@ -26,10 +30,10 @@ def check_simple(outline: Array, name: str) -> None:
 
 
 def check_apart(outlines: Sequence[Array], names: Sequence[str], slight: float = 0.0) -> None:
-    """Refuse outlines (n, 2) that are the same or overlap.
+    """Refuse outlines that are the same or overlap.
 
     Args:
-        outlines: of blocks, none of which crosses itself [m].
+        outlines: of blocks, none of which crosses itself, each (n, 2) [m].
         names: of the blocks.
         slight: depth of overlap that a survey's tolerance might remove [m], for the advice.
 

@@ -54,7 +54,7 @@ AnyMember = TypeVar("AnyMember", bound=Member)
 def with_roles(
     members: Sequence[AnyMember], others: Sequence[Member] = ()
 ) -> tuple[AnyMember, ...]:
-    """Blocks or joints with the roles of their parts, filled in where they do not tell them.
+    """Return blocks or joints with the roles of their parts, filled in where they do not tell them.
 
     What one of a part tells goes for all of it. Where none does, its name decides (`part_role`).
 
@@ -126,7 +126,7 @@ def part_role(part: str) -> str:
 
 
 def judged_parts(roles: Mapping[str, str]) -> tuple[str, ...]:
-    """Those parts whose failures and motions are judged: rings and piers, in the order given.
+    """Return the parts whose failures and motions are judged: rings and piers, in their order.
 
     Where there is neither, as in a wall by itself, every part is judged.
 

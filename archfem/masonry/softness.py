@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from archfem.masonry.structure import Block, Structure
+from archfem.masonry.block import Block
+from archfem.masonry.structure import Structure
 
 SEISMIC = 25.0
 """Upper end of the band in which earthquakes carry energy [Hz]."""
@@ -33,7 +34,14 @@ class Softness:
 
 
 def softness(structure: Structure, number: int) -> Softness:
-    """Estimate from a shear wave that crosses the block twice, c_s / (2 L) with L² its area."""
+    """Return an estimate of how soft a block is.
+
+    Its first mode is that of a shear wave which crosses it twice, c_s / (2 L) with L² its area.
+
+    Args:
+        structure: whose joints hold it.
+        number: of the block.
+    """
     block = structure.blocks[number]
     length = sqrt(block.area)
     stiffest = max(
@@ -48,16 +56,26 @@ def _shear_modulus(block: Block) -> float:
 
 
 def soft_blocks(structure: Structure) -> tuple[int, ...]:
-    """Blocks whose inner modes reach down to the seismic band: they need all their nodes."""
+    """Return the numbers of the blocks whose inner modes reach down to the seismic band.
+
+    They need all their nodes.
+
+    Args:
+        structure: whose blocks that move are looked at.
+    """
     return tuple(
         number for number in structure.free if softness(structure, number).inner < CLEAR * SEISMIC
     )
 
 
 def yielding_blocks(structure: Structure) -> tuple[int, ...]:
-    """Blocks, neither of rings nor of piers, that deform rather than let their joints open.
+    """Return the numbers of the blocks that deform rather than let their joints open.
 
-    A fill fits itself to what it lies on. Taken as one rigid body it would hold every ring below.
+    They are of neither rings nor piers. A fill fits itself to what it lies on; taken as one rigid
+    body it would hold every ring below.
+
+    Args:
+        structure: whose blocks that move are looked at.
     """
     return tuple(
         number

@@ -1,4 +1,4 @@
-"""What stands and what touches: blocks, the joints between them, and the structure they form."""
+"""What stands and what touches: the joints between blocks, and the structure that both form."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,103 +9,14 @@ from numpy.typing import NDArray
 from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
-from archfem.masonry.geometry import area_of_polygon, area_of_sector, side_of_line
-from archfem.masonry.materials import Contact, Material
+from archfem.masonry.block import Block, Point
+from archfem.masonry.materials import Contact
 from archfem.masonry.naming import number_of
 from archfem.masonry.roles import judged_parts, with_roles
 from archfem.units import G
 
-Point = tuple[float, float]
-
 TOUCHING = 1e-6
 """Largest distance of two points that count as one, relative to the size of the structure."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """A plane body bounded by straight edges, or a voussoir cut from a circular ring.
-
-    Attributes:
-        outline: vertices in anticlockwise order [m].
-        material: what it is made of.
-        name: how a person finds it.
-        fixed: an abutment or foundation, which does not move of itself.
-        corners: numbers of the four vertices between which a structured mesh is spanned, or None
-            for an unstructured one. Cells *along* lie on the first and third of the four sides so
-            made, cells *through the thickness* on the second and fourth.
-        part: the part of the structure it belongs to, e.g. "arch" or "north pier".
-        centre: where given, the first and third sides of the four-sided outline are arcs about
-            this point, and the other two are radial: an annular sector.
-        role: of its part: "ring" or "pier", which are judged, or "other", which follows what
-            carries it. Where nothing of a part tells it, the structure fills it in by the words of
-            the part's name, and warns where they leave it open; without a name a part is a ring.
-    """
-
-    outline: tuple[Point, ...]
-    material: Material
-    name: str
-    fixed: bool = False
-    corners: tuple[int, int, int, int] | None = None
-    part: str = ""
-    centre: Point | None = None
-    role: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse outlines that do not bound an area anticlockwise."""
-        if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
-            raise InvalidStructure(
-                f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"
-            )
-        if self.area <= 0.0:
-            raise InvalidStructure(
-                f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"
-            )
-
-    @cached_property
-    def points(self) -> Array:
-        """Vertices (n, 2) [m]."""
-        return np.array(self.outline, dtype=float)
-
-    def arc(self, side: int, pieces: int) -> Array:
-        """Points on side 0 or 2 of a sector, at equal angles (pieces + 1, 2) [m]."""
-        arm = self.points - np.array(self.centre)
-        start, end = arm[side], arm[side + 1]
-        turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
-        angles = turn * np.linspace(0.0, 1.0, pieces + 1)[:, None]
-        across = np.array([-start[1], start[0]])
-        return np.array(self.centre) + np.cos(angles) * start + np.sin(angles) * across
-
-    def drawn(self, pieces: int = 16) -> Array:
-        """Outline with each arc replaced by so many chords (n, 2) [m]."""
-        if self.centre is None:
-            return self.points
-        return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
-
-    def side_of(self, line: Array, near: float) -> int:
-        """On which side of a line it lies: 1 left, -1 right, 0 where no straight edge covers it."""
-        return side_of_line(self.points, line, near, arcs=() if self.centre is None else (0, 2))
-
-    @cached_property
-    def _measures(self) -> tuple[float, Array, float]:
-        """Area, centroid, polar second moment of area about the centroid."""
-        if self.centre is None:
-            return area_of_polygon(self.points)
-        return area_of_sector(self.points, np.array(self.centre))
-
-    @property
-    def area(self) -> float:
-        """Area [m²]."""
-        return self._measures[0]
-
-    @property
-    def centroid(self) -> Array:
-        """Centre of gravity (2,) [m]."""
-        return self._measures[1]
-
-    @property
-    def polar_moment(self) -> float:
-        """Polar second moment of area about the centroid [m⁴]."""
-        return self._measures[2]
 
 
 @dataclass(frozen=True)
@@ -119,7 +30,8 @@ class Joint:
         contact: stiffness and friction.
         name: how a person finds it.
         part: the part of the structure it belongs to; mechanisms are counted by part.
-        role: of that part, as for a block.
+        role: of that part: "ring" or "pier", which are judged, or "other". Where nothing of the
+            part tells it, the structure fills it in, as for a block.
     """
 
     blocks: tuple[int, int]
@@ -148,7 +60,8 @@ class Joint:
     @cached_property
     def middle(self) -> Array:
         """Mid-point, from which eccentricity is measured (2,) [m]."""
-        return self.ends.mean(axis=0)
+        middle: Array = self.ends.mean(axis=0)
+        return middle
 
     @cached_property
     def depth(self) -> float:
@@ -158,7 +71,8 @@ class Joint:
     @cached_property
     def tangent(self) -> Array:
         """Unit vector from intrados to extrados (2,)."""
-        return (self.ends[1] - self.ends[0]) / self.depth
+        tangent: Array = (self.ends[1] - self.ends[0]) / self.depth
+        return tangent
 
 
 @dataclass(frozen=True)
@@ -293,11 +207,15 @@ class Structure:
         return self.width * sum(block.area * block.material.unit_weight for block in free)
 
     def density(self, block: Block) -> float:
-        """Density of a block's material under this structure's gravity [kg/m³]."""
+        """Return the density of a block's material under this structure's gravity [kg/m³].
+
+        Args:
+            block: one of the structure, or any other.
+        """
         return block.material.unit_weight / self.gravity
 
     def joint_number(self, joint: int | str) -> int:
-        """Number of a joint.
+        """Return the number of a joint.
 
         Args:
             joint: number or name.
@@ -308,7 +226,7 @@ class Structure:
         return number_of("joint", [each.name for each in self.joints], joint)
 
     def block_number(self, block: int | str) -> int:
-        """Number of a block.
+        """Return the number of a block.
 
         Args:
             block: number or name.

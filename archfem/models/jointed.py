@@ -45,8 +45,8 @@ class Jointed:
         self.cells = cells
         self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
-        self._always = self.blocks.data + pattern.spread(operator.shear_stiffness()).data
-        self._across = operator.normal_stiffness(pattern)
+        always, self._across = operator.matrices(pattern)
+        self._always = self.blocks.data + always
         self.prediction: Prediction | None = None
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 

@@ -8,7 +8,8 @@ import xarray as xr
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import check_instant, thrust_line
-from archfem.masonry.structure import Block, Structure
+from archfem.masonry.block import Block
+from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
 
 

@@ -16,9 +16,9 @@ from archfem.dynamics.time_history import time_history
 from archfem.joints.criteria import Criteria
 from archfem.limit.verified import Verifier, first_verified_mechanism
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block
 from archfem.masonry.materials import BACKFILL, STONE_TO_STONE
 from archfem.masonry.shapes import arch_on_piers, circular_arch, column
-from archfem.masonry.structure import Block
 from archfem.models.rigid import rigid
 from archfem.motion.motion import Motion
 

@@ -1,4 +1,4 @@
-"""Resultants and criteria on joints whose state is known by construction."""
+"""Criteria on joints whose state is known by construction."""
 
 from dataclasses import replace
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import archfem as af
 from archfem.cases.summary import joint_table
-from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
     envelope,
@@ -17,35 +17,6 @@ from archfem.joints.criteria import (
     judged,
     longest_duration,
 )
-from archfem.joints.resultants import joint_dataset, thrust_line
-from archfem.limit.counted import counted_mechanism, counted_mechanisms
-from archfem.limit.verified import verified_mechanism
-from archfem.masonry.materials import STONE_TO_STONE
-from archfem.masonry.roles import judged_parts
-from archfem.masonry.shapes import column
-
-DEPTH = 0.55
-
-
-@pytest.fixture
-def joints(ring):
-    """Five steps: joint 3 hinges at the intrados, 7 slides, 11 opens, at different times."""
-    resultants = np.zeros((5, 18, 3))
-    resultants[..., 0] = 1000.0
-    resultants[1:3, 3, 2] = -0.48 * 1000.0 * DEPTH
-    resultants[2:, 7, 1] = -700.0
-    resultants[2, 11] = 0.0
-    resultants[2, 14, 2] = 0.47 * 1000.0 * DEPTH
-    resultants[4, 14, 2] = 0.45 * 1000.0 * DEPTH
-    return joint_dataset(ring, resultants, np.arange(5) * 0.1)
-
-
-def test_eccentricity_and_friction(joints):
-    assert float(joints["eccentricity"][1, 3]) == pytest.approx(-0.48)
-    assert float(joints["friction"][2, 7]) == pytest.approx(0.7)
-    assert np.isnan(joints["eccentricity"][2, 11])
-    assert np.isnan(joints["friction"][2, 11])
-    assert joints["N"].attrs["units"] == "N"
 
 
 def test_flags(joints):
@@ -63,17 +34,17 @@ def test_flags(joints):
 def test_friction_at_its_limit_is_used_up_whatever_the_round_off(ring, share):
     normal = 1000.0 * 1.1 ** np.arange(18)  # V / N is then μ only to a few digits of the last
     resultants = np.stack([normal, 0.6 * share * normal, np.zeros(18)], axis=1)
-    assert joint_dataset(ring, resultants)["slide"].all()
+    assert af.joints.joint_dataset(ring, resultants)["slide"].all()
     resultants[:, 1] *= 1.0 - 1e-5
-    assert not joint_dataset(ring, resultants)["slide"].any()
+    assert not af.joints.joint_dataset(ring, resultants)["slide"].any()
 
 
 def test_a_joint_without_friction_slides_either_way():
     """A plain stack on a frictionless bed: nothing but the bed lets it move."""
-    slippery = replace(STONE_TO_STONE, friction=0.0)
-    stack = column(breadth=1.0, heights=[1.0], contact=slippery)
-    joints = joint_dataset(stack, np.array([[1000.0, 0.0, 0.0]]))
-    assert verified_mechanism(stack, joints).moved.blocks == (1,)
+    slippery = replace(af.masonry.STONE_TO_STONE, friction=0.0)
+    stack = af.column(breadth=1.0, heights=[1.0], contact=slippery)
+    joints = af.joints.joint_dataset(stack, np.array([[1000.0, 0.0, 0.0]]))
+    assert af.verified_mechanism(stack, joints).moved.blocks == (1,)
 
 
 def test_first_times_and_durations(joints):
@@ -93,22 +64,10 @@ def test_envelope(joints):
 
 
 def test_mechanism_needs_four_joints_at_once(joints):
-    found = counted_mechanism(joints)
+    found = af.limit.counted_mechanism(joints)
     assert found.time == pytest.approx(0.2)
     assert found.joints == (3, 7, 11, 14)
-    assert counted_mechanism(joints.isel(time=[0, 1, 3, 4])) is None
-
-
-def test_thrust_line_passes_the_faces_at_half(ring):
-    resultants = np.zeros((18, 3))
-    resultants[:, 0] = 1.0
-    resultants[:9, 2], resultants[9:, 2] = 0.5 * DEPTH, -0.5 * DEPTH
-    resultants[5] = 0.0
-    line = thrust_line(ring, joint_dataset(ring, resultants)).values
-    radii = np.hypot(*line.T)
-    assert radii[:5] == pytest.approx(2.95 + DEPTH / 2)
-    assert radii[9:] == pytest.approx(2.95 - DEPTH / 2)
-    assert np.isnan(line[5]).all()
+    assert af.limit.counted_mechanism(joints.isel(time=[0, 1, 3, 4])) is None
 
 
 def test_table_says_when_and_how_long(joints):
@@ -147,7 +106,7 @@ def joints_of(failing):
 def test_definitions_of_a_counted_mechanism():
     soil, three = range(14, 20), {0, 1, 9}
     states = [soil, three | set(soil), three | {10}, {0, 5, 6, 7}, {0, 5, 6, 9}, {1, 2, 3, 4, 5}]
-    found = counted_mechanisms(joints_of(states))
+    found = af.limit.counted_mechanisms(joints_of(states))
     anywhere, ring, mixed = found.values()
     assert list(found) == ["any four joints", "four in a ring", "ring and pier"]
     assert (anywhere.time, anywhere.kind, anywhere.joints) == (2.0, "global", (0, 1, 9, 10))
@@ -157,14 +116,14 @@ def test_definitions_of_a_counted_mechanism():
 
 
 def test_four_in_a_pier_are_no_four_in_a_ring():
-    found = counted_mechanisms(joints_of([{5, 6, 7, 8}]))
+    found = af.limit.counted_mechanisms(joints_of([{5, 6, 7, 8}]))
     assert found["any four joints"].kind == "local"
     assert found["four in a ring"] is None
     assert found["ring and pier"] is None  # no joint of a ring
 
 
 def test_four_of_two_rings_and_a_pier_are_of_no_pair():
-    found = counted_mechanisms(joints_of([{0, 5, 9, 10}]))
+    found = af.limit.counted_mechanisms(joints_of([{0, 5, 9, 10}]))
     assert found["any four joints"].kind == "global"
     assert found["ring and pier"] is None
 
@@ -176,13 +135,11 @@ def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
     assert turned["joint"].values.tolist() == list(range(13, -1, -1))
     soil = flagged(joints.isel(joint=slice(14, None)), Criteria())
     assert judged(soil).identical(soil)  # there is nothing else to judge
-    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
-    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
 
 
 def test_a_wall_by_itself_is_counted():
     joints = joints_of([{14, 15, 16, 17}]).isel(joint=slice(14, None))
-    found = counted_mechanism(joints)
+    found = af.limit.counted_mechanism(joints)
     assert (found.kind, found.part) == ("local", "backfill")
 
 
@@ -198,9 +155,13 @@ def test_limits_are_those_of_the_criteria(joints):
     wide = flagged(joints, Criteria(hinge=0.475))
     assert wide["hinge"][1, 3] == -1
     assert wide["hinge"][2, 14] == 0  # at 0.47
-    assert counted_mechanism(wide) is None
-    assert counted_mechanism(joints, Criteria(failures=5)) is None
-    assert counted_mechanism(joints, Criteria(hinge=0.475, failures=3)).joints == (3, 7, 11)
+    assert af.limit.counted_mechanism(wide) is None
+    assert af.limit.counted_mechanism(joints, Criteria(failures=5)) is None
+    assert af.limit.counted_mechanism(joints, Criteria(hinge=0.475, failures=3)).joints == (
+        3,
+        7,
+        11,
+    )
 
 
 def test_friction_of_the_criteria_stands_for_that_of_every_joint(joints):
@@ -221,7 +182,7 @@ def test_joints_tell_by_which_criteria_they_were_judged(joints):
 
 @pytest.mark.parametrize("hinge", [0.0, -0.46, 0.51, np.nan, np.inf, "0.46", None, True])
 def test_a_hinge_lies_within_its_joint(hinge):
-    with pytest.raises(InvalidInput, match="criteria hinge"):
+    with pytest.raises(af.errors.InvalidInput, match="criteria hinge"):
         Criteria(hinge=hinge)
 
 
@@ -229,5 +190,5 @@ def test_a_hinge_lies_within_its_joint(hinge):
     "given", [{"failures": 0}, {"failures": 4.0}, {"friction": -0.1}, {"friction": "none"}]
 )
 def test_criteria_that_cannot_be_meant(given):
-    with pytest.raises(InvalidInput, match=f"criteria {next(iter(given))}"):
+    with pytest.raises(af.errors.InvalidInput, match=f"criteria {next(iter(given))}"):
         Criteria(**given)

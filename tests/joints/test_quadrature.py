@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.errors import InvalidInput
+import archfem as af
 from archfem.joints.quadrature import Quadrature
 
 BREAKS = np.array([-0.3, -0.1, 0.05, 0.3])
@@ -41,5 +41,5 @@ def test_lobatto_has_points_at_the_ends_and_gauss_has_not():
     ],
 )
 def test_refusals(arguments, says):
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises(af.errors.InvalidInput, match=says):
         Quadrature(*arguments)

@@ -13,10 +13,10 @@ from archfem.limit.collapse import BodyForce, collapse_factor, stands
 from archfem.limit.skeleton import skeleton_of
 from archfem.limit.verified import Verifier, first_verified_mechanism, verified_mechanism
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
 from archfem.masonry.shapes import arch_on_piers, circular_arch
 from archfem.masonry.softness import yielding_blocks
-from archfem.masonry.structure import Block
 from archfem.models.rigid import rigid
 from archfem.motion.motion import Motion
 

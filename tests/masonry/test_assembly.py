@@ -5,19 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.errors import InvalidInput, InvalidStructure
+import archfem as af
 from archfem.masonry.assembly import assembled, by_materials, touching
-from archfem.masonry.direction import directions_of
-from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE
-from archfem.masonry.shapes import Arch, arch_on_piers, bridge, circular_arch, column
-from archfem.masonry.structure import Block
 
 EXACT = 1e-12
 """Ends are corners of the blocks, to round-off of coordinates of a few metres."""
 
 
 def box(x0, y0, x1, y1, name, **more):
-    return Block(((x0, y0), (x1, y0), (x1, y1), (x0, y1)), STONE, name, **more)
+    return af.Block(((x0, y0), (x1, y0), (x1, y1), (x0, y1)), af.STONE, name, **more)
 
 
 def by_pair(structure):
@@ -26,8 +22,8 @@ def by_pair(structure):
 
 @pytest.mark.parametrize("chords", [None, 1, 3])
 def test_joints_of_a_ring_are_found(chords):
-    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=chords)
-    found = assembled(ring.blocks, STONE_TO_STONE)
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=chords)
+    found = assembled(ring.blocks, af.masonry.STONE_TO_STONE)
     assert [joint.name for joint in found.joints] == [f"arch, joint {k}" for k in range(18)]
     for joint, given in zip(found.joints, ring.joints, strict=True):
         assert set(joint.blocks) == set(given.blocks)
@@ -36,8 +32,8 @@ def test_joints_of_a_ring_are_found(chords):
 
 
 def test_joints_of_a_column_are_found():
-    stack = column(breadth=0.8, heights=[1.0, 0.5, 2.0])
-    found = assembled(stack.blocks, STONE_TO_STONE)
+    stack = af.column(breadth=0.8, heights=[1.0, 0.5, 2.0])
+    found = assembled(stack.blocks, af.masonry.STONE_TO_STONE)
     names = ["column, base", "column, joint 1", "column, joint 2"]
     assert [joint.name for joint in found.joints] == names
     for joint, given in zip(found.joints, stack.joints, strict=True):
@@ -45,10 +41,10 @@ def test_joints_of_a_column_are_found():
 
 
 def test_springings_on_piers_belong_to_the_ring():
-    given = arch_on_piers(
+    given = af.arch_on_piers(
         radius=2.0, thickness=0.4, voussoirs=9, pier_breadth=0.8, courses=[0.5, 0.5]
     )
-    found = by_pair(assembled(given.blocks, STONE_TO_STONE))
+    found = by_pair(assembled(given.blocks, af.masonry.STONE_TO_STONE))
     for joint in given.joints:
         mine = found[frozenset(joint.blocks)]
         assert mine.part == joint.part
@@ -59,14 +55,14 @@ def test_springings_on_piers_belong_to_the_ring():
 @pytest.mark.parametrize("turn", [0.0, 25.0, -25.0])
 @pytest.mark.parametrize("embrace", [5.0, 60.0, 159.0, 250.0])
 def test_the_outer_end_is_found_for_shallow_and_skew_rings(turn, embrace):
-    ring = circular_arch(radius=3.0, thickness=0.4, embrace=embrace, voussoirs=7, chords=1)
+    ring = af.circular_arch(radius=3.0, thickness=0.4, embrace=embrace, voussoirs=7, chords=1)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     spin = np.array([[c, -s], [s, c]])
     blocks = [
         replace(block, outline=tuple(map(tuple, (block.points @ spin.T + [3.0, 9.0]).tolist())))
         for block in ring.blocks
     ]
-    found = assembled(blocks, STONE_TO_STONE).joints
+    found = assembled(blocks, af.masonry.STONE_TO_STONE).joints
     ends = np.array([joint.ends for joint in ring.joints]) @ spin.T + [3.0, 9.0]
     assert np.array([joint.ends for joint in found]) == pytest.approx(ends, abs=1e-9)
 
@@ -85,10 +81,10 @@ def test_a_pointed_arch_is_counted_from_the_left_and_points_outwards():
         for k in range(5):
             points = [rim[0][k], rim[1][k], rim[1][k + 1], rim[0][k + 1]]
             points = points if sign > 0 else points[::-1]
-            blocks.append(Block(tuple(points), STONE, f"{name} {k}", part="arch"))
+            blocks.append(af.Block(tuple(points), af.STONE, f"{name} {k}", part="arch"))
     blocks.append(box(-3.3, -1.0, -2.7, 0.0, "left foot", fixed=True))
     blocks.append(box(2.7, -1.0, 3.3, 0.0, "right foot", fixed=True))
-    joints = assembled(blocks, STONE_TO_STONE).joints
+    joints = assembled(blocks, af.masonry.STONE_TO_STONE).joints
     assert [joint.name for joint in joints] == [f"arch, joint {k}" for k in range(11)]
     assert np.all(np.diff([joint.middle[0] for joint in joints]) > 0.0)
     assert all(joint.tangent @ (joint.middle - [0.0, 0.0]) > 0.0 for joint in joints)
@@ -97,33 +93,32 @@ def test_a_pointed_arch_is_counted_from_the_left_and_points_outwards():
 def test_a_flat_arch_points_upwards():
     tops, bottoms = np.linspace(-1.2, 1.2, 6), np.linspace(-0.8, 0.8, 6)
     stones = [
-        Block(
+        af.Block(
             ((bottoms[k], 0.0), (bottoms[k + 1], 0.0), (tops[k + 1], 0.5), (tops[k], 0.5)),
-            STONE,
+            af.STONE,
             f"stone {k + 1}",
             part="flat arch",
         )
         for k in range(5)
     ]
     ends = [
-        Block(((-2.0, 0.0), (-0.8, 0.0), (-1.2, 0.5), (-2.0, 0.5)), STONE, "left", fixed=True),
-        Block(((0.8, 0.0), (2.0, 0.0), (2.0, 0.5), (1.2, 0.5)), STONE, "right", fixed=True),
+        af.Block(
+            ((-2.0, 0.0), (-0.8, 0.0), (-1.2, 0.5), (-2.0, 0.5)), af.STONE, "left", fixed=True
+        ),
+        af.Block(((0.8, 0.0), (2.0, 0.0), (2.0, 0.5), (1.2, 0.5)), af.STONE, "right", fixed=True),
     ]
-    joints = assembled([*reversed(stones), *ends], STONE_TO_STONE).joints
+    joints = assembled([*reversed(stones), *ends], af.masonry.STONE_TO_STONE).joints
     assert [joint.name for joint in joints] == [f"flat arch, joint {k}" for k in range(6)]
     assert all(joint.extrados[1] > joint.intrados[1] for joint in joints)
     assert np.all(np.diff([joint.middle[0] for joint in joints]) > 0.0)
 
 
-def test_the_centre_of_a_ring_is_found(ring):
-    directions = directions_of(ring.blocks, touching(ring.blocks))
-    assert directions["arch"].centre == pytest.approx([0.0, 0.0], abs=1e-9)
-
-
 def test_one_course_on_two_stones_has_two_joints():
     ground = box(0.0, -1.0, 4.0, 0.0, "ground", fixed=True)
     left, right = box(0.0, 0.0, 1.5, 1.0, "left"), box(1.5, 0.0, 4.0, 1.0, "right")
-    joints = assembled([ground, left, right, box(0.5, 1.0, 3.5, 2.0, "lintel")], STONE_TO_STONE)
+    joints = assembled(
+        [ground, left, right, box(0.5, 1.0, 3.5, 2.0, "lintel")], af.masonry.STONE_TO_STONE
+    )
     spans = {joint.name: sorted(joint.ends[:, 0].tolist()) for joint in joints.joints}
     assert spans == {
         "ground to left": [0.0, 1.5],
@@ -144,8 +139,8 @@ def test_edges_that_continue_each_other_are_one_joint(upright):
     low = [(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.2, 1.0), (1.0, 1.0), (0.0, 1.0)]
     high = [(0.0, 1.0), (1.6, 1.0), (2.7, 1.0), (3.0, 1.0), (3.0, 2.0), (0.0, 2.0)]
     blocks = [
-        Block(turned(low), STONE, "a", fixed=True),
-        Block(turned(high), STONE, "b"),
+        af.Block(turned(low), af.STONE, "a", fixed=True),
+        af.Block(turned(high), af.STONE, "b"),
     ]
     (touch,) = touching(blocks)
     assert touch[2] == pytest.approx(np.array(turned([(0.0, 1.0), (3.0, 1.0)])), abs=EXACT)
@@ -154,7 +149,10 @@ def test_edges_that_continue_each_other_are_one_joint(upright):
 def test_a_bent_face_has_a_joint_for_each_straight_piece():
     low = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.3), (0.0, 1.0))
     high = ((0.0, 1.0), (1.0, 1.3), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0))
-    found = assembled([Block(low, STONE, "a", fixed=True), Block(high, STONE, "b")], STONE_TO_STONE)
+    found = assembled(
+        [af.Block(low, af.STONE, "a", fixed=True), af.Block(high, af.STONE, "b")],
+        af.masonry.STONE_TO_STONE,
+    )
     assert [joint.name for joint in found.joints] == ["a to b, 1", "a to b, 2"]
     assert found.joints[0].middle[0] < found.joints[1].middle[0]
 
@@ -162,26 +160,29 @@ def test_a_bent_face_has_a_joint_for_each_straight_piece():
 def test_blocks_that_share_a_corner_do_not_touch():
     blocks = [box(0.0, 0.0, 1.0, 1.0, "a"), box(1.0, 1.0, 2.0, 2.0, "b")]
     assert touching(blocks) == []
-    with pytest.raises(InvalidStructure, match=r"\['b'\] rest on nothing"):
-        assembled([replace(blocks[0], fixed=True), blocks[1]], STONE_TO_STONE)
-    with pytest.raises(InvalidStructure, match="no blocks to assemble"):
-        assembled([], STONE_TO_STONE)
+    with pytest.raises(af.errors.InvalidStructure, match=r"\['b'\] rest on nothing"):
+        assembled([replace(blocks[0], fixed=True), blocks[1]], af.masonry.STONE_TO_STONE)
+    with pytest.raises(af.errors.InvalidStructure, match="no blocks to assemble"):
+        assembled([], af.masonry.STONE_TO_STONE)
 
 
 def test_joints_given_are_left_alone(stack):
     given = replace(stack.joints[0], name="mine")
-    found = assembled(stack.blocks, STONE_TO_STONE, joints=[given])
+    found = assembled(stack.blocks, af.masonry.STONE_TO_STONE, joints=[given])
     assert [joint.name for joint in found.joints] == ["mine", "block 1 to block 2"]
 
 
 def test_soil_on_a_ring_is_no_part_of_it():
-    ring = bridge(arches=[Arch(span=4.0, rise=1.6, thickness=0.4, voussoirs=9)])
+    ring = af.bridge(arches=[af.shapes.Arch(span=4.0, rise=1.6, thickness=0.4, voussoirs=9)])
     top = [point for block in ring.blocks for point in block.outline if point[1] > 0.5]
     crown = max(y for _, y in top)
     key = next(block for block in ring.blocks if block.name == "arch, voussoir 5")
     face = sorted(point for point in key.outline if point[1] > crown - 1e-6)
     soil = ((face[0]), (face[1]), (face[1][0], crown + 1.0), (face[0][0], crown + 1.0))
-    found = assembled([*ring.blocks, Block(soil, BACKFILL, "soil", part="soil")], STONE_TO_STONE)
+    found = assembled(
+        [*ring.blocks, af.Block(soil, af.masonry.BACKFILL, "soil", part="soil")],
+        af.masonry.STONE_TO_STONE,
+    )
     assert [joint.part for joint in found.joints] == ["arch"] * 10 + ["soil"]
 
 
@@ -192,7 +193,7 @@ def test_a_pier_of_several_stones_a_course():
         box(1.8, 0.0, 3.0, 1.0, "b", part="pier"),
         box(1.0, 1.0, 3.0, 2.0, "c", part="pier"),
     ]
-    found = assembled([ground, *stones], STONE_TO_STONE)
+    found = assembled([ground, *stones], af.masonry.STONE_TO_STONE)
     names = ["pier, base 1", "pier, base 2", "pier, joint 1", "pier, joint 2", "a to b"]
     assert [joint.name for joint in found.joints] == names
 
@@ -201,7 +202,7 @@ def test_a_pier_on_a_loose_footing_has_its_base():
     ground = box(0.0, -1.0, 4.0, 0.0, "ground", fixed=True)
     footing = box(0.5, 0.0, 3.5, 0.4, "footing", part="footing")
     stones = [box(1.0, y, 3.0, y + 1.0, f"stone at {y}", part="pier") for y in (0.4, 1.4)]
-    found = assembled([ground, footing, *stones], STONE_TO_STONE)
+    found = assembled([ground, footing, *stones], af.masonry.STONE_TO_STONE)
     assert [joint.name for joint in found.joints] == [
         "pier, base",
         "pier, joint 1",
@@ -211,13 +212,13 @@ def test_a_pier_on_a_loose_footing_has_its_base():
 
 
 def test_contacts_by_materials():
-    of = by_materials(STONE_TO_STONE, {"backfill / stone": SOIL_TO_STONE})
+    of = by_materials(af.masonry.STONE_TO_STONE, {"backfill / stone": af.masonry.SOIL_TO_STONE})
     stone, other = box(0.0, 0.0, 1.0, 1.0, "a"), box(0.0, 1.0, 1.0, 2.0, "b")
-    soil = replace(other, material=BACKFILL)
-    assert of(stone, other) == STONE_TO_STONE
-    assert of(stone, soil) == of(soil, stone) == SOIL_TO_STONE
-    brick = replace(other, material=replace(STONE, name="brick"))
-    with pytest.raises(InvalidInput, match='give one for "brick/stone"'):
+    soil = replace(other, material=af.masonry.BACKFILL)
+    assert of(stone, other) == af.masonry.STONE_TO_STONE
+    assert of(stone, soil) == of(soil, stone) == af.masonry.SOIL_TO_STONE
+    brick = replace(other, material=replace(af.STONE, name="brick"))
+    with pytest.raises(af.errors.InvalidInput, match='give one for "brick/stone"'):
         of(stone, brick)
-    with pytest.raises(InvalidInput, match="'stone' is no pair"):
-        by_materials(STONE_TO_STONE, {"stone": STONE_TO_STONE})
+    with pytest.raises(af.errors.InvalidInput, match="'stone' is no pair"):
+        by_materials(af.masonry.STONE_TO_STONE, {"stone": af.masonry.STONE_TO_STONE})

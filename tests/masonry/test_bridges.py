@@ -8,31 +8,29 @@ import numpy as np
 import pytest
 import shapely
 
-from archfem.cases.case import Case
-from archfem.errors import InvalidStructure
-from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, STONE, STONE_TO_STONE, Material
-from archfem.masonry.shapes import Arch, Backfill, Paving, Pier, Sidewall, bridge
+import archfem as af
 
 MESHES = Path(__file__).parents[2] / "meshes"
 EXACT = 1e-9
 """Areas of tens of m² from sums of products of coordinates, in double precision."""
-
 RING = {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 13}
 WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
-ARCH = Arch(**RING)
+ARCH = af.shapes.Arch(**RING)
 PAIR = {
-    "arches": (Arch(name="west arch", **RING), Arch(name="east arch", **RING)),
-    "piers": (Pier(name="pier", gap=0.9, height=2.4),),
+    "arches": (af.shapes.Arch(name="west arch", **RING), af.shapes.Arch(name="east arch", **RING)),
+    "piers": (af.shapes.Pier(name="pier", gap=0.9, height=2.4),),
 }
 
 
 def walls(**change):
-    return tuple(Sidewall(name=f"{side} sidewall", **WALL | change) for side in ("west", "east"))
+    return tuple(
+        af.shapes.Sidewall(name=f"{side} sidewall", **WALL | change) for side in ("west", "east")
+    )
 
 
 @pytest.fixture(scope="module")
 def prusias():
-    return Case.read(MESHES / "prusias.toml").structure
+    return af.Case.read(MESHES / "prusias.toml").structure
 
 
 def polygons(structure):
@@ -98,12 +96,12 @@ def test_the_deck_is_as_long_as_its_parts(prusias):
     "name", ["prusias", "prusias_piers", "prusias_wall", "prusias_fill", "prusias_restored"]
 )
 def test_blocks_of_the_shipped_bridges_do_not_overlap(name):
-    assert_apart(Case.read(MESHES / f"{name}.toml").structure)
+    assert_apart(af.Case.read(MESHES / f"{name}.toml").structure)
 
 
 def test_fill_is_the_deck_less_rings_and_openings():
     """Uneroded fill: what a rectangle from springing level to deck leaves around the stones."""
-    made = bridge(**PAIR, sidewalls=walls(), backfill=Backfill(cover=0.5))
+    made = af.bridge(**PAIR, sidewalls=walls(), backfill=af.shapes.Backfill(cover=0.5))
     fill = block(made, "backfill")
     (x0, _), (x1, top) = fill.points.min(axis=0), fill.points.max(axis=0)
     crown = max(y for each in made.blocks if "voussoir" in each.name for _, y in each.outline)
@@ -122,8 +120,10 @@ def test_fill_is_the_deck_less_rings_and_openings():
 @pytest.mark.parametrize("hump", [0.0, 0.7, 50.0])
 def test_erosion_takes_all_but_a_hump(hump):
     """Between slopes of 1 to 2 beside the hump the fill sinks by the erosion."""
-    full = bridge(**PAIR, sidewalls=walls(), backfill=Backfill(cover=0.8))
-    sunk = bridge(**PAIR, sidewalls=walls(), backfill=Backfill(cover=0.8, erosion=0.4, hump=hump))
+    full = af.bridge(**PAIR, sidewalls=walls(), backfill=af.shapes.Backfill(cover=0.8))
+    sunk = af.bridge(
+        **PAIR, sidewalls=walls(), backfill=af.shapes.Backfill(cover=0.8, erosion=0.4, hump=hump)
+    )
     length = np.ptp(block(full, "backfill").points[:, 0])
     crown = 2.0 + 2.0  # the west crown: half the first span behind its sidewall
     left, right = (max(0.0, side - hump) for side in (crown, length - crown))
@@ -142,13 +142,13 @@ def test_erosion_takes_all_but_a_hump(hump):
 
 
 def test_spandrels_weigh_in_place_of_fill():
-    fill = Backfill(cover=0.5, spandrels=0.8)
-    made = bridge(arches=[ARCH], backfill=fill, width=4.0)
-    plain = bridge(arches=[ARCH], backfill=replace(fill, spandrels=0.0), width=4.0)
+    fill = af.shapes.Backfill(cover=0.5, spandrels=0.8)
+    made = af.bridge(arches=[ARCH], backfill=fill, width=4.0)
+    plain = af.bridge(arches=[ARCH], backfill=replace(fill, spandrels=0.0), width=4.0)
     soil = block(made, "backfill")
-    extra = 0.8 * soil.area * (STONE.unit_weight - BACKFILL.unit_weight)
+    extra = 0.8 * soil.area * (af.STONE.unit_weight - af.masonry.BACKFILL.unit_weight)
     assert made.weight - plain.weight == pytest.approx(extra, rel=1e-9)
-    assert soil.material.young == BACKFILL.young
+    assert soil.material.young == af.masonry.BACKFILL.young
 
 
 def test_names_and_parts(prusias):
@@ -163,16 +163,16 @@ def test_names_and_parts(prusias):
         ]
         assert [joint.middle[1] for joint in own] == pytest.approx([-2.0, -1.6, -1.2, -0.8, -0.4])
     soil = named(prusias, "main arch, voussoir 5 to backfill")
-    assert (soil.part, soil.contact) == ("backfill", SOIL_TO_STONE)
+    assert (soil.part, soil.contact) == ("backfill", af.masonry.SOIL_TO_STONE)
     assert {joint.role for joint in prusias.joints if "backfill" in joint.name} == {"other"}
     for joint in prusias.joints:
         if joint.role == "ring":
-            assert joint.contact == STONE_TO_STONE
+            assert joint.contact == af.masonry.STONE_TO_STONE
             assert joint.extrados[1] >= joint.intrados[1]
 
 
 def test_two_spans_without_fill():
-    made = bridge(**PAIR)
+    made = af.bridge(**PAIR)
     assert {each.part for each in made.blocks} == {
         "left abutment",
         "west arch",
@@ -197,7 +197,7 @@ def test_two_spans_without_fill():
 
 
 def test_one_arch_with_fill_and_no_sidewalls():
-    made = bridge(arches=[ARCH], backfill=Backfill(cover=0.4))
+    made = af.bridge(arches=[ARCH], backfill=af.shapes.Backfill(cover=0.4))
     assert [each.name for each in made.blocks if each.fixed] == ["left abutment", "right abutment"]
     fill = block(made, "backfill")
     feet = [named(made, f"arch, joint {k}").extrados[0] for k in (0, 13)]
@@ -212,8 +212,8 @@ def test_one_arch_with_fill_and_no_sidewalls():
 @pytest.mark.parametrize("filled", [True, False])
 @pytest.mark.parametrize("state", ["free", "retained", "fixed"])
 def test_states_of_sidewalls(state, filled, above):
-    fill = Backfill(cover=0.4) if filled else None
-    made = bridge(arches=[ARCH], sidewalls=walls(state=state, above=above), backfill=fill)
+    fill = af.shapes.Backfill(cover=0.4) if filled else None
+    made = af.bridge(arches=[ARCH], sidewalls=walls(state=state, above=above), backfill=fill)
     own = [each for each in made.blocks if each.part == "west sidewall"]
     fixed = {
         "free": ["west sidewall, foundation"],
@@ -241,10 +241,10 @@ def test_states_of_sidewalls(state, filled, above):
 @pytest.mark.parametrize("stones", [1, 2, 3])
 def test_the_hump_is_over_the_crown_of_rings_of_few_thick_stones(stones):
     """The highest points of one stone are the outer ends of its springings."""
-    arch = Arch(span=0.8, rise=0.2, thickness=0.7, voussoirs=stones)
+    arch = af.shapes.Arch(span=0.8, rise=0.2, thickness=0.7, voussoirs=stones)
     sides = walls(above=0.0, setback=0.1, length=4.0)
-    fill = Backfill(cover=0.5, erosion=0.1, hump=0.6)
-    made = bridge(arches=[arch], sidewalls=sides, backfill=fill)
+    fill = af.shapes.Backfill(cover=0.5, erosion=0.1, hump=0.6)
+    made = af.bridge(arches=[arch], sidewalls=sides, backfill=fill)
     points = block(made, "backfill").points
     high = points[points[:, 1] > points[:, 1].max() - 1e-9, 0]
     crown = 4.0 + 0.4
@@ -255,13 +255,13 @@ def test_the_hump_is_over_the_crown_of_rings_of_few_thick_stones(stones):
 def test_a_sidewall_without_setback(spot):
     change = {"setback": 0.0}
     both = [replace(wall, **change) if spot in wall.name else wall for wall in walls()]
-    assert_apart(bridge(arches=[ARCH], sidewalls=both, backfill=Backfill(cover=0.4)))
+    assert_apart(af.bridge(arches=[ARCH], sidewalls=both, backfill=af.shapes.Backfill(cover=0.4)))
 
 
 def test_paving_follows_an_eroded_surface():
-    fill = Backfill(cover=0.8, erosion=0.4, hump=0.5)
-    paving = Paving(thickness=0.2, length=1.0)
-    made = bridge(**PAIR, sidewalls=walls(), backfill=fill, paving=paving)
+    fill = af.shapes.Backfill(cover=0.8, erosion=0.4, hump=0.5)
+    paving = af.shapes.Paving(thickness=0.2, length=1.0)
+    made = af.bridge(**PAIR, sidewalls=walls(), backfill=fill, paving=paving)
     stones = [each for each in made.blocks if each.part == "paving"]
     length = np.ptp(block(made, "backfill").points[:, 0])
     assert sum(each.area for each in stones) == pytest.approx(0.2 * length, abs=EXACT)
@@ -270,15 +270,17 @@ def test_paving_follows_an_eroded_surface():
     assert len(beds) == len(stones)
     slope = 2.0 * (np.hypot(0.8, 0.4) - 0.8)
     assert sum(joint.depth for joint in beds) == pytest.approx(length + slope, abs=EXACT)
-    assert {joint.contact for joint in beds} == {SOIL_TO_STONE}
+    assert {joint.contact for joint in beds} == {af.masonry.SOIL_TO_STONE}
     between = [joint for joint in made.joints if joint.name.startswith("paving stone")]
     assert [joint.depth for joint in between] == pytest.approx([0.2] * (len(stones) - 1))
-    assert {joint.contact for joint in between} == {STONE_TO_STONE}
+    assert {joint.contact for joint in between} == {af.masonry.STONE_TO_STONE}
     assert_apart(made)
 
 
 def test_rings_in_chords_lie_on_the_circle():
-    one, three = (bridge(arches=[ARCH], backfill=Backfill(cover=0.4), chords=n) for n in (1, 3))
+    one, three = (
+        af.bridge(arches=[ARCH], backfill=af.shapes.Backfill(cover=0.4), chords=n) for n in (1, 3)
+    )
     half = 2.0 * np.arctan(1.6 / 2.0)
     turn, radius = 2.0 * half / 13, 2.0 / sin(half)
     for made, n in ((one, 1), (three, 3)):
@@ -290,35 +292,10 @@ def test_rings_in_chords_lie_on_the_circle():
 
 
 def test_gravity_width_and_material_are_passed_on():
-    stone = Material(20e9, 0.2, 24e3, name="basalt")
-    made = bridge(arches=[ARCH], width=3.0, gravity=1.62, material=stone)
+    stone = af.Material(20e9, 0.2, 24e3, name="basalt")
+    made = af.bridge(arches=[ARCH], width=3.0, gravity=1.62, material=stone)
     assert (made.width, made.gravity) == (3.0, 1.62)
     assert {each.material for each in made.blocks} == {stone}
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: Arch(**RING | {"rise": None}), "either embrace or rise"),
-        (lambda: Arch(**RING, embrace=150.0), "either embrace or rise"),
-        (lambda: Arch(**RING | {"span": 0.0}), "'arch': span 0 m is not between 0 and 1000"),
-        (lambda: Arch(**RING | {"rise": -1.0}), "'arch': rise -1 m"),
-        (lambda: Arch(**RING | {"thickness": 4e3}), "'arch': thickness 4000 m"),
-        (lambda: Arch(**RING | {"rise": None}, embrace=360.0), "embrace 360° is not between"),
-        (lambda: Pier(gap=1.0, height=-2.0), "'pier': height -2 m"),
-        (lambda: Sidewall(**WALL, state="loose"), "'sidewall': state 'loose' is not known"),
-        (lambda: Sidewall(**WALL | {"above": -0.1}), "'sidewall': above -0.1 m is not from 0"),
-        (lambda: Sidewall(**WALL, setback=-0.1), "'sidewall': setback -0.1 m is not from 0"),
-        (lambda: Backfill(cover=0.4, erosion=-0.1), "'backfill': erosion -0.1 m is not from 0"),
-        (lambda: Backfill(cover=float("nan")), "'backfill': cover nan m is not from 0"),
-        (lambda: Backfill(cover=0.4, hump=-1.0), "'backfill': hump -1 m is not from 0"),
-        (lambda: Backfill(cover=0.4, spandrels=-1.0), "'backfill': spandrels -1 m is not from 0"),
-        (lambda: Paving(thickness=0.0), "'paving': thickness 0 m"),
-    ],
-)
-def test_impossible_parts_are_refused(make, says):
-    with pytest.raises(InvalidStructure, match=says):
-        make()
 
 
 @pytest.mark.parametrize(
@@ -327,19 +304,25 @@ def test_impossible_parts_are_refused(make, says):
         ({"arches": ()}, "0 arches and 1 piers: give at least one arch"),
         ({"piers": ()}, "2 arches and 0 piers: .* a pier between each two"),
         ({"sidewalls": walls()[:1]}, "1 sidewalls: give a left and a right one, or none"),
-        ({"paving": Paving(thickness=0.2)}, "paving lies on backfill"),
-        ({"backfill": Backfill(cover=0.01)}, r"the fill is 0.010 m above the stones at x = "),
+        ({"paving": af.shapes.Paving(thickness=0.2)}, "paving lies on backfill"),
         (
-            {"backfill": Backfill(cover=0.5, erosion=0.6, hump=0.0)},
+            {"backfill": af.shapes.Backfill(cover=0.01)},
+            r"the fill is 0.010 m above the stones at x = ",
+        ),
+        (
+            {"backfill": af.shapes.Backfill(cover=0.5, erosion=0.6, hump=0.0)},
             r"the fill is -0.\d+ m above .* less erosion or lower sidewalls",
         ),
         (
-            {"backfill": Backfill(cover=0.5), "sidewalls": walls(above=3.0)},
+            {"backfill": af.shapes.Backfill(cover=0.5), "sidewalls": walls(above=3.0)},
             "the fill is -0.7.* lower sidewalls",
         ),
-        ({"backfill": Backfill(cover=0.5, spandrels=1.0)}, "spandrels of 1 m do not fit into"),
         (
-            {"piers": (Pier(gap=0.3, height=2.0),)},
+            {"backfill": af.shapes.Backfill(cover=0.5, spandrels=1.0)},
+            "spandrels of 1 m do not fit into",
+        ),
+        (
+            {"piers": (af.shapes.Pier(gap=0.3, height=2.0),)},
             "rings do not stand side by side on a gap of 0.3",
         ),
         ({"sidewalls": walls(setback=1.9)}, "nothing is left of its length 2 m behind the ring"),
@@ -352,20 +335,20 @@ def test_impossible_parts_are_refused(make, says):
                     replace(arch, rise=None, embrace=230.0, thickness=0.6)
                     for arch in PAIR["arches"]
                 ],
-                "piers": (Pier(gap=0.6, height=2.0),),
+                "piers": (af.shapes.Pier(gap=0.6, height=2.0),),
             },
             "'west arch, voussoir .*' and 'east arch, voussoir .*' overlap by",
         ),
         (
             {
                 "arches": [replace(arch, rise=None, embrace=220.0) for arch in PAIR["arches"]],
-                "piers": (Pier(gap=2.5, height=2.0),),
-                "backfill": Backfill(cover=0.5),
+                "piers": (af.shapes.Pier(gap=2.5, height=2.0),),
+                "backfill": af.shapes.Backfill(cover=0.5),
             },
             "the outline of 'backfill' crosses or touches itself",
         ),
     ],
 )
 def test_parts_that_do_not_go_together(change, says):
-    with pytest.raises(InvalidStructure, match=says):
-        bridge(**PAIR | change)
+    with pytest.raises(af.errors.InvalidStructure, match=says):
+        af.bridge(**PAIR | change)

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from archfem.cases.case import Case
-from archfem.errors import InvalidInput
+import archfem as af
 from archfem.masonry.naming import number_of
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
@@ -28,13 +27,13 @@ def test_by_name_and_by_number():
     ],
 )
 def test_near_misses(joint, says):
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises(af.errors.InvalidInput, match=says):
         number_of("joint", NAMES, joint)
 
 
 def test_a_case_names_joints_or_numbers_them():
-    assert Case.read(RING, ['output.joints=["joint 5", 7]']).joints == (5, 7)
-    assert Case.read(RING, ["output.joints=[]"]).joints == ()
+    assert af.Case.read(RING, ['output.joints=["joint 5", 7]']).joints == (5, 7)
+    assert af.Case.read(RING, ["output.joints=[]"]).joints == ()
 
 
 @pytest.mark.parametrize(
@@ -42,5 +41,5 @@ def test_a_case_names_joints_or_numbers_them():
     [('["jint 5"]', "did you mean 'joint 5'"), ("[18]", "no joint 18"), ("[2.5]", "a word")],
 )
 def test_a_case_refuses_joints_that_are_not_there(joints, says):
-    with pytest.raises(InvalidInput, match=says):
-        Case.read(RING, [f"output.joints={joints}"])
+    with pytest.raises(af.errors.InvalidInput, match=says):
+        af.Case.read(RING, [f"output.joints={joints}"])

@@ -7,31 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.cases.case import Case
+import archfem as af
 from archfem.cases.findings import of_run
-from archfem.dynamics.events import CountedMechanism, EveryMechanism, MovingMechanism
-from archfem.dynamics.history import History
-from archfem.dynamics.schemes import Rayleigh
-from archfem.dynamics.time_history import time_history
-from archfem.errors import InvalidInput, InvalidStructure
-from archfem.joints.criteria import Criteria, judged, roles_of
-from archfem.joints.resultants import joint_dataset
-from archfem.limit.counted import counted_mechanisms
-from archfem.limit.skeleton import yielding_blocks
-from archfem.limit.verified import first_verified_mechanism
-from archfem.masonry.assembly import assembled
-from archfem.masonry.materials import SOIL_TO_STONE, STONE_TO_STONE
-from archfem.masonry.roles import part_role
-from archfem.masonry.shapes import Arch, Backfill, Pier, bridge, column
-from archfem.masonry.structure import Structure
-from archfem.masonry.survey.survey import Layer, read_outlines, surveyed, write_outlines
-from archfem.models.rigid import rigid
-from archfem.motion.motion import Motion
-from archfem.view.envelopes import draw_envelope
+from archfem.masonry.roles import judged_parts, part_role
+from archfem.masonry.softness import yielding_blocks
 from archfem.view.marks import joint_marks
 
 RING = {"span": 4.0, "rise": 1.6, "thickness": 0.3, "voussoirs": 13}
-FILL = Backfill(cover=0.5)
+FILL = af.shapes.Backfill(cover=0.5)
 WEIGHT = 1e4
 NAMES = {
     "arches": ("west arch", "east arch", "pier"),
@@ -42,9 +25,9 @@ NAMES = {
 
 def viaduct(west, east, middle, fill=FILL):
     """Two rings, a pier and fill, of the names given."""
-    return bridge(
-        arches=[Arch(name=west, **RING), Arch(name=east, **RING)],
-        piers=[Pier(name=middle, gap=0.9, height=2.4)],
+    return af.bridge(
+        arches=[af.shapes.Arch(name=west, **RING), af.shapes.Arch(name=east, **RING)],
+        piers=[af.shapes.Pier(name=middle, gap=0.9, height=2.4)],
         backfill=fill,
     )
 
@@ -81,9 +64,8 @@ def quake(structure):
 
 def verdicts(structure):
     """First mechanisms of that quake by each definition: joints, time, class and moving blocks."""
-    joints = joint_dataset(structure, quake(structure), np.arange(6.0))
-    found = counted_mechanisms(joints)
-    found["verified"] = first_verified_mechanism(structure, joints).moved
+    joints = af.joints.joint_dataset(structure, quake(structure), np.arange(6.0))
+    found = af.first_mechanisms(af.History(joints, structure))
     return {name: replace(each, part="") for name, each in found.items()}
 
 
@@ -107,8 +89,8 @@ def test_the_verdict_does_not_hang_on_names(names, told):
     }
     made = viaduct(*names)
     assert verdicts(made) == expected
-    again = assembled(made.blocks, STONE_TO_STONE)
-    first = assembled(viaduct(*NAMES["arches"]).blocks, STONE_TO_STONE)
+    again = af.masonry.assembled(made.blocks, af.masonry.STONE_TO_STONE)
+    first = af.masonry.assembled(viaduct(*NAMES["arches"]).blocks, af.masonry.STONE_TO_STONE)
     assert [each.role for each in again.joints] == [each.role for each in first.joints]
     assert [each.ends.tolist() for each in again.joints] == [e.ends.tolist() for e in first.joints]
     assert told() == []
@@ -116,25 +98,30 @@ def test_the_verdict_does_not_hang_on_names(names, told):
 
 def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
     """And another one, with warnings, where nobody tells what the vaults are."""
-    motion = Motion(5.0 * np.sin(4.0 * np.pi * np.arange(0.0, 0.8, 0.005)), 0.005)
+    motion = af.Motion(5.0 * np.sin(4.0 * np.pi * np.arange(0.0, 0.8, 0.005)), 0.005)
     met = []
     for names in NAMES.values():
         made = viaduct(*names, fill=None)
-        run = time_history(rigid(made), motion, damping=Rayleigh(0.05, (4.0, 15.0)))
+        run = af.time_history(
+            af.build(made, fidelity="rigid"), motion, damping=af.Rayleigh(0.05, (4.0, 15.0))
+        )
         met.append((replace(run.mechanism, part=""), replace(run.verified.moved, part="")))
     assert met[0] == met[1] == met[2]
     assert (met[0][0].kind, told()) == ("global", [])
-    run = time_history(rigid(untold(made)), motion, damping=Rayleigh(0.05, (4.0, 15.0)))
+    blank = af.build(untold(made), fidelity="rigid")
+    run = af.time_history(blank, motion, damping=af.Rayleigh(0.05, (4.0, 15.0)))
     assert replace(run.mechanism, part="") != met[0][0]
     assert len(told()) >= 3
 
 
-@pytest.mark.parametrize("event", [CountedMechanism, MovingMechanism, EveryMechanism])
+@pytest.mark.parametrize(
+    "event", [af.CountedMechanism, af.dynamics.MovingMechanism, af.dynamics.EveryMechanism]
+)
 def test_events_go_by_roles(event):
     endings = []
     for names in NAMES.values():
         made = viaduct(*names)
-        watch = event().watch(made, Criteria())
+        watch = event().watch(made, af.Criteria())
         ends = [watch(resultants) is not None for resultants in quake(made)]
         endings.append(ends.index(True))
     assert len(set(endings)) == 1
@@ -145,9 +132,9 @@ def test_all_else_goes_by_roles_too():
     seen = []
     for names in NAMES.values():
         made = viaduct(*names)
-        joints = joint_dataset(made, quake(made), np.arange(6.0))
-        run = History(joints.assign_attrs(ended="finished", outcome="reached the end"), made)
-        panels = [axes.get_title() for axes in draw_envelope({"run": run}).axes]
+        joints = af.joints.joint_dataset(made, quake(made), np.arange(6.0))
+        run = af.History(joints.assign_attrs(ended="finished", outcome="reached the end"), made)
+        panels = [axes.get_title() for axes in af.view.draw_envelope({"run": run}).axes]
         assert panels == list(names)
         found = of_run(run)
         assert set(found["eccentricity"]) == set(names)
@@ -165,7 +152,9 @@ def test_an_unknown_name_is_warned_of_once_and_told_how_to_set_it(told):
         assert "its name has no word that says what it is" in said
         assert 'Block(role="ring")' in said
         assert "[structure.layers]" in said
-    assert set(roles_of(joint_dataset(made, quake(made)[0])).values()) == {"other"}
+    assert set(af.joints.roles_of(af.joints.joint_dataset(made, quake(made)[0])).values()) == {
+        "other"
+    }
     assert verdicts(untold(viaduct(*NAMES["arches"]))) == verdicts(viaduct(*NAMES["arches"]))
     assert len(told()) == 3
     replace(made, width=2.0)
@@ -179,7 +168,7 @@ def test_what_one_block_tells_goes_for_all_of_its_part(told):
     blank = [replace(each, role="") for each in made.blocks]
     blank[number] = replace(blank[number], role="ring")
     joints = tuple(replace(each, role="") for each in made.joints)
-    again = Structure(tuple(blank), joints, made.width)
+    again = af.Structure(tuple(blank), joints, made.width)
     assert {each.role for each in again.blocks if each.part == "west vault"} == {"ring"}
     assert {each.role for each in again.joints if each.part == "west vault"} == {"ring"}
     assert verdicts(again) == verdicts(viaduct(*NAMES["arches"]))
@@ -224,31 +213,45 @@ def test_names_that_leave_a_role_open(part, role, why, told):
     assert why in said
 
 
+def test_rings_and_piers_are_judged_or_all_where_there_is_neither():
+    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
+    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
+
+
 def test_roles_that_contradict_one_another_are_refused():
-    made = column(breadth=1.0, heights=[1.0, 1.0])
+    made = af.column(breadth=1.0, heights=[1.0, 1.0])
     base, block, top = made.blocks
     with pytest.raises(
-        InvalidStructure, match=r"'base' has role 'pier' and 'block 1' has .*'ring'"
+        af.errors.InvalidStructure, match=r"'base' has role 'pier' and 'block 1' has .*'ring'"
     ):
         replace(made, blocks=(base, replace(block, role="ring"), top))
     wrong = tuple(replace(joint, role="other") for joint in made.joints)
-    with pytest.raises(InvalidStructure, match="'joint 0' has role 'other': give all blocks and"):
+    with pytest.raises(
+        af.errors.InvalidStructure, match="'joint 0' has role 'other': give all blocks and"
+    ):
         replace(made, joints=wrong)
-    with pytest.raises(InvalidStructure, match=r"role 'vault', which is not known: .*'ring', 'pie"):
-        assembled([base, replace(block, role="vault")], STONE_TO_STONE)
-    with pytest.raises(InvalidStructure, match=r"of part 'wall', .* 'other' and .* 'pier'"):
-        assembled(
-            [replace(base, part="wall", role="other"), replace(block, part="wall")], SOIL_TO_STONE
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"role 'vault', which is not known: .*'ring', 'pie"
+    ):
+        af.masonry.assembled([base, replace(block, role="vault")], af.masonry.STONE_TO_STONE)
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"of part 'wall', .* 'other' and .* 'pier'"
+    ):
+        af.masonry.assembled(
+            [replace(base, part="wall", role="other"), replace(block, part="wall")],
+            af.masonry.SOIL_TO_STONE,
         )
-    with pytest.raises(InvalidStructure, match=r"of part 'backfill', .*'ring' and .*'other'"):
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"of part 'backfill', .*'ring' and .*'other'"
+    ):
         viaduct("backfill", "east arch", "pier")
 
 
 def test_a_survey_tells_roles_by_properties_or_layers(tmp_path, told):
     made = viaduct(*NAMES["German"])
     path = tmp_path / "viaduct.geojson"
-    write_outlines(made, path)
-    joints = [(joint.name, joint.role) for joint in surveyed(path).joints]
+    af.masonry.write_outlines(made, path)
+    joints = [(joint.name, joint.role) for joint in af.masonry.surveyed(path).joints]
     assert told() == []
     table = json.loads(path.read_text())
     for feature in table["features"]:
@@ -256,63 +259,67 @@ def test_a_survey_tells_roles_by_properties_or_layers(tmp_path, told):
     path.write_text(json.dumps(table))
     layers = {block.part: {"role": block.role} for block in made.blocks}
     structure = {"shape": "outlines", "file": str(path), "layers": layers}
-    found = Case.of({"structure": structure}).structure
+    found = af.Case.of({"structure": structure}).structure
     assert [(joint.name, joint.role) for joint in found.joints] == joints
     assert told() == []
-    read_outlines(path)
+    af.read_outlines(path)
     assert {said.split("'")[1] for said in told()} == set(NAMES["German"])
 
 
 def test_roles_of_a_survey_that_cannot_be_meant(tmp_path):
     path = tmp_path / "stack.geojson"
-    write_outlines(column(breadth=1.0, heights=[1.0]), path)
+    af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), path)
     table = json.loads(path.read_text())
     rest = table["features"][1]["properties"]
     rest["role"] = "ring"
     path.write_text(json.dumps(table))
-    with pytest.raises(InvalidStructure, match=r"stack.geojson: of part 'column', 'base' has role"):
-        surveyed(path)
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"stack.geojson: of part 'column', 'base' has role"
+    ):
+        af.masonry.surveyed(path)
     rest["role"] = "vault"
     path.write_text(json.dumps(table))
-    with pytest.raises(InvalidStructure, match=r"stack.geojson: 'block 1' .* role 'vault'"):
-        surveyed(path)
+    with pytest.raises(
+        af.errors.InvalidStructure, match=r"stack.geojson: 'block 1' .* role 'vault'"
+    ):
+        af.masonry.surveyed(path)
     del rest["role"]
     rest["Role"] = "pier"
     path.write_text(json.dumps(table))
-    with pytest.raises(InvalidInput, match="property 'Role': did you mean 'role'"):
-        surveyed(path)
+    with pytest.raises(af.errors.InvalidInput, match="property 'Role': did you mean 'role'"):
+        af.masonry.surveyed(path)
 
 
 def test_what_a_feature_tells_comes_before_its_layer(tmp_path):
     path = tmp_path / "stack.geojson"
-    write_outlines(column(breadth=1.0, heights=[1.0]), path)
-    blocks = read_outlines(path, layers={"column": Layer(role="other")}).blocks
+    af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), path)
+    blocks = af.read_outlines(path, layers={"column": af.masonry.Layer(role="other")}).blocks
     assert {block.role for block in blocks} == {"pier"}
 
 
 def test_a_bridge_of_a_case_may_call_its_parts_anything(told):
-    case = Case.of({"structure": {"shape": "bridge", "arches": {"Bogen": RING}}})
+    case = af.Case.of({"structure": {"shape": "bridge", "arches": {"Bogen": RING}}})
     assert {joint.role for joint in case.structure.joints} == {"ring"}
     assert told() == []
 
 
 def test_a_saved_history_keeps_roles(tmp_path):
     made = viaduct(*NAMES["English"])
-    dataset = joint_dataset(made, quake(made), np.arange(6.0))
-    path = History(dataset, made).save(tmp_path / "run.nc")
-    again = History.read(path)
-    assert roles_of(again.joints) == roles_of(dataset)
-    assert judged(again.joints)["joint"].equals(judged(dataset)["joint"])
-    assert again.mechanism == counted_mechanisms(dataset)["any four joints"]
+    dataset = af.joints.joint_dataset(made, quake(made), np.arange(6.0))
+    path = af.History(dataset, made).save(tmp_path / "run.nc")
+    again = af.History.read(path)
+    assert af.joints.roles_of(again.joints) == af.joints.roles_of(dataset)
+    assert af.joints.judged(again.joints)["joint"].equals(af.joints.judged(dataset)["joint"])
+    assert again.mechanism == af.limit.counted_mechanisms(dataset)["any four joints"]
 
 
 def test_a_file_without_roles_is_read_with_its_structure(tmp_path):
     made = viaduct(*NAMES["English"])
-    dataset = joint_dataset(made, quake(made), np.arange(6.0)).drop_vars("role")
-    path = History(dataset).save(tmp_path / "run.nc")
+    dataset = af.joints.joint_dataset(made, quake(made), np.arange(6.0)).drop_vars("role")
+    path = af.History(dataset).save(tmp_path / "run.nc")
     with pytest.raises(
-        InvalidInput, match=r"rings and piers, .* give the structure that was shake"
+        af.errors.InvalidInput, match=r"rings and piers, .* give the structure that was shake"
     ):
-        History.read(path)
-    found = History.read(path, made)
-    assert roles_of(found.joints)["west vault"] == "ring"
+        af.History.read(path)
+    found = af.History.read(path, made)
+    assert af.joints.roles_of(found.joints)["west vault"] == "ring"

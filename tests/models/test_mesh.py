@@ -10,6 +10,7 @@ import pytest
 from archfem.errors import InvalidInput, MeshError
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block
 from archfem.masonry.materials import STONE, STONE_TO_STONE
 from archfem.masonry.shapes import (
     Arch,
@@ -20,7 +21,6 @@ from archfem.masonry.shapes import (
     bridge,
     circular_arch,
 )
-from archfem.masonry.structure import Block
 from archfem.models.discretisation import Discretisation
 from archfem.models.fem.division import divided
 from archfem.models.fem.mesh import mesh, read_mesh, write_mesh

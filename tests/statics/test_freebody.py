@@ -12,9 +12,9 @@ from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.actions import BodyForce
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block
 from archfem.masonry.materials import STONE, STONE_TO_STONE
 from archfem.masonry.shapes import arch_on_piers
-from archfem.masonry.structure import Block
 from archfem.statics.equilibrium import dead_load, equilibrium
 from archfem.statics.freebody import forces_on
 from archfem.view.freebody import draw_free_body

@@ -22,7 +22,7 @@ from archfem.dynamics.stepping.sparse import Sparse
 from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.errors import InvalidInput
-from archfem.joints.operator import Facets, JointPoints, Springs
+from archfem.joints.points import Facets, JointPoints, Springs
 from archfem.masonry.actions import Settlement
 from archfem.masonry.shapes import Arch, Backfill, bridge
 from archfem.motion.motion import Motion

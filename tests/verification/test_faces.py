@@ -7,9 +7,9 @@ from archfem.dynamics.ladder import build
 from archfem.dynamics.schemes import Rayleigh
 from archfem.dynamics.time_history import time_history
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block
 from archfem.masonry.materials import STONE, STONE_TO_STONE
 from archfem.masonry.shapes import Arch, Backfill, bridge
-from archfem.masonry.structure import Block
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import dead_load
 from archfem.statics.newton import Newton

@@ -9,7 +9,7 @@ from archfem.dynamics.ladder import build
 from archfem.dynamics.schemes import HHT, Rayleigh
 from archfem.dynamics.time_history import time_history
 from archfem.errors import InvalidInput
-from archfem.joints.operator import Facets, JointPoints, Springs
+from archfem.joints.points import Facets, JointPoints, Springs
 from archfem.masonry.materials import BACKFILL
 from archfem.masonry.shapes import circular_arch, column
 from archfem.motion.motion import Motion

@@ -13,7 +13,8 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.operator import Facets, JointOperator
+from archfem.joints.operator import JointOperator
+from archfem.joints.points import Facets
 
 
 class Law(NamedTuple):

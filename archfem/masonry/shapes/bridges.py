@@ -11,10 +11,12 @@ import numpy as np
 
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
+from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.shapes.site import Face, Site, ledge
-from archfem.masonry.structure import Block, Point, Structure
+from archfem.masonry.shapes.placed import Face
+from archfem.masonry.shapes.site import Site, ledge
+from archfem.masonry.structure import Structure
 from archfem.units import G
 
 THIN = 0.02
@@ -34,7 +36,7 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     chords: int = 1,
     gravity: float = G,
 ) -> Structure:
-    """Build a bridge from its parts, from left to right.
+    """Return a bridge built from its parts, from left to right.
 
     Lengths are measured from the left end of the deck (x) and from the springing level (y).
     Joints are named by part: "main arch, joint 5" counted from the left springing, "north pier,

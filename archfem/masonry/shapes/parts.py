@@ -13,8 +13,8 @@ import numpy as np
 
 from archfem.arguments import instance
 from archfem.errors import InvalidStructure
+from archfem.masonry.block import Point
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
-from archfem.masonry.structure import Point
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +154,13 @@ class Backfill:
         _check_not_negative(self, "cover", "erosion", "hump", "spandrels")
 
     def surface(self, left: float, right: float, crown: Point) -> list[Point]:
-        """Points along the surface between the ends of the deck, given the highest crown."""
+        """Return points along its surface, from left to right [m].
+
+        Args:
+            left: x of the left end of the deck [m].
+            right: x of its right end [m].
+            crown: the highest point of the rings below [m].
+        """
         deck = crown[1] + self.cover
         low, slope = deck - self.erosion, 2.0 * self.erosion
         reach = crown[0] + np.array([-self.hump - slope, -self.hump, self.hump, self.hump + slope])
@@ -164,7 +170,15 @@ class Backfill:
         return [(float(px), float(py)) for px, py in zip(x, y, strict=True)]
 
     def loaded(self, width: float, stone: Material) -> Material:
-        """The fill with the weight of the spandrels spread over the width [m]."""
+        """Return the material of the fill with the weight of the spandrels spread over the width.
+
+        Args:
+            width: of the bridge, out of plane [m].
+            stone: of the spandrels.
+
+        Raises:
+            InvalidStructure: the spandrels are as wide as the bridge.
+        """
         if not self.spandrels < width:
             raise InvalidStructure(
                 f"spandrels of {self.spandrels:.3g} m do not fit into a width of {width:.3g} m"

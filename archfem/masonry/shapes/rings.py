@@ -9,8 +9,9 @@ import numpy as np
 
 from archfem.arguments import real, reals
 from archfem.errors import InvalidStructure
+from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Block, Joint, Point, Structure
+from archfem.masonry.structure import Joint, Structure
 from archfem.units import G
 
 
@@ -28,7 +29,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     chords: int | None = None,
     gravity: float = G,
 ) -> Structure:
-    """Build a ring of equal voussoirs with radial joints between two fixed abutments.
+    """Return a ring of equal voussoirs with radial joints between two fixed abutments.
 
     The circle is centred on the origin and its crown lies on the y axis. Blocks and joints are
     numbered from the left: block 0 is the left abutment and joint 0 the left springing.
@@ -94,7 +95,7 @@ def column(
     contact: Contact = STONE_TO_STONE,
     gravity: float = G,
 ) -> Structure:
-    """Stack rectangular blocks on a fixed base; one block is the classical rocking block.
+    """Return rectangular blocks on a fixed base; one block is the classical rocking block.
 
     Joint 0 is the base. Its "intrados" is the left edge and its "extrados" the right one, so that
     eccentricity is positive to the right. The base's mid-point is the origin.
@@ -149,7 +150,7 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     chords: int | None = None,
     gravity: float = G,
 ) -> Structure:
-    """Set a semicircular ring on two piers, centred under its feet.
+    """Return a semicircular ring on two piers, centred under its feet.
 
     Blocks and joints are numbered from the foot of the left pier over the ring to the foot of the
     right one: block 0 is the left foundation and joint 0 the left base. "Intrados" is the side of

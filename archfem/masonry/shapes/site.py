@@ -1,31 +1,33 @@
 """Stonework of a bridge, block by block: rings, piers and sidewalls, and the paving."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
-from math import cos
 
 import numpy as np
 
 from archfem.errors import InvalidStructure
+from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.overlaps import check_apart, check_simple
 from archfem.masonry.shapes.parts import Arch, Paving, Pier, Sidewall
-from archfem.masonry.shapes.rings import circular_arch
-from archfem.masonry.structure import Block, Joint, Point, Structure
+from archfem.masonry.shapes.placed import Face, extrados_of, face_of, ring_of
+from archfem.masonry.structure import Joint
 
 DEEP = 0.2
 """Depth of the fixed blocks under piers and behind walls [m]; they do not deform."""
-
-Face = tuple[Point, Point]
-"""A springing joint: its intrados and its extrados."""
 
 Courses = Pier | Sidewall
 """A part built up in courses."""
 
 
 def ledge(face: Face, inward: float, walls: Sequence[Sidewall]) -> list[Point]:
-    """What the fill lies on outside an outer springing, from the end of the deck inwards."""
+    """Return what the fill lies on outside an outer springing, from the end of the deck inwards.
+
+    Args:
+        face: the springing joint.
+        inward: 1 at the left end of the bridge, -1 at the right.
+        walls: the sidewall behind it, or none: then the fill ends at the springing.
+    """
     x, y = face[1]
     if not walls:
         return []
@@ -48,13 +50,25 @@ class Site:
     def build(
         self, arches: Sequence[Arch], piers: Sequence[Pier], sidewalls: Sequence[Sidewall]
     ) -> tuple[list[tuple[Face, Face]], list[list[Point]]]:
-        """Build all stonework below the fill; springings and extrados of each ring."""
+        """Build all stonework below the fill, from left to right.
+
+        Args:
+            arches: the rings.
+            piers: between them, one fewer.
+            sidewalls: left and right, or none.
+
+        Returns:
+            The two springing joints of each ring, and the points along its extrados [m].
+
+        Raises:
+            InvalidStructure: parts do not fit beside one another.
+        """
         rings, x = [], sidewalls[0].length if sidewalls else 0.0
         for number, arch in enumerate(arches):
-            rings.append(self._ring(arch, x))
+            rings.append(ring_of(arch, x, self.material, self.contact, self.chords))
             x += arch.span + (piers[number].gap if number < len(piers) else 0.0)
         faces = [(ring.joints[0], ring.joints[-1]) for ring in rings]
-        springings = [(_face(left), _face(right)) for left, right in faces]
+        springings = [(face_of(left), face_of(right)) for left, right in faces]
         support = self._end(springings[0][0], 1.0, sidewalls[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
             first = len(self.blocks)
@@ -66,9 +80,9 @@ class Site:
                 after = self._end(right, -1.0, sidewalls[1:], "right abutment")
             stones = [support, *range(first, last + 1), after]
             for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
-                self._join(pair, _face(joint), f"joint {k}", arch)
+                self._join(pair, face_of(joint), f"joint {k}", arch)
             support = after
-        return springings, [_extrados(ring) for ring in rings]
+        return springings, [extrados_of(ring) for ring in rings]
 
     def add(
         self,
@@ -81,7 +95,17 @@ class Site:
         fixed: bool = False,
         structured: bool = False,
     ) -> int:
-        """Add a block, whichever way round its outline is given; its number."""
+        """Return the number of a block that is added.
+
+        Args:
+            outline: its vertices, either way round; repeated ones are dropped [m].
+            name: of the block.
+            material: by default that of all stones.
+            part: it belongs to; by default one of its own, called as it is.
+            role: of that part.
+            fixed: whether it is an abutment or foundation.
+            structured: whether its first four vertices are the corners of a structured mesh.
+        """
         points = [(float(px), float(py)) for px, py in outline]
         points = [point for k, point in enumerate(points) if point != points[k - 1]]
         x, y = np.array(points).T
@@ -102,7 +126,12 @@ class Site:
         return len(self.blocks) - 1
 
     def pave(self, surface: Sequence[Point], paving: Paving) -> None:
-        """Lay paving stones on a surface, given from left to right."""
+        """Lay paving stones on a surface.
+
+        Args:
+            surface: points along it, from left to right [m].
+            paving: the stones, about as long as they are asked to be.
+        """
         breaks, levels = np.array(surface).T
         pieces = [
             np.linspace(a, b, max(1, round((b - a) / paving.length)) + 1)[:-1]
@@ -116,7 +145,11 @@ class Site:
             self.add([*low, *high], f"paving stone {k + 1}", part="paving", structured=True)
 
     def check(self) -> None:
-        """Refuse blocks that cross themselves or one another: their lengths do not go together."""
+        """Refuse blocks that cross themselves or one another: their lengths do not go together.
+
+        Raises:
+            InvalidStructure: names the blocks.
+        """
         outlines = [block.points for block in self.blocks]
         names = [block.name for block in self.blocks]
         for outline, name in zip(outlines, names, strict=True):
@@ -141,20 +174,6 @@ class Site:
         return self.add(
             outline, name, part=part.name, role=part.role, fixed=fixed, structured=structured
         )
-
-    def _ring(self, arch: Arch, left: float) -> Structure:
-        """A ring with its left springing at x = left, its names and its place."""
-        ring = circular_arch(
-            radius=arch.radius,
-            thickness=arch.thickness,
-            embrace=2.0 * np.degrees(arch.half),
-            voussoirs=arch.voussoirs,
-            material=self.material,
-            contact=self.contact,
-            chords=self.chords,
-        )
-        shift = np.array([left + arch.span / 2.0, -arch.radius * cos(arch.half)])
-        return _moved(ring, shift, arch.name)
 
     def _pier(self, pier: Pier, left: Face, right: Face) -> int:
         """A pier under two springings; the number of its skewback."""
@@ -256,41 +275,3 @@ class Site:
             corners = [(outer, -wall.height), (outer, high), (far, high), (far, -wall.height)]
             self._stone(corners, "retaining wall", wall, fixed=True)
         return skewback
-
-
-def _face(joint: Joint) -> Face:
-    return joint.intrados, joint.extrados
-
-
-def _moved(ring: Structure, shift: np.ndarray, name: str) -> Structure:
-    """A ring at another place, its blocks and joints named after it."""
-
-    def at(point: Point) -> Point:
-        return (float(point[0] + shift[0]), float(point[1] + shift[1]))
-
-    blocks = [
-        Block(
-            tuple(map(at, block.outline)),
-            block.material,
-            f"{name}, {block.name}",
-            block.fixed,
-            block.corners,
-            name,
-            role="ring",
-        )
-        for block in ring.blocks
-    ]
-    joints = [
-        replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=name)
-        for each in ring.joints
-    ]
-    return Structure(tuple(blocks), tuple(joints), ring.width, ring.gravity, name)
-
-
-def _extrados(ring: Structure) -> list[Point]:
-    """Points along the extrados of a ring, from left to right."""
-    points = [ring.joints[0].extrados]
-    for block in ring.blocks[1:-1]:
-        half = len(block.outline) // 2
-        points += list(reversed(block.outline[half:-1]))
-    return points

@@ -50,7 +50,7 @@ class Outline:
 def outlines_in(
     path: str | Path, unit: str | None = None, ignored: Collection[str] = ()
 ) -> list[Outline]:
-    """Read the closed polygons of a drawing.
+    """Return the closed polygons of a drawing.
 
     Args:
         path: a .geojson or .json file, a FeatureCollection of Polygons with the properties of
@@ -121,11 +121,12 @@ def _check_properties(told: dict[str, Any], name: str) -> None:
 
 def _dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Closed polylines of a DXF file."""
-    import ezdxf  # slow to import
+    from ezdxf.filemanagement import readfile  # slow to import
+    from ezdxf.lldxf.const import DXFError
 
     try:
-        drawing = ezdxf.readfile(path)
-    except (OSError, UnicodeDecodeError, ezdxf.DXFError) as error:
+        drawing = readfile(path)
+    except (OSError, UnicodeDecodeError, DXFError) as error:
         raise InvalidInput(f"it is not DXF: {error}") from error
     read = [entity for entity in drawing.modelspace() if entity.dxf.layer not in ignored]
     polylines = [entity for entity in read if entity.dxftype() in ("LWPOLYLINE", "POLYLINE")]
@@ -148,12 +149,13 @@ def _dxf(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Out
 def _dxf_metres(drawing: Any, unit: str | None) -> float:
     """Metres in a unit of a DXF drawing."""
     from ezdxf import units
+    from ezdxf.enums import InsertUnits
 
     if unit is not None:
         return in_unit(f"1 {unit}", "m", "unit")
     if not drawing.units:
         raise InvalidInput('the drawing does not say its unit ($INSUNITS): give one, e.g. "mm"')
-    return float(units.conversion_factor(drawing.units, units.InsertUnits.Meters))
+    return float(units.conversion_factor(drawing.units, InsertUnits.Meters))
 
 
 def _polyline(entity: Any, factor: float) -> Outline:

@@ -11,6 +11,7 @@ import numpy as np
 from archfem.arrays import Array
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
+from archfem.masonry.block import Block
 from archfem.masonry.direction import Direction, directions_of
 from archfem.masonry.materials import (
     MATERIALS,
@@ -21,7 +22,7 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.roles import with_roles
-from archfem.masonry.structure import Block, Structure
+from archfem.masonry.structure import Structure
 from archfem.masonry.survey.drawings import Outline, outlines_in
 from archfem.masonry.survey.snapping import NEARLY, snapped
 from archfem.units import G
@@ -76,7 +77,7 @@ def read_outlines(
     material: Material = STONE,
     materials: Mapping[str, Material] = MATERIALS,
 ) -> Survey:
-    """Read the outlines of blocks from a drawing, and make them touch.
+    """Return the blocks that a drawing outlines, made to touch.
 
     Four-sided blocks get corners, so that their meshes are structured; through the thickness lie
     the sides across a ring or a pier, otherwise the shorter ones.
@@ -127,7 +128,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     width: float = 1.0,
     gravity: float = G,
 ) -> Structure:
-    """Make a structure of the outlines in a drawing.
+    """Return a structure of the outlines in a drawing.
 
     Args:
         path: as for `read_outlines`.
@@ -235,6 +236,10 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
     """Write the blocks of a structure as GeoJSON that `read_outlines` reads.
 
     Arcs become chords. Coordinates are metres in the plane, not degrees.
+
+    Args:
+        structure: whose blocks are written, with their parts, roles and names of materials.
+        path: of the file.
     """
     features = []
     for block in structure.blocks:

@@ -1,0 +1,28 @@
+"""Eccentricity, friction and thrust line of joints whose resultants are given."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+DEPTH = 0.55
+
+
+def test_eccentricity_and_friction(joints):
+    assert float(joints["eccentricity"][1, 3]) == pytest.approx(-0.48)
+    assert float(joints["friction"][2, 7]) == pytest.approx(0.7)
+    assert np.isnan(joints["eccentricity"][2, 11])
+    assert np.isnan(joints["friction"][2, 11])
+    assert joints["N"].attrs["units"] == "N"
+
+
+def test_thrust_line_passes_the_faces_at_half(ring):
+    resultants = np.zeros((18, 3))
+    resultants[:, 0] = 1.0
+    resultants[:9, 2], resultants[9:, 2] = 0.5 * DEPTH, -0.5 * DEPTH
+    resultants[5] = 0.0
+    line = af.joints.thrust_line(ring, af.joints.joint_dataset(ring, resultants)).values
+    radii = np.hypot(*line.T)
+    assert radii[:5] == pytest.approx(2.95 + DEPTH / 2)
+    assert radii[9:] == pytest.approx(2.95 - DEPTH / 2)
+    assert np.isnan(line[5]).all()

@@ -1,0 +1,135 @@
+"""Drawings read: GeoJSON and DXF, units and layers; and files that are none."""
+
+import json
+
+import ezdxf
+import pytest
+from drawn import assert_same, dxf, geojson, layers_of, square
+
+import archfem as af
+
+
+@pytest.mark.parametrize(
+    ("units", "factor", "unit"),
+    [(6, 1.0, None), (4, 1e3, None), (5, 1e2, None), (0, 1e3, "mm"), (1, 1e2, "cm")],
+    ids=["m", "mm", "cm", "given", "given against the file"],
+)
+def test_round_trip_through_dxf(viaduct, tmp_path, units, factor, unit):
+    path = dxf(tmp_path / "viaduct.dxf", viaduct, factor, units)
+    layers = layers_of(viaduct)
+    assert_same(af.masonry.surveyed(path, layers=layers, unit=unit, width=4.0), viaduct, 1e-6)
+
+
+def test_round_trip_through_2d_polylines_drawn_clockwise(tmp_path):
+    """Old-style polylines, mirrored by their extrusion, in a drawing that names nothing."""
+    drawing = ezdxf.new()
+    for x, y, layer in ((0.0, -1.0, "rock"), (0.0, 0.0, "pier"), (0.0, 1.0, "pier")):
+        points = [(-px, py) for px, py in reversed(square(x, y))]
+        attributes = {"layer": layer, "extrusion": (0, 0, -1)}
+        drawing.modelspace().add_polyline2d(points, close=True, dxfattribs=attributes)
+    drawing.saveas(tmp_path / "pier.dxf")
+    layers = {"rock": af.masonry.Layer(fixed=True), "pier": af.masonry.Layer()}
+    found = af.masonry.surveyed(tmp_path / "pier.dxf", layers=layers)
+    assert [block.name for block in found.blocks] == ["rock 1", "pier 1", "pier 2"]
+    assert [joint.name for joint in found.joints] == ["pier, base", "pier, joint 1"]
+    assert found.blocks[1].centroid == pytest.approx([0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"geometry": {"type": "MultiPolygon", "coordinates": [[square(0, 0)]]}}, "a MultiPolygon"),
+        ({"geometry": None}, "'a' is a None"),
+        (
+            {
+                "geometry": {
+                    "type": "Polygon",
+                    "coordinates": [square(0, 0, 4), square(1, 1)],
+                }
+            },
+            "'a' has a hole",
+        ),
+        ({"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}}, "has 2 vertices"),
+        ({"geometry": {"type": "Polygon", "coordinates": [[[0, 0], "x"]]}}, "no list of points"),
+        ({"geometry": {"type": "Polygon", "coordinates": [[1, 2, 3]]}}, "no finite points"),
+        (
+            {"geometry": {"type": "Polygon", "coordinates": [[[0, 0, 0], [1, 0, 0], [1, 1, 9]]]}},
+            "does not lie in the plane",
+        ),
+        ({"properties": {"name": "a", "Material": "stone"}}, "did you mean 'material'"),
+        ({"properties": {"name": "a", "fixed": "yes"}}, "fixed = 'yes' is not true or false"),
+        ({"properties": {"name": "a", "material": "jelly"}}, "'a' is of 'jelly'"),
+    ],
+)
+def test_features_that_are_no_blocks(tmp_path, change, says):
+    path = geojson(tmp_path / "bad.geojson", {"a": square(0, 0)})
+    table = json.loads(path.read_text())
+    table["features"][0] |= change
+    path.write_text(json.dumps(table))
+    with pytest.raises(af.errors.InvalidInput, match=says):
+        af.read_outlines(path)
+
+
+def test_wrong_units(tmp_path):
+    big = {"rock": square(0, -400, 400), "a": square(0, 0, 400)}
+    path = geojson(tmp_path / "mm.geojson", big)
+    with pytest.raises(af.errors.InvalidInput, match=r"typically 566 m large: .* unit = \"mm\""):
+        af.read_outlines(path)
+    assert af.read_outlines(path, unit="mm", snap=1e-4).blocks[0].area == pytest.approx(0.16)
+    with pytest.raises(af.errors.InvalidInput, match="unit = '1 stone' is not in a unit like m"):
+        af.read_outlines(path, unit="stone")
+    degrees = {"a": square(31.2, 40.9, 5e-6), "b": square(31.2, 40.9 + 5e-6, 5e-6)}
+    with pytest.raises(
+        af.errors.InvalidInput, match=r"degrees \(CRS84\) do not do: export projected metres"
+    ):
+        af.read_outlines(geojson(tmp_path / "deg.geojson", degrees))
+
+
+def test_files_that_are_no_drawings(tmp_path):
+    for name, text, says in (
+        ("a.shp", "", "is no drawing: give a .geojson or a .dxf"),
+        ("a.geojson", "{", "it is not JSON"),
+        ("b.geojson", "[]", "no GeoJSON FeatureCollection"),
+        ("d.geojson", '{"features": [3]}', "feature 1 is not as GeoJSON has it"),
+        ("c.geojson", '{"type": "FeatureCollection", "features": []}', "no closed outlines"),
+        ("a.dxf", "nonsense", "it is not DXF"),
+    ):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(af.errors.InvalidInput, match=says):
+            af.read_outlines(tmp_path / name)
+    with pytest.raises(af.errors.InvalidInput, match="there is no drawing"):
+        af.read_outlines(tmp_path / "none.dxf")
+
+
+@pytest.mark.parametrize(
+    ("draw", "says"),
+    [
+        (lambda s: s.add_lwpolyline(square(2, 0)), r"at \(2, 0\) on layer '0' is not closed"),
+        (lambda s: s.add_line((0, 0), (1, 1)), "layer '0' has a LINE beside its polylines"),
+        (
+            lambda s: s.add_lwpolyline([(2, 0, 0.3), (3, 0, 0), (3, 1, 0)], "xyb", close=True),
+            "has arcs, and joints are straight",
+        ),
+        (lambda s: s.add_polymesh((3, 3)), "is a mesh"),
+        (
+            lambda s: (
+                s.add_text("one", dxfattribs={"insert": (0.2, 0.2)}),
+                s.add_mtext("two", dxfattribs={"insert": (0.4, 0.4)}),
+            ),
+            r"has the texts \['one', 'two'\] in it",
+        ),
+    ],
+)
+def test_dxf_that_cannot_be_read(tmp_path, draw, says):
+    drawing = ezdxf.new()
+    drawing.modelspace().add_lwpolyline(square(0, 0), close=True)
+    draw(drawing.modelspace())
+    drawing.saveas(tmp_path / "bad.dxf")
+    with pytest.raises(af.errors.InvalidInput, match=says):
+        af.read_outlines(tmp_path / "bad.dxf")
+
+
+def test_dxf_without_a_unit(tmp_path, stack):
+    path = dxf(tmp_path / "none.dxf", stack, units=0)
+    with pytest.raises(af.errors.InvalidInput, match=r"does not say its unit \(\$INSUNITS\)"):
+        af.read_outlines(path)

@@ -1,0 +1,48 @@
+"""Rings from a few lengths: weights, spans, and what is refused."""
+
+from math import radians
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+
+def test_ring_weighs_what_it_should(ring):
+    assert ring.weight == pytest.approx(20e3 * 0.55 * 2.95 * radians(159.0), rel=1e-12)
+    chorded = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+    turn = radians(159.0) / 17
+    assert chorded.weight / ring.weight == pytest.approx(np.sin(turn) / turn, rel=1e-12)
+
+
+def test_span_and_rise_are_clear(ring):
+    arch = af.circular_arch(span=5.0, rise=2.0, thickness=0.4, voussoirs=11)
+    feet = [arch.joints[0].intrados, arch.joints[-1].intrados]
+    assert feet[1][0] - feet[0][0] == pytest.approx(5.0)
+    crown = max(y for block in arch.blocks[1:-1] for x, y in block.drawn()[:17])
+    assert crown - feet[0][1] == pytest.approx(2.0, abs=1e-12)
+
+
+def test_over_semicircular_and_single_stone_rings():
+    assert len(af.circular_arch(radius=1, thickness=0.2, embrace=200, voussoirs=9).joints) == 10
+    assert len(af.circular_arch(radius=1, thickness=0.2, embrace=80, voussoirs=1).blocks) == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"thickness": -0.1}, "thickness -0.1 m is not between"),
+        ({"thickness": 7.0}, "twice the radius"),
+        ({"embrace": 400.0}, "embrace 400"),
+        ({"voussoirs": 0}, "voussoirs 0"),
+        ({"voussoirs": 2.5}, "voussoirs 2.5"),
+        ({"span": 5.0}, "either radius and embrace"),
+        ({"radius": None, "embrace": None, "span": 5.0, "rise": 2.6}, "half the span"),
+        ({"width": 0.0}, "width 0 m"),
+        ({"gravity": -9.81}, "gravity -9.81"),
+    ],
+)
+def test_impossible_rings_are_refused(change, says):
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
+    with pytest.raises(af.errors.InvalidStructure, match=says):
+        af.circular_arch(**{**given, **change})

@@ -1,0 +1,93 @@
+"""Outlines that nearly touch, made to touch; and those that cannot be meant."""
+
+import json
+
+import numpy as np
+import pytest
+from drawn import assert_same, geojson, square
+
+import archfem as af
+
+
+@pytest.mark.parametrize(("error", "snap"), [(0.5e-3, 2e-3), (2e-3, 8e-3), (8e-3, 0.03)])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_disturbed_outlines_are_made_to_touch(viaduct, drawing, tmp_path, error, snap, seed):
+    rng = np.random.default_rng(seed)
+    table = json.loads(drawing.read_text())
+    for feature in table["features"]:
+        ring = np.array(feature["geometry"]["coordinates"][0])[:-1]
+        ring += rng.uniform(-error, error, ring.shape)
+        if rng.uniform() < 0.5:
+            ring = ring[::-1]
+        feature["geometry"]["coordinates"] = [[*ring.tolist(), ring[0].tolist()]]
+    path = tmp_path / "rough.geojson"
+    path.write_text(json.dumps(table))
+    # Copies of a corner lie in a square of ± error; their mean, or the foot on an edge, does too.
+    assert_same(af.masonry.surveyed(path, snap=snap, width=4.0), viaduct, 2.0 * error)
+    assert 0.5 * error < af.read_outlines(path, snap=snap).moved < snap
+
+
+def test_vertices_are_put_onto_edges(tmp_path):
+    """A stone across the joint of two others, corners up to 2 mm off, and a face with a bend."""
+    path = geojson(
+        tmp_path / "t.geojson",
+        {
+            "ground": [[0, 0], [4, 0.001], [4, 1], [2.1, 1.0015], [0, 1]],
+            "left": [[0, 1.001], [2, 1], [2, 2], [0, 2]],
+            "right": [[2.001, 0.999], [4, 1.001], [4, 2], [2, 2.001]],
+            "top": [[0, 2.001], [4, 2], [4, 3], [0, 3]],
+        },
+    )
+    found = af.masonry.surveyed(path, snap=2e-3)
+    assert [joint.name for joint in found.joints] == [
+        "ground to left",
+        "ground to right",
+        "left to right",
+        "left to top",
+        "right to top",
+    ]
+    depths = [joint.depth for joint in found.joints]
+    assert depths == pytest.approx([2.0, 2.0, 1.0, 2.0, 2.0], abs=4e-3)
+    assert len(found.blocks[0].outline) == 5  # vertices in a straight face are kept
+
+
+LOWER = {"rock": square(0, -1)}
+
+
+@pytest.mark.parametrize(
+    ("outlines", "says"),
+    [
+        (LOWER | {"a": square(0, 0), "b": square(0.2, 0.2)}, "'a' and 'b' overlap by 6.4e.03 cm²"),
+        (LOWER | {"a": square(0, -0.004)}, "'rock' and 'a' overlap by 40 cm², about 3.98 mm deep"),
+        (LOWER | {"a": square(0, 0.004)}, "are 4 mm apart at .* raise snap = 0.001 m above"),
+        (LOWER | {"a": [[-0.1, 0.003], [2, 0], [2, 1], [0, 1]]}, r"are 2.86 mm apart at .0\.000"),
+        (LOWER | {"a": square(0, 0), "b": square(0, 0)}, "'a' and 'b' are the same"),
+        (LOWER | {"a": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "'a' crosses or touches itself"),
+        (LOWER | {"a": square(0.998, 0)}, "'rock' and 'a' touch along 2 mm only"),
+        (LOWER | {"a": square(3, 3)}, r"\['a'\] rest on nothing"),
+        (LOWER | {"a": [[0, 0], [1, 0], [1, 5e-4]]}, "'a' is no larger than snap 0.001 m"),
+        (
+            LOWER | {"a": [[0.0009 * k, 0] for k in range(9)] + [[1, 1]]},
+            "vertex of 'a' at .* by 3.96 mm",
+        ),
+    ],
+)
+def test_outlines_that_are_no_structure(tmp_path, outlines, says):
+    path = geojson(tmp_path / "bad.geojson", outlines)
+    with pytest.raises(af.errors.InvalidStructure, match=says):
+        af.masonry.surveyed(path)
+
+
+def test_gaps_that_are_meant_are_left(tmp_path):
+    """A joint open at one end by 6 mm, an open joint of 10 mm: more than five times snap."""
+    path = geojson(
+        tmp_path / "open.geojson",
+        {
+            "rock": [[0, -1], [3, -1], [3, 0], [0, 0]],
+            "a": [[0, 0], [1, 0], [0.994, 1], [0, 1]],
+            "b": square(1, 0),
+            "c": [[2.01, 0], [3, 0], [3, 1], [2.01, 1]],
+        },
+    )
+    names = [joint.name for joint in af.masonry.surveyed(path).joints]
+    assert names == ["rock to a", "rock to b", "rock to c"]
