@@ -33,7 +33,11 @@ class Limits:
     bounds: Array
 
     def with_(self, other: "Limits") -> "Limits":
-        """Both sets of limits together."""
+        """Return both sets of limits together.
+
+        Args:
+            other: limits on the same forces.
+        """
         return Limits(
             sparse.vstack([self.rows, other.rows], format="csr"),
             np.concatenate([self.bounds, other.bounds]),
@@ -41,19 +45,28 @@ class Limits:
 
 
 def no_limits(joints: int) -> Limits:
-    """No limits on the forces of so many joints."""
+    """Return no limits on the forces of so many joints.
+
+    Args:
+        joints: how many.
+    """
     return Limits(sparse.csr_matrix((0, 3 * joints)), np.zeros(0))
 
 
 def friction_limits(coefficient: Array, cohesion: Array) -> Limits:
-    """|V| <= c + μ N for each joint, with μ (n_joints,) [-] and c (n_joints,) [block weights]."""
+    """Return the limits |V| <= c + μ N of each joint.
+
+    Args:
+        coefficient: μ (n_joints,) [-].
+        cohesion: c (n_joints,) [mean block weights].
+    """
     slope, one = sparse.diags(-coefficient), sparse.identity(len(coefficient))
     rows = sparse.bmat([[slope, slope, one], [slope, slope, -one]], format="csr")
     return Limits(rows, np.tile(cohesion, 2))
 
 
 def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limits:
-    """Tangents of the crushing limit |M| <= N h/2 - N²/(2 σ w), for given joints.
+    """Return tangents of the crushing limit |M| <= N h/2 - N²/(2 σ w), for given joints.
 
     A rectangular stress block of the full strength σ asks each end for F >= N²/(2 N_c) with
     N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
@@ -113,7 +126,10 @@ class Programme:
     prices: Array = field(default_factory=lambda: np.zeros(0))
 
     def solve(self) -> Optimum | None:
-        """Solve, adding crushing cuts until none is violated; None where it is unbounded.
+        """Solve, adding crushing cuts until none is violated.
+
+        Returns:
+            The optimum, or None where the objective falls without bound.
 
         Raises:
             DidNotConverge: the solver gave up, or no state fulfils the limits.

@@ -16,11 +16,10 @@ from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
-from archfem.statics.newton import Solver, magnitude
+from archfem.statics.newton import ROUGHLY, Solver, magnitude
 
-TOLERANCE, ROUGHLY, ITERATIONS = 1e-9, 1e-7, 30
-"""Force left out of balance, relative to the sum of all loads; the same where round-off of large
-motions is above that; Newton's iterations in a step."""
+TOLERANCE, ITERATIONS = 1e-9, 30
+"""Force left out of balance, relative to the sum of all loads; Newton's iterations in a step."""
 
 FIRST, GROWTH, SMALLEST = 1e-6, 1.1, 1e-3
 """First displacement relative to the structure's size, growth of steps, and the smallest step,
@@ -86,6 +85,14 @@ class LoadPath:
     ) -> "LoadPath":
         """Begin at the dead load's equilibrium.
 
+        Args:
+            model: what is loaded.
+            actions: that grow together.
+            start: the equilibrium under the dead load.
+
+        Returns:
+            A path of this one state.
+
         Raises:
             InvalidInput: the load is zero.
         """
@@ -111,11 +118,14 @@ class LoadPath:
         return np.array(self.resisted)
 
     def advance(self, border: Array, distance: float) -> bool:
-        """Add the equilibrium at a distance along the border's direction; whether there is one.
+        """Add the equilibrium at a distance along the border's direction.
 
         Args:
             border: a and b of the further equation (2,).
             distance: its right side, from the last state on.
+
+        Returns:
+            Whether there is one.
         """
         along, up = border / np.array(self.unit)
         row = sparse.csr_matrix(np.append(along * self.probe, up))
@@ -140,13 +150,14 @@ class LoadPath:
 
     def _rest(self, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
-        return self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        rest: Array = self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        return rest
 
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Whether forces are in balance, or off by no more than round-off of large motions."""
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.live)
         rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
-        return magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load)
+        return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
 
 
 def _size(model: Model, action: BodyForce | PointLoad) -> float:
@@ -187,6 +198,14 @@ class SupportPath:
     def of(cls, model: Model, settlement: Settlement, start: Equilibrium) -> "SupportPath":
         """Begin at the dead load's equilibrium.
 
+        Args:
+            model: whose support moves.
+            settlement: a unit of its motion.
+            start: the equilibrium under the dead load.
+
+        Returns:
+            A path of this one state.
+
         Raises:
             InvalidInput: the block is not a support, or does not move.
         """
@@ -218,10 +237,19 @@ class SupportPath:
         intrados, extrados, slip = blocks.gaps(self.motion)
         normal, shear, moment = np.moveaxis(self.resultants, -1, 0)
         middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.structure.depths
-        return normal @ middle + moment @ turn - shear @ slip
+        work: Array = normal @ middle + moment @ turn - shear @ slip
+        return work
 
     def advance(self, border: Array, distance: float) -> bool:
-        """Move the support on by a distance in units of the first; whether there is equilibrium."""
+        """Move the support on, and add the equilibrium there.
+
+        Args:
+            border: of no use here, for a support moves by displacement alone.
+            distance: in units of the first step.
+
+        Returns:
+            Whether there is one.
+        """
         part = self.parts[-1] + distance * self.unit[0] / self.reach
         model = self.model.moved(self.model.supports + part * self.motion)
         try:
@@ -255,6 +283,12 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         control: "displacement", "arc length" or "force".
         stop: the rules.
         criteria: what makes a joint hinge.
+
+    Returns:
+        The rule that ended it, in words.
+
+    Raises:
+        DidNotConverge: there is no equilibrium just after the dead load.
     """
     distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}

@@ -93,6 +93,9 @@ def pushover(
         stop: when to end.
         criteria: what makes a joint hinge; by default the usual ones.
 
+    Returns:
+        The curve, the joints along it, and the limit that it tends to.
+
     Raises:
         InvalidInput: control is unknown, or not by displacement for a settlement; the load misses
             the structure or is zero.
@@ -161,7 +164,7 @@ def hinge_order(
 
 
 def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
-    """Limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
+    """Return the limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
 
     Taken over the last doubling of d, since points of a joint open one by one. While part of d is
     elastic it is too high, so that the limit lies in between; a flat last step has reached it.
