@@ -80,10 +80,10 @@ def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
             equilibrium found on the way, under part of the weight.
     """
     check_model(model)
-    return equilibrium(model, self_weight(model), newton)
+    return equilibrium_under(model, self_weight(model), newton)
 
 
-def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
+def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
     """Find the equilibrium under a load that is brought on from rest.
 
     Supports that have moved do so after that, little by little: the joints follow.
