@@ -20,7 +20,7 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
-LOG = logging.getLogger("archfem")
+logger = logging.getLogger("archfem")
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
 
@@ -164,7 +164,7 @@ def collapse_factor(
         found = without_dilatancy(asked, found)
     result = _result(asked, ends[0], scale * found.value, found, support=support)
     if friction == "coulomb" and result.sliding:
-        LOG.warning(
+        logger.warning(
             "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "
             "estimate; friction='nonassociated' does without it",
             list(result.sliding),

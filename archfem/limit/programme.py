@@ -32,7 +32,7 @@ class Limits:
     rows: sparse.csr_matrix
     bounds: Array
 
-    def with_(self, other: "Limits") -> "Limits":
+    def joined(self, other: "Limits") -> "Limits":
         """Return both sets of limits together.
 
         Args:
@@ -138,7 +138,7 @@ class Programme:
         if self.crushing is not None:
             every = np.arange(len(self.crushing))
             for share in (0.25, 0.5, 1.0):
-                limits = limits.with_(crushing_cuts(every, share * self.crushing, self.crushing))
+                limits = limits.joined(crushing_cuts(every, share * self.crushing, self.crushing))
         for _ in range(CUTS):
             found = self._solve_within(limits)
             if found is None or self.crushing is None:
@@ -149,7 +149,7 @@ class Programme:
             broken = np.flatnonzero(excess > EXCESS * self.crushing)
             if not len(broken):
                 return found
-            limits = limits.with_(crushing_cuts(broken, thrust[broken], self.crushing))
+            limits = limits.joined(crushing_cuts(broken, thrust[broken], self.crushing))
         raise DidNotConverge(
             f"the crushing limit is still violated after {CUTS} rounds of cuts: "
             "check that strength is in Pa"

@@ -6,8 +6,8 @@ from .freebody import FreeBody as FreeBody
 from .freebody import forces_on as forces_on
 from .modes import Modes as Modes
 from .newton import Newton as Newton
-from .path import Stop as Stop
 from .pushover import Pushover as Pushover
+from .pushover import Stop as Stop
 from .strength import joint_stress as joint_stress
 from .strength import strength_use as strength_use
 from .strength import strength_use_over as strength_use_over

@@ -16,11 +16,7 @@ EXACT = 1e-7
 
 
 SIDEWAYS = af.BodyForce(1.0)
-
-
 ECCENTRIC = af.PointLoad(1.4, (0.0, -1e3))
-
-
 LOADS = [
     SIDEWAYS,
     af.BodyForce(-1.0),

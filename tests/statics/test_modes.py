@@ -16,23 +16,11 @@ import archfem as af
 from archfem.statics.modes import modes
 
 GRAVITY = 9.81
-
-
 DENSITY = 2000.0
-
-
 HARD = af.Material(30e9, 0.2, DENSITY * GRAVITY)
-
-
 NORMAL, SHEAR = 1e9, 4e8
-
-
 JOINT = af.Contact(NORMAL, SHEAR, 0.6)
-
-
 BREADTH, HEIGHT = 0.6, 2.4
-
-
 SAME = 1e-9
 """Two ways to the same numbers: rounding of a stiffness whose ω² span eight decades."""
 

@@ -1,16 +1,12 @@
 """Pushover: it rises to the limit of rigid blocks, whichever way it is controlled."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.statics.pushover import CONTROLS, pushover
+from archfem.statics.pushover import CONTROLS, Stop, pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
-
-
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
 
 
@@ -91,9 +87,7 @@ def test_ring_on_piers_reaches_its_limit():
 def test_curve_of_a_rocking_block_follows_the_joint_section():
     """Compressed depth c = 3 (h/2 - |e|) and turning θ = 2 N / (k_n w c²) once |e| > h/6."""
     block = af.column(breadth=0.6, heights=[2.4])
-    found = pushover(
-        rigid(block, cells=(200, 1)), af.BodyForce(1.0), stop=af.statics.Stop(displacement=1e-3)
-    )
+    found = pushover(rigid(block, cells=(200, 1)), af.BodyForce(1.0), stop=Stop(displacement=1e-3))
     contact, weight = block.joints[0].contact, block.weight
     factor = found.curve["factor"].values
     slip = factor * weight / (contact.shear_stiffness * 0.6)
@@ -128,7 +122,7 @@ def test_force_control_says_that_the_load_cannot_grow():
 def test_limit_lies_between_what_was_reached_and_the_extrapolation(reach, rule):
     model = rigid(RING, cells=(32, 1), **rule)
     limit = af.collapse_factor(RING, live=af.BodyForce(1.0), friction=None).factor
-    found = pushover(model, af.BodyForce(1.0), stop=af.statics.Stop(displacement=reach))
+    found = pushover(model, af.BodyForce(1.0), stop=Stop(displacement=reach))
     assert "moved by" in found.outcome
     assert found.factor < limit < found.limit + REACHED * limit
     assert found.uncertainty == pytest.approx(found.limit - found.factor)
@@ -142,16 +136,14 @@ def test_a_load_without_a_limit_has_no_extrapolation():
 
 
 def test_other_rules_stop_it():
-    by_hinges = pushover(rigid(RING), af.BodyForce(1.0), stop=af.statics.Stop(hinges=2))
+    by_hinges = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(hinges=2))
     assert 2 <= len(by_hinges.hinges) < 4
     assert "joints hinge" in by_hinges.outcome
     early = af.Criteria(hinge=0.3)
-    sooner = pushover(
-        rigid(RING), af.BodyForce(1.0), stop=af.statics.Stop(hinges=2), criteria=early
-    )
+    sooner = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(hinges=2), criteria=early)
     assert sooner.factor < by_hinges.factor
     assert af.Criteria.of(sooner.joints) == early
-    by_steps = pushover(rigid(RING), af.BodyForce(1.0), stop=af.statics.Stop(steps=5))
+    by_steps = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(steps=5))
     assert by_steps.curve.sizes["step"] == 6
     assert "5 steps" in by_steps.outcome
 
@@ -174,13 +166,29 @@ def test_a_ring_that_does_not_stand_is_not_pushed():
         ),
         (lambda: pushover(rigid(RING), af.Settlement(0, (0.0, 0.0, 0.0))), "is zero"),
         (lambda: pushover(rigid(RING), af.Settlement(5, (0.1, 0.0, 0.0))), "cannot settle"),
-        (lambda: af.statics.Stop(slope=1.5), "not between 0 and 1"),
-        (lambda: replace(af.statics.Stop(), steps=0), "must be above 0"),
     ],
 )
 def test_input_that_cannot_be_meant_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"slope": 1.5}, "slope 1.5 is not between 0 and 1"),
+        ({"steps": 0}, "steps 0 must be above 0"),
+    ],
+)
+def test_rules_that_would_stop_at_once_or_never_are_refused(given, message):
+    with pytest.raises(af.InvalidInput, match=message):
+        Stop(**given)
+
+
+def test_what_moved_is_named():
+    stop = Stop(displacement=1e-5)
+    for load, what in ((af.BodyForce(1.0), "load"), (af.Settlement(0, (-1.0, 0, 0)), "support")):
+        assert f"the {what} moved by" in pushover(rigid(RING), load, stop=stop).outcome
 
 
 @pytest.mark.parametrize("spread", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
@@ -202,16 +210,14 @@ def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(spread
 def test_spreading_supports_bring_meshed_rungs_to_the_least_thrust(rung):
     settlement = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
     limit = af.collapse_factor(RING, live=settlement, friction=None).factor
-    found = pushover(
-        af.build(RING, fidelity=rung, cells=(4, 2)), settlement, stop=af.statics.Stop(slope=1e-4)
-    )
+    found = pushover(af.build(RING, fidelity=rung, cells=(4, 2)), settlement, stop=Stop(slope=1e-4))
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor < 0.8 * float(found.curve["factor"][0])  # the thrust of the dead load
 
 
 def test_work_on_a_settlement_is_the_thrust_on_the_support():
     found = pushover(
-        rigid(RING), af.Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=af.statics.Stop(steps=3)
+        rigid(RING), af.Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3)
     )
     joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
     thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]

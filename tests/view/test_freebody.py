@@ -60,8 +60,6 @@ def test_an_open_joint_is_named_and_has_no_arrow():
 
 def test_a_polygon_of_too_many_forces_is_refused():
     bridge = af.Case.read(BRIDGE).structure
-    joints = af.joints.joint_dataset(
-        bridge, np.tile([1e4, 0.0, 0.0], (len(bridge.joints), 1))
-    )
+    joints = af.joints.joint_dataset(bridge, np.tile([1e4, 0.0, 0.0], (len(bridge.joints), 1)))
     with pytest.raises(af.InvalidInput, match=r"'backfill' has \d+ joints: .* choose a stone"):
         draw_free_body(bridge, joints, "backfill")
