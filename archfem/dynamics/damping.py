@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archfem.arguments import real
+from archfem.arguments import real, whole
 from archfem.dynamics.schemes import EFFECTIVE, Rayleigh
 from archfem.errors import InvalidInput
 from archfem.models.model import Model, check_model
@@ -72,17 +72,27 @@ class EffectiveRange:
 
 
 def effective_range(
-    model: Model, about: Equilibrium | None = None, *, share: float = EFFECTIVE
+    model: Model,
+    about: Equilibrium | None = None,
+    *,
+    share: float = EFFECTIVE,
+    few: int = FEW,
+    most: int = MOST,
 ) -> EffectiveRange:
     """Find the first and the last mode effective along x.
 
-    As many modes are computed as it takes; where 1024 do not have the share, the last of them is
-    given, and a warning says how much they have.
+    A few modes are computed, and then twice as many as before until they have the share; where
+    `most` have not, the last of them is given, and a warning says how much they have.
 
     Args:
         model: any rung of the ladder.
         about: the state, such as the dead load of this model; None: all joints closed.
         share: of the mass that can move along x, of the modes up to the last [-].
+        few: number of modes to compute at first.
+        most: number of modes not to go beyond.
+
+    Returns:
+        Both, and all modes that were computed.
 
     Raises:
         InvalidInput: the share is not one, or a single mode has it.
@@ -93,9 +103,10 @@ def effective_range(
         raise InvalidInput(
             f"share {share} of the mass is not between {FIRST_SHARE} and 1: 90 % is 0.9"
         )
+    few, most = whole(few, "modes to compute at first"), whole(most, "modes to compute at most")
     count = 0
-    while count < min(MOST, model.size):
-        count = min(max(FEW, 2 * count), MOST, model.size)
+    while count < min(most, model.size):
+        count = min(max(few, 2 * count), most, model.size)
         found = modes(model, count, about)
         reached = np.cumsum(found.mass_ratios[:, 0])
         if reached[-1] >= share:
@@ -124,7 +135,7 @@ def effective_damping(
     joints: str = "closed",
     share: float = EFFECTIVE,
 ) -> Rayleigh:
-    """Damping with a ratio at the first and the last mode effective along x, less between them.
+    """Return damping with a ratio at the first and last mode effective along x, less between them.
 
     So Demirel and Aldemir (Buildings 11 (2021), section 2) choose it: no mode that counts along
     the structure is damped by more than the ratio. `effective_range` tells which modes these are.

@@ -11,7 +11,7 @@ from archfem.joints.criteria import judged
 from archfem.masonry.actions import BodyForce
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import equilibrium, self_weight
+from archfem.statics.equilibrium import equilibrium_under, self_weight
 
 WINDOW = 8.0
 """Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
@@ -33,7 +33,7 @@ def severe_motion(model: Model) -> Motion:
     for _ in range(10):
         middle = 0.5 * (low + high)
         try:
-            joints = equilibrium(model, weight + model.load(BodyForce(middle))).joints
+            joints = equilibrium_under(model, weight + model.load(BodyForce(middle))).joints
             severe = float(abs(judged(joints)["eccentricity"]).max()) > SEVERE
         except DidNotConverge:
             severe = True

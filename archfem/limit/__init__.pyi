@@ -1,4 +1,5 @@
 from .collapse import Collapse as Collapse
+from .collapse import Outcome as Outcome
 from .collapse import collapse_factor as collapse_factor
 from .collapse import stands as stands
 from .counted import Mechanism as Mechanism
@@ -6,4 +7,6 @@ from .counted import counted_mechanism as counted_mechanism
 from .counted import counted_mechanisms as counted_mechanisms
 from .thickness import minimum_thickness as minimum_thickness
 from .verified import VerifiedMechanism as VerifiedMechanism
+from .verified import Verifier as Verifier
+from .verified import first_verified_mechanism as first_verified_mechanism
 from .verified import verified_mechanism as verified_mechanism

@@ -26,7 +26,11 @@ from archfem.masonry.structure import Structure
 
 
 def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
-    """Generalised forces of actions on the free blocks (3 n_free,) [N, N, N m].
+    """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m].
+
+    Args:
+        structure: whose blocks are loaded.
+        actions: body forces in multiples of g, point loads in N; they add up.
 
     Raises:
         InvalidInput: a point load misses the structure.
@@ -107,24 +111,40 @@ class RigidBlocks:
         return sparse.diags(self.coordinates) @ self.kinematics.T @ sparse.diags(sign)
 
     def scaled(self, load: Array) -> Array:
-        """Generalised forces in the programme's units (3 n_free,)."""
+        """Return generalised forces in the programme's units (3 n_free,).
+
+        Args:
+            load: as made by `rigid_load` (3 n_free,) [N, N, N m].
+        """
         return self.coordinates * load / self.force
 
     def motion(self, coordinates: Array) -> Array:
-        """Motion of all blocks from the multipliers of the balance (n_blocks, 3) [m, m, rad]."""
+        """Return the motion of all blocks, zero for fixed ones (n_blocks, 3) [m, m, rad].
+
+        Args:
+            coordinates: multipliers of the balance (3 n_free,), in the programme's units.
+        """
         motion = np.zeros((len(self.structure.blocks), 3))
         motion[list(self.structure.free)] = (self.coordinates * coordinates).reshape(-1, 3)
         return motion
 
     def reach(self, motion: Array) -> float:
-        """Largest displacement of a corner of any block, for a motion (n_blocks, 3) [m]."""
+        """Return the largest displacement of a corner of any block [m].
+
+        Args:
+            motion: of the centroid of every block (n_blocks, 3) [m, m, rad].
+        """
         return max(
             float(np.linalg.norm(motion_of(block.drawn(), block.centroid) @ own, axis=1).max())
             for block, own in zip(self.structure.blocks, motion, strict=True)
         )
 
     def resultants(self, forces: Array) -> Array:
-        """N, V, M from the programme's forces (3 n_joints,): (n_joints, 3) [N, N, N m]."""
+        """Return N, V, M of every joint (n_joints, 3) [N, N, N m].
+
+        Args:
+            forces: F_i of all joints, then F_e, then V (3 n_joints,) [mean block weights].
+        """
         intrados, extrados, shear = self.force * forces.reshape(3, -1)
         moment = (extrados - intrados) * self.structure.depths / 2.0
         return np.stack([intrados + extrados, shear, moment], axis=1)

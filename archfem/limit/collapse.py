@@ -20,7 +20,7 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
-LOG = logging.getLogger("archfem")
+logger = logging.getLogger("archfem")
 
 SELF_WEIGHT = BodyForce(0.0, -1.0)
 
@@ -127,6 +127,9 @@ def collapse_factor(
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
 
+    Returns:
+        The factor, how it was found, and the mechanism.
+
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, or bodies such as a
             fill cannot be taken as rigid.
@@ -161,7 +164,7 @@ def collapse_factor(
         found = without_dilatancy(asked, found)
     result = _result(asked, ends[0], scale * found.value, found, support=support)
     if friction == "coulomb" and result.sliding:
-        LOG.warning(
+        logger.warning(
             "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "
             "estimate; friction='nonassociated' does without it",
             list(result.sliding),
@@ -173,13 +176,26 @@ def collapse_factor(
 def stands(
     structure: Structure, *, friction: str | None = "coulomb", strength: float | None = None
 ) -> bool:
-    """Whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
+    """Tell whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
 
     The programme finds the least forces that would have to be added to the blocks' weights,
 
         min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= μ N,
 
-    and the structure stands where that is nothing. Arguments are those of `collapse_factor`.
+    and the structure stands where that is nothing.
+
+    Args:
+        structure: supports are its fixed blocks.
+        friction: "coulomb" or "nonassociated", here the same, holds |V| <= μ N; None forbids
+            sliding.
+        strength: compressive strength of the blocks [Pa], as for `collapse_factor`; None for no
+            limit.
+
+    Returns:
+        Whether it stands.
+
+    Raises:
+        InvalidInput: an option is unknown, or bodies such as a fill cannot be taken as rigid.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
@@ -253,7 +269,7 @@ def _balanced(fall: Optimum, dead: Programme) -> bool:
 def _result(
     asked: Programme, outcome: Outcome, factor: float, found: Optimum, support: Array | None = None
 ) -> Collapse:
-    """Read the optimum as joint resultants and as a motion of blocks.
+    """Return the optimum read as joint resultants and as a motion of blocks.
 
     A motion that follows a moving support keeps its size, any other is scaled.
     """

@@ -36,7 +36,7 @@ class Mechanism:
 
 
 def mechanism_kind(roles: Collection[str]) -> str:
-    """Class of a mechanism: "none", "local", "semi-global" or "global".
+    """Return the class of a mechanism: "none", "local", "semi-global" or "global".
 
     Args:
         roles: of the judged parts that fail or move, one for each.
@@ -104,6 +104,9 @@ def counted_mechanisms(
     Args:
         joints: over joint, or over time and joint.
         criteria: by default those by which the joints were judged already.
+
+    Returns:
+        The first mechanism by each definition, or None, by the definition's name.
     """
     joints = flagged(joints, criteria)
     rings = joints["role"].values.astype(str) == "ring"

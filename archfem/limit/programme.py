@@ -32,8 +32,12 @@ class Limits:
     rows: sparse.csr_matrix
     bounds: Array
 
-    def with_(self, other: "Limits") -> "Limits":
-        """Both sets of limits together."""
+    def joined(self, other: "Limits") -> "Limits":
+        """Return both sets of limits together.
+
+        Args:
+            other: limits on the same forces.
+        """
         return Limits(
             sparse.vstack([self.rows, other.rows], format="csr"),
             np.concatenate([self.bounds, other.bounds]),
@@ -41,19 +45,28 @@ class Limits:
 
 
 def no_limits(joints: int) -> Limits:
-    """No limits on the forces of so many joints."""
+    """Return no limits on the forces of so many joints.
+
+    Args:
+        joints: how many.
+    """
     return Limits(sparse.csr_matrix((0, 3 * joints)), np.zeros(0))
 
 
 def friction_limits(coefficient: Array, cohesion: Array) -> Limits:
-    """|V| <= c + μ N for each joint, with μ (n_joints,) [-] and c (n_joints,) [block weights]."""
+    """Return the limits |V| <= c + μ N of each joint.
+
+    Args:
+        coefficient: μ (n_joints,) [-].
+        cohesion: c (n_joints,) [mean block weights].
+    """
     slope, one = sparse.diags(-coefficient), sparse.identity(len(coefficient))
     rows = sparse.bmat([[slope, slope, one], [slope, slope, -one]], format="csr")
     return Limits(rows, np.tile(cohesion, 2))
 
 
 def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limits:
-    """Tangents of the crushing limit |M| <= N h/2 - N²/(2 σ w), for given joints.
+    """Return tangents of the crushing limit |M| <= N h/2 - N²/(2 σ w), for given joints.
 
     A rectangular stress block of the full strength σ asks each end for F >= N²/(2 N_c) with
     N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
@@ -113,7 +126,10 @@ class Programme:
     prices: Array = field(default_factory=lambda: np.zeros(0))
 
     def solve(self) -> Optimum | None:
-        """Solve, adding crushing cuts until none is violated; None where it is unbounded.
+        """Solve, adding crushing cuts until none is violated.
+
+        Returns:
+            The optimum, or None where the objective falls without bound.
 
         Raises:
             DidNotConverge: the solver gave up, or no state fulfils the limits.
@@ -122,7 +138,7 @@ class Programme:
         if self.crushing is not None:
             every = np.arange(len(self.crushing))
             for share in (0.25, 0.5, 1.0):
-                limits = limits.with_(crushing_cuts(every, share * self.crushing, self.crushing))
+                limits = limits.joined(crushing_cuts(every, share * self.crushing, self.crushing))
         for _ in range(CUTS):
             found = self._solve_within(limits)
             if found is None or self.crushing is None:
@@ -133,7 +149,7 @@ class Programme:
             broken = np.flatnonzero(excess > EXCESS * self.crushing)
             if not len(broken):
                 return found
-            limits = limits.with_(crushing_cuts(broken, thrust[broken], self.crushing))
+            limits = limits.joined(crushing_cuts(broken, thrust[broken], self.crushing))
         raise DidNotConverge(
             f"the crushing limit is still violated after {CUTS} rounds of cuts: "
             "check that strength is in Pa"

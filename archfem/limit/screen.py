@@ -76,10 +76,14 @@ class Screen:
         return found
 
     def permit(self, freedoms: Array) -> bool:
-        """Whether the failed joints may permit a motion of the parts: a necessary condition.
+        """Tell whether the failed joints may permit a motion of the parts.
 
         Args:
             freedoms: of every joint (3 n_joints,), as `Verifier.freedoms` gives them.
+
+        Returns:
+            False where they permit none; True where they may, which is for the programme of
+            `verified_mechanism` to decide.
         """
         either = np.flatnonzero(freedoms == 2.0)
         ways = np.concatenate([np.flatnonzero(freedoms), either])

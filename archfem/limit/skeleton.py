@@ -26,7 +26,14 @@ class Skeleton:
     size: int
 
     def in_whole(self, motion: Array) -> Array:
-        """Motion of all blocks of the whole structure (size, 3), zero for those left out."""
+        """Return the motion of all blocks of the whole structure, zero for those left out.
+
+        Args:
+            motion: of the skeleton's blocks (n_left, 3) [m, m, rad].
+
+        Returns:
+            (size, 3) [m, m, rad].
+        """
         whole = np.zeros((self.size, 3))
         whole[list(self.blocks)] = motion
         return whole
@@ -36,6 +43,12 @@ def skeleton_of(structure: Structure) -> Skeleton:
     """Leave out the yielding bodies, and what no longer stands on fixed ground without them.
 
     A structure of nothing but yielding bodies is its own skeleton.
+
+    Args:
+        structure: the whole.
+
+    Returns:
+        What is left, and the numbers it has in the whole.
     """
     everything = tuple(range(len(structure.blocks)))
     blocks = _standing(structure, set(everything) - set(yielding_blocks(structure)))

@@ -68,7 +68,8 @@ def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
 
 def _thrust(state: Optimum) -> Array:
     """Normal force of each joint (n_joints,) [block weights]."""
-    return state.forces.reshape(3, -1)[:2].sum(axis=0)
+    thrust: Array = state.forces.reshape(3, -1)[:2].sum(axis=0)
+    return thrust
 
 
 def _excess(state: Optimum, friction: Array) -> float:

@@ -27,7 +27,10 @@ def minimum_thickness(
         build: makes the structure of a given thickness [m].
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
-        tolerance: relative width of the last bracket; its standing end is returned.
+        tolerance: relative width of the last bracket [-].
+
+    Returns:
+        The end of the last bracket that stands [m].
 
     Raises:
         InvalidInput: no thickness makes it stand, or every one does.

@@ -109,6 +109,9 @@ def first_verified_mechanism(
         structure: whose blocks move; of its rings and piers, one at least must.
         joints: over time and joint.
         criteria: what makes a joint fail; by default those by which the joints were judged already.
+
+    Returns:
+        The motion and its class at that instant; None where no ring and no pier ever moves.
     """
     verifier, joints = Verifier(structure), flagged(joints, criteria)
     idle: set[bytes] = set()
@@ -156,7 +159,17 @@ class Verifier:
         return Screen(self.blocks, self.parts)
 
     def verified(self, joints: xr.Dataset) -> VerifiedMechanism:
-        """Look for a motion at one instant, as `verified_mechanism` does."""
+        """Look for a motion at one instant, as `verified_mechanism` does.
+
+        Args:
+            joints: of the whole structure, as made by `joint_dataset`, with their flags.
+
+        Returns:
+            The motion and its class, beside the count.
+
+        Raises:
+            InvalidInput: `joints` has several instants, or is of another structure.
+        """
         check_instant(self.structure, joints)
         scaled = _largest_motion(self.blocks, self.freedoms(joints))
         gaps = (self.blocks.kinematics @ (self.blocks.coordinates * scaled)).reshape(3, -1)
@@ -177,7 +190,11 @@ class Verifier:
         return VerifiedMechanism(moved, counted, self.skeleton.in_whole(motion))
 
     def moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
-        """The same, or None at once where rings and piers cannot move."""
+        """Return the same, or None at once where rings and piers cannot move.
+
+        Args:
+            joints: as for `verified`.
+        """
         if not self.screen.permit(self.freedoms(joints)):
             return None
         found = self.verified(joints)
@@ -220,4 +237,5 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     )
     if found.status != 0:
         raise DidNotConverge(f"the linear programme found no motion: {found.message}")
-    return found.x
+    motion: Array = found.x
+    return motion

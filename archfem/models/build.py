@@ -25,6 +25,9 @@ def build(structure: Structure, asked: Discretisation) -> Model:
             joints and condenses the rest; "full" keeps all nodes; "monolithic" does, too, and
             assembles the UFL forms at each iteration.
 
+    Returns:
+        The model; where a rung is too low for a soft block, a warning is logged.
+
     Raises:
         InvalidInput: a rung is asked for blocks that there are not.
         MeshError: the blocks cannot be cut as asked.

@@ -35,8 +35,13 @@ class Cells:
         return self.block[[cell[0] for cell in self.polygons]]
 
     def displacement(self, q: Array) -> Array:
-        """Displacement of every point (m, 2) [m]."""
-        return (self.lift @ q).reshape(-1, 2)
+        """Return the displacement of every point (m, 2) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        moved: Array = self.lift @ q
+        return moved.reshape(-1, 2)
 
     @cached_property
     def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -51,12 +56,20 @@ class Cells:
         _, first, count = np.unique(
             np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
         )
-        return edges[first[count == 1]]
+        single: NDArray[np.intp] = edges[first[count == 1]]
+        return single
 
     def at(self, block: int, point: Array) -> sparse.csr_matrix:
-        """Displacement of a point on the surface of a block, from coordinates (2, n).
+        """Return the displacement of a point on the surface of a block, from coordinates.
 
         Taken from the nearest edge, linearly between its ends.
+
+        Args:
+            block: number of the block.
+            point: on its surface or near it (2,) [m].
+
+        Returns:
+            (2, n).
         """
         edges, owner = self._edges
         edges = edges[owner == block]

@@ -20,6 +20,9 @@ def full(space: BrokenSpace, rule: Quadrature) -> Jointed:
     Args:
         space: broken across the joints.
         rule: quadrature on each facet of a joint.
+
+    Returns:
+        The model, its nodes in the order of the space.
     """
     forms = Forms(space, rule)
     free = space.free

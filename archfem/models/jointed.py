@@ -20,7 +20,8 @@ class Jointed:
     """A model whose only nonlinearity is the status of its joint points.
 
     Forces are K q + Gᵀ W t(G q). The tangent changes only when a point opens or closes, so the
-    last one is kept and given again, as the same object, until then.
+    last one is kept and given again, as the same object, until then. `Model` says what attributes
+    and methods mean.
     """
 
     def __init__(
@@ -51,7 +52,11 @@ class Jointed:
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
     def with_operator(self, operator: JointOperator) -> "Jointed":
-        """The same blocks between joints taken in another way."""
+        """Return a model of the same blocks, between joints taken in another way.
+
+        Args:
+            operator: of the joints, on the same coordinates.
+        """
         return Jointed(
             self.structure,
             self.fidelity,
@@ -63,11 +68,20 @@ class Jointed:
         ).moved(self.supports)
 
     def settled(self, settlement: Settlement) -> "Jointed":
-        """The same model with a support that has moved, further than before."""
+        """Return the same model with a support that has moved, further than before.
+
+        Args:
+            settlement: the support and its motion.
+        """
         return self.moved(settlement.added(self.structure, self.supports))
 
     def moved(self, supports: Array) -> "Jointed":
-        """The same model with its supports moved: joints open and slip by as much at q = 0."""
+        """Return the same model with its supports moved: joints open and slip as much at q = 0.
+
+        Args:
+            supports: motions of the fixed blocks, from where they were built, zero for the others
+                (n_blocks, 3) [m, m, rad].
+        """
         other = copy(self)
         other.supports = supports
         offset = gaps_of(self.structure, self.operator.points, supports) if supports.any() else None
@@ -76,17 +90,30 @@ class Jointed:
         return other
 
     def predicted(self, prediction: Prediction) -> "Jointed":
-        """The same model, with what was predicted of it."""
+        """Return the same model, with what was predicted of it.
+
+        Args:
+            prediction: to be kept as `prediction`.
+        """
         other = copy(self)
         other.prediction = prediction
         return other
 
     def force(self, q: Array) -> Array:
-        """Internal forces of blocks and joints (n,)."""
-        return self.blocks @ q + self.operator.force(q)
+        """Return the internal forces of blocks and joints (n,).
+
+        Args:
+            q: coordinates (n,).
+        """
+        of_blocks: Array = self.blocks @ q
+        return of_blocks + self.operator.force(q)
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Derivative of `force`; the same object as before while no point opens or closes."""
+        """Return the derivative of `force`, the same object while no point opens or closes.
+
+        Args:
+            q: coordinates (n,).
+        """
         stiffness = self.operator.stiffness(q)
         if self._last is None or not np.array_equal(stiffness, self._last[0]):
             matrix = self._pattern.matrix(self._always + self._across @ stiffness)
@@ -99,17 +126,31 @@ class Jointed:
         return self._pattern.matrix(self._always + self._across @ whole)
 
     def energy(self, q: Array) -> float:
-        """Potential energy of blocks and joints [J]."""
+        """Return the potential energy of blocks and joints [J].
+
+        Args:
+            q: coordinates (n,).
+        """
         return 0.5 * float(q @ (self.blocks @ q)) + self.operator.energy(q)
 
     def resultants(self, q: Array) -> Array:
-        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m].
+
+        Args:
+            q: coordinates (n,).
+        """
         return self.operator.resultants(q)
 
     def load(self, action: Action) -> Array:
-        """Generalised forces of an action (n,)."""
+        """Return the generalised forces of an action (n,).
+
+        Args:
+            action: body force or point load.
+        """
         if isinstance(action, BodyForce):
             multiples = np.array([action.horizontal, action.vertical])
-            return self.body @ multiples * self.structure.gravity
+            inertia: Array = self.body @ multiples
+            return inertia * self.structure.gravity
         block, point = action.place(self.structure)
-        return self.cells.at(block, point).T @ np.array(action.force)
+        force: Array = self.cells.at(block, point).T @ np.array(action.force)
+        return force

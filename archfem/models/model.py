@@ -1,11 +1,12 @@
 """The waist of the hourglass: what every model of a structure answers.
 
-Everything above (structure, mesh, forms) exists to produce a `Model`; everything below (statics,
-dynamics, modal analysis) consumes one by what is declared here, on whatever rung it stands.
+Everything to its left (masonry, joints, meshes and forms) exists to produce a `Model`; everything
+to its right (statics, dynamics, pictures, cases) takes one by what is declared here, on whatever
+rung it stands.
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from scipy import sparse
 
@@ -39,6 +40,7 @@ class Prediction:
         return self.error <= self.tolerance
 
 
+@runtime_checkable
 class Model(Protocol):
     """A structure ready to be moved: generalised coordinates q and what they cost.
 
@@ -51,7 +53,8 @@ class Model(Protocol):
         size: number n of coordinates.
         mass: kinetic energy is ½ q̇ᵀ M q̇ (n, n).
         blocks: stiffness of the blocks without the joints (n, n).
-        body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg …].
+        body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg, where the
+            coordinate is a displacement].
         cells: polygons that cover the blocks, and how they move with q.
         supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         prediction: what was predicted when it was chosen; None where it was asked for by name.
@@ -72,34 +75,76 @@ class Model(Protocol):
         """From coordinates to the forces of the joints; None where weak forms give them."""
 
     def force(self, q: Array) -> Array:
-        """Internal forces of blocks and joints (n,)."""
+        """Return the internal forces of blocks and joints (n,).
+
+        Args:
+            q: coordinates (n,).
+        """
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Derivative of `force`; the very same object as before where nothing has changed."""
+        """Return the derivative of `force` (n, n).
+
+        Args:
+            q: coordinates (n,).
+
+        Returns:
+            Where a model can tell that nothing has changed since it was last asked, the very same
+            object as then, which need not be factorised again.
+        """
 
     def closed(self) -> sparse.csr_matrix:
-        """Tangent with every joint closed over its whole depth."""
+        """Return the tangent with every joint closed over its whole depth (n, n)."""
 
     def energy(self, q: Array) -> float:
-        """Potential energy of blocks and joints, whose gradient is `force` [J]."""
+        """Return the potential energy of blocks and joints, whose gradient is `force` [J].
+
+        Args:
+            q: coordinates (n,).
+        """
 
     def resultants(self, q: Array) -> Array:
-        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m].
+
+        Args:
+            q: coordinates (n,).
+        """
 
     def settled(self, settlement: Settlement) -> Self:
-        """The same model with a support that has moved, further than before."""
+        """Return the same model with a support that has moved, further than before.
+
+        Args:
+            settlement: the support and its motion.
+
+        Raises:
+            InvalidInput: the block is not a support.
+        """
 
     def moved(self, supports: Array) -> Self:
-        """The same model with its supports moved so far from where they were built."""
+        """Return the same model with its supports moved so far from where they were built.
+
+        Args:
+            supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
 
     def predicted(self, prediction: Prediction) -> Self:
-        """The same model, with what was predicted of it."""
+        """Return the same model, with what was predicted of it.
+
+        Args:
+            prediction: to be kept as `prediction`.
+        """
 
     def load(self, action: Action) -> Array:
-        """Generalised forces of an action (n,)."""
+        """Return the generalised forces of an action (n,).
+
+        Args:
+            action: body force or point load.
+
+        Raises:
+            InvalidInput: a point load misses the structure.
+        """
 
 
-def check_model(model: Any) -> None:
+def check_model(model: object) -> None:
     """Refuse what is no model, such as the structure of which one is to be built.
 
     Args:
@@ -108,7 +153,7 @@ def check_model(model: Any) -> None:
     Raises:
         InvalidInput: it does not answer what a model answers.
     """
-    if not hasattr(model, "tangent") or not hasattr(model, "supports"):
+    if not isinstance(model, Model):
         raise InvalidInput(
             f"model is a {type(model).__name__}: build one, e.g. build(structure, fidelity='rigid')"
         )

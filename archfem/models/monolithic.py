@@ -17,7 +17,10 @@ from archfem.models.model import Prediction
 
 
 class Monolithic:
-    """A model that asks the compiled UFL forms for everything that depends on displacement."""
+    """A model that asks the compiled UFL forms for everything that depends on displacement.
+
+    `Model` says what attributes and methods mean.
+    """
 
     fidelity = "monolithic"
     operator = None
@@ -42,11 +45,20 @@ class Monolithic:
         self.prediction: Prediction | None = None
 
     def settled(self, settlement: Settlement) -> "Monolithic":
-        """The same model with a support that has moved, further than before."""
+        """Return the same model with a support that has moved, further than before.
+
+        Args:
+            settlement: the support and its motion.
+        """
         return self.moved(settlement.added(self.structure, self.supports))
 
     def moved(self, supports: Array) -> "Monolithic":
-        """The same model with its supports moved: their nodes follow."""
+        """Return the same model with its supports moved: their nodes follow.
+
+        Args:
+            supports: motions of the fixed blocks, from where they were built, zero for the others
+                (n_blocks, 3) [m, m, rad].
+        """
         other = copy(self)
         other.supports = supports
         other._everywhere = np.zeros_like(self._everywhere)
@@ -57,7 +69,11 @@ class Monolithic:
         return other
 
     def predicted(self, prediction: Prediction) -> "Monolithic":
-        """The same model, with what was predicted of it."""
+        """Return the same model, with what was predicted of it.
+
+        Args:
+            prediction: to be kept as `prediction`.
+        """
         other = copy(self)
         other.prediction = prediction
         return other
@@ -68,11 +84,19 @@ class Monolithic:
         return self._everywhere
 
     def force(self, q: Array) -> Array:
-        """Internal forces of blocks and joints (n,)."""
+        """Return the internal forces of blocks and joints (n,).
+
+        Args:
+            q: coordinates (n,).
+        """
         return self._forms.force(self._spread(q))[self._free]
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Derivative of `force`."""
+        """Return the derivative of `force`, assembled anew.
+
+        Args:
+            q: coordinates (n,).
+        """
         return self._pattern.spread(self._assembled(q))
 
     def _assembled(self, q: Array) -> sparse.csr_matrix:
@@ -83,9 +107,17 @@ class Monolithic:
         return self._pattern.spread(self._closed)
 
     def energy(self, q: Array) -> float:
-        """Potential energy of blocks and joints [J]."""
+        """Return the potential energy of blocks and joints [J].
+
+        Args:
+            q: coordinates (n,).
+        """
         return self._forms.energy(self._spread(q))
 
     def resultants(self, q: Array) -> Array:
-        """N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m].
+
+        Args:
+            q: coordinates (n,).
+        """
         return self._forms.resultants(self._spread(q))

@@ -23,7 +23,16 @@ Numbers = NDArray[np.intp]
 
 
 def projected(model: Jointed, basis: sparse.csr_matrix, fidelity: str) -> Jointed:
-    """Express a model in the coordinates of a basis (n, m)."""
+    """Express a model in the coordinates of a basis.
+
+    Args:
+        model: with n coordinates.
+        basis: columns are motions in those coordinates (n, m).
+        fidelity: what to call the result.
+
+    Returns:
+        A model with m coordinates, the factors of the columns.
+    """
     cells, back = model.cells, basis.T.tocsr()
     return Jointed(
         model.structure,
@@ -54,6 +63,9 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
         model: with all nodes.
         rungs: of each block of the structure, some of `RUNGS` (n_blocks,).
         fidelity: what to call the result.
+
+    Returns:
+        The smaller model.
     """
     joints = _faces(model)
     pieces, order = [], []
@@ -74,7 +86,7 @@ def reduced(model: Jointed, rungs: Sequence[str], fidelity: str) -> Jointed:
 
 
 def _bends(structure: Structure, number: int) -> bool:
-    """Whether a face is a long beam on its joint as elastic foundation: λ L > π.
+    """Return whether a face is a long beam on its joint as elastic foundation: λ L > π.
 
     λ⁴ = k_n w / (4 E I); Hetényi, Beams on elastic foundation (1946). The thickness of the beam is
     about the block's area over its longest extent.

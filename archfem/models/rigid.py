@@ -20,8 +20,11 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
 
     Args:
         structure: what to model.
-        cells: facets on each joint.
-        rule: quadrature on each facet.
+        cells: facets on each joint; with exact quadrature one is enough.
+        rule: quadrature on each facet; by default the usual one.
+
+    Returns:
+        The model, its coordinates in the order of `structure.free`.
     """
     rule = rule or Quadrature()
     facets = 1 if rule.rule == "exact" else cells  # the gap between rigid faces is linear

@@ -1,9 +1,15 @@
 from .equilibrium import Equilibrium as Equilibrium
 from .equilibrium import dead_load as dead_load
+from .equilibrium import equilibrium_under as equilibrium_under
 from .equilibrium import self_weight as self_weight
+from .freebody import FreeBody as FreeBody
 from .freebody import forces_on as forces_on
 from .modes import Modes as Modes
 from .newton import Newton as Newton
-from .path import Stop as Stop
 from .pushover import Pushover as Pushover
+from .pushover import Stop as Stop
+from .strength import joint_stress as joint_stress
 from .strength import strength_use as strength_use
+from .strength import strength_use_over as strength_use_over
+from .strength import utilisation as utilisation
+from .stress import principal as principal

@@ -5,6 +5,8 @@ Anal. Appl. 23 (2002) 601). By Sylvester's law of inertia the negative pivots of
 as there are ω² below σ: that tells of negative stiffness, and of a mode that was stepped over.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 
@@ -22,13 +24,33 @@ APART = 1e-6
 """Eigenvalues nearer than this, relative to their size, count as equal."""
 
 ITERATIONS = 200
+"""After which SLEPc gives up."""
 
 LEAST, MOST = 20, 240
 """Bounds on the size of the projected problem, which is else as large as the number of modes."""
 
 
+def count_below(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, square: float) -> int:
+    """Return the number of ω² below a value, by Sylvester's law.
+
+    Args:
+        stiffness: K (n, n), symmetric.
+        mass: M (n, n), symmetric and positive.
+        square: the value, which is no ω² itself [1/s²].
+    """
+    solver = _solver(_matrix(stiffness), _matrix(mass), 1, square)
+    solver.setUp()
+    return _negative(solver)
+
+
 def lowest(
-    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
+    stiffness: sparse.csr_matrix,
+    mass: sparse.csr_matrix,
+    count: int,
+    *,
+    accuracy: float = ACCURACY,
+    iterations: int = ITERATIONS,
+    check: Callable[[sparse.csr_matrix, sparse.csr_matrix, float], int] = count_below,
 ) -> tuple[Array, Array]:
     """Find the lowest ω² and their shapes, so that φᵀ M φ = 1.
 
@@ -36,6 +58,9 @@ def lowest(
         stiffness: K (n, n), symmetric.
         mass: M (n, n), symmetric and positive.
         count: how many, from 1 to n.
+        accuracy: residual of a pair, relative to its inverted eigenvalue [-].
+        iterations: after which SLEPc gives up.
+        check: counts the ω² below a value, to tell whether one was stepped over.
 
     Returns:
         ω² in ascending order (count,) [1/s²], shapes (n, count).
@@ -44,8 +69,8 @@ def lowest(
         DidNotConverge: K is singular or negative, or SLEPc did not find all pairs.
     """
     zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
-    operators = _matrix(stiffness), _matrix(mass)
-    solver = _solver(operators, count, -zero)
+    solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
+    solver.setTolerances(accuracy, iterations)
     solver.solve()
     found = solver.getConverged()
     if found < count:
@@ -53,11 +78,7 @@ def lowest(
             f"SLEPc found {found} of {count} modes in {solver.getIterationNumber()} iterations "
             f"(reason {int(solver.getConvergedReason())}): ask for fewer, or check units"
         )
-    vector = PETSc.Vec().createSeq(len(stiffness.indptr) - 1)
-    squares, shapes = np.empty(found), np.empty((vector.size, found))
-    for number in range(found):
-        squares[number] = solver.getEigenpair(number, vector).real
-        shapes[:, number] = vector.array_r
+    squares, shapes = _pairs(solver, found, mass.shape[0])
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
@@ -67,11 +88,11 @@ def lowest(
             "another state"
         )
     edge = float(squares[-1]) * (1.0 - APART)
-    below, missed = int(np.sum(squares < edge)), _below(operators, edge)
-    if missed != below:
+    below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
+    if there != below:
         raise DidNotConverge(
             f"SLEPc found {below} modes below {np.sqrt(edge) / (2.0 * np.pi):.4g} Hz where there "
-            f"are {missed}: ask for a few more or fewer"
+            f"are {there}: ask for a few more or fewer"
         )
     return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
 
@@ -82,15 +103,24 @@ def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
     return made
 
 
-def _solver(operators: tuple[PETSc.Mat, PETSc.Mat], count: int, shift: float) -> SLEPc.EPS:
+def _pairs(solver: SLEPc.EPS, count: int, size: int) -> tuple[Array, Array]:
+    """The ω² that a solver found (count,), and their shapes (size, count)."""
+    vector = PETSc.Vec().createSeq(size)
+    squares, shapes = np.empty(count), np.empty((size, count))
+    for number in range(count):
+        squares[number] = solver.getEigenpair(number, vector).real
+        shapes[:, number] = vector.array_r
+    return squares, shapes
+
+
+def _solver(stiffness: PETSc.Mat, mass: PETSc.Mat, count: int, shift: float) -> SLEPc.EPS:
     """A solver for the pairs nearest a shift, by a Cholesky factor of K - σ M."""
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
-    solver.setOperators(*operators)
+    solver.setOperators(stiffness, mass)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setDimensions(count, mpd=min(max(count, LEAST), MOST))
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(shift)
-    solver.setTolerances(ACCURACY, ITERATIONS)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     linear = transform.getKSP()
@@ -102,10 +132,3 @@ def _solver(operators: tuple[PETSc.Mat, PETSc.Mat], count: int, shift: float) ->
 def _negative(solver: SLEPc.EPS) -> int:
     """Number of negative pivots of the solver's factor."""
     return int(solver.getST().getKSP().getPC().getFactorMatrix().getInertia()[0])
-
-
-def _below(operators: tuple[PETSc.Mat, PETSc.Mat], square: float) -> int:
-    """Number of ω² below a value."""
-    solver = _solver(operators, 1, square)
-    solver.setUp()
-    return _negative(solver)

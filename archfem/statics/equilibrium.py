@@ -41,12 +41,23 @@ class Equilibrium:
         return joint_dataset(self.model.structure, self.model.resultants(self.q))
 
     def joint(self, joint: str | int) -> xr.Dataset:
-        """What one joint carries, given by name or number."""
+        """Return what one joint carries.
+
+        Args:
+            joint: its name or number.
+
+        Raises:
+            InvalidInput: there is no such joint.
+        """
         return one_joint(self.joints, joint)
 
 
 def self_weight(model: Model) -> Array:
-    """Generalised forces of gravity (n,)."""
+    """Return the generalised forces of gravity (n,).
+
+    Args:
+        model: any rung of the ladder.
+    """
     return model.load(BodyForce(0.0, -1.0))
 
 
@@ -60,16 +71,19 @@ def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
         model: any rung of the ladder.
         newton: settings of the solves.
 
+    Returns:
+        The state, with its joints' resultants.
+
     Raises:
         InvalidInput: the model is none.
         DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
             equilibrium found on the way, under part of the weight.
     """
     check_model(model)
-    return equilibrium(model, self_weight(model), newton)
+    return equilibrium_under(model, self_weight(model), newton)
 
 
-def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
+def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
     """Find the equilibrium under a load that is brought on from rest.
 
     Supports that have moved do so after that, little by little: the joints follow.
@@ -78,6 +92,9 @@ def equilibrium(model: Model, load: Array, newton: Newton | None = None) -> Equi
         model: any rung of the ladder.
         load: generalised forces (n,).
         newton: settings of the solves.
+
+    Returns:
+        The state under the whole load, on supports that have moved all the way.
 
     Raises:
         DidNotConverge: there is none; `last` is the last one on the way.

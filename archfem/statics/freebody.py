@@ -34,12 +34,14 @@ class FreeBody:
     @property
     def sizes(self) -> Array:
         """Lengths of the forces (n,) [N]."""
-        return np.linalg.norm(self.forces, axis=1)
+        sizes: Array = np.linalg.norm(self.forces, axis=1)
+        return sizes
 
     @property
     def sum(self) -> Array:
         """What the forces add up to, zero at rest (2,) [N]."""
-        return self.forces.sum(axis=0)
+        total: Array = self.forces.sum(axis=0)
+        return total
 
     @property
     def moment(self) -> float:
@@ -69,6 +71,9 @@ def forces_on(
         block: its number or name; it must not be fixed.
         cells: of a model with a mesh, for the weight as meshed: there the arcs of sectors are
             chords, which makes them lighter. By default that of the true outline.
+
+    Returns:
+        The forces and where they act, the weight last.
 
     Raises:
         InvalidInput: there is no such block, or it is fixed, or `joints` has several instants or

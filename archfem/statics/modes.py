@@ -80,6 +80,9 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         count: how many modes, from 1 to the number of coordinates.
         about: the state, such as the dead load of this model; None: all joints closed.
 
+    Returns:
+        The modes, the lowest first.
+
     Raises:
         InvalidInput: there are not so many modes, or the state is another model's.
         DidNotConverge: the structure is a mechanism there and does not vibrate, or modes were not

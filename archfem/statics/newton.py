@@ -96,6 +96,9 @@ class Solver:
             start: first guess (n,).
             scale: size of the load, as by `magnitude`.
 
+        Returns:
+            Coordinates, and what it took to find them.
+
         Raises:
             DidNotConverge: neither a full step nor a line search led there.
         """
@@ -157,11 +160,11 @@ class Solver:
     def _judge(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         reasons = PETSc.SNES.ConvergedReason
         if not np.isfinite(norms[2]):
-            return reasons.DIVERGED_FNORM_NAN
-        return reasons.CONVERGED_FNORM_ABS if self._fits(norms[2]) else reasons.ITERATING
+            return int(reasons.DIVERGED_FNORM_NAN)
+        return int(reasons.CONVERGED_FNORM_ABS if self._fits(norms[2]) else reasons.ITERATING)
 
     def _fits(self, rest: float) -> bool:
-        """Whether a residual is within the tolerance, or nothing but round-off.
+        """Return whether a residual is within the tolerance, or nothing but round-off.
 
         Large rigid motions of stiff blocks leave a residual of the order of the rounding of
         tangent times displacement, below which no iteration can go.
@@ -183,5 +186,9 @@ class Solver:
 
 
 def magnitude(load: Array) -> float:
-    """Size of a load: the sum of its absolute components, which no refinement of nodes changes."""
+    """Return the size of a load: the sum of absolute components, the same on any mesh.
+
+    Args:
+        load: generalised forces (n,).
+    """
     return float(np.sum(np.abs(load)))

@@ -10,47 +10,17 @@ from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria
-from archfem.joints.resultants import joint_dataset
 from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
-from archfem.statics.newton import Solver, magnitude
+from archfem.statics.newton import ROUGHLY, Solver, magnitude
 
-TOLERANCE, ROUGHLY, ITERATIONS = 1e-9, 1e-7, 30
-"""Force left out of balance, relative to the sum of all loads; the same where round-off of large
-motions is above that; Newton's iterations in a step."""
+TOLERANCE, ITERATIONS = 1e-9, 30
+"""Force left out of balance, relative to the sum of all loads; Newton's iterations in a step."""
 
-FIRST, GROWTH, SMALLEST = 1e-6, 1.1, 1e-3
-"""First displacement relative to the structure's size, growth of steps, and the smallest step,
-relative to the first, to which they are halved before giving up."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stop:
-    """When a pushover ends, whichever comes first.
-
-    Attributes:
-        slope: tangent of the curve relative to its initial tangent [-].
-        displacement: of the loaded point, relative to the structure's size [-].
-        hinges: number of hinged joints, or None not to count them.
-        steps: number of steps.
-    """
-
-    slope: float = 1e-6
-    displacement: float = 0.1
-    hinges: int | None = None
-    steps: int = 400
-
-    def __post_init__(self) -> None:
-        """Refuse what would stop at once, or never."""
-        if not 0.0 <= self.slope < 1.0:
-            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
-        if not (self.displacement > 0.0 and self.steps >= 1):
-            raise InvalidInput(
-                f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"
-            )
+FIRST = 1e-6
+"""First displacement, relative to the structure's size."""
 
 
 @dataclass(eq=False)
@@ -67,6 +37,8 @@ class LoadPath:
         resisted: N, V, M of every joint at each step (n_joints, 3) [N, N, N m].
         factors: of the load at each step [-].
         iterations: of Newton's method in each step.
+        units: of the factors.
+        moving: what it is whose displacement is told.
     """
 
     model: Model
@@ -79,12 +51,21 @@ class LoadPath:
     factors: list[float]
     iterations: list[int]
     units = "1"
+    moving = "load"
 
     @classmethod
     def of(
         cls, model: Model, actions: Sequence[BodyForce | PointLoad], start: Equilibrium
     ) -> "LoadPath":
         """Begin at the dead load's equilibrium.
+
+        Args:
+            model: what is loaded.
+            actions: that grow together.
+            start: the equilibrium under the dead load.
+
+        Returns:
+            A path of this one state.
 
         Raises:
             InvalidInput: the load is zero.
@@ -111,11 +92,14 @@ class LoadPath:
         return np.array(self.resisted)
 
     def advance(self, border: Array, distance: float) -> bool:
-        """Add the equilibrium at a distance along the border's direction; whether there is one.
+        """Add the equilibrium at a distance along the border's direction.
 
         Args:
             border: a and b of the further equation (2,).
             distance: its right side, from the last state on.
+
+        Returns:
+            Whether there is one.
         """
         along, up = border / np.array(self.unit)
         row = sparse.csr_matrix(np.append(along * self.probe, up))
@@ -140,13 +124,14 @@ class LoadPath:
 
     def _rest(self, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
-        return self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        rest: Array = self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        return rest
 
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Whether forces are in balance, or off by no more than round-off of large motions."""
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.live)
         rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
-        return magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load)
+        return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
 
 
 def _size(model: Model, action: BodyForce | PointLoad) -> float:
@@ -170,6 +155,8 @@ class SupportPath:
         states: coordinates at each step (n,).
         resisted: N, V, M of every joint at each step (n_joints, 3) [N, N, N m].
         iterations: of Newton's method in each step.
+        units: of the factors.
+        moving: what it is whose displacement is told.
     """
 
     model: Model
@@ -182,10 +169,19 @@ class SupportPath:
     resisted: list[Array]
     iterations: list[int]
     units = "N m"
+    moving = "support"
 
     @classmethod
     def of(cls, model: Model, settlement: Settlement, start: Equilibrium) -> "SupportPath":
         """Begin at the dead load's equilibrium.
+
+        Args:
+            model: whose support moves.
+            settlement: a unit of its motion.
+            start: the equilibrium under the dead load.
+
+        Returns:
+            A path of this one state.
 
         Raises:
             InvalidInput: the block is not a support, or does not move.
@@ -218,10 +214,19 @@ class SupportPath:
         intrados, extrados, slip = blocks.gaps(self.motion)
         normal, shear, moment = np.moveaxis(self.resultants, -1, 0)
         middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.structure.depths
-        return normal @ middle + moment @ turn - shear @ slip
+        work: Array = normal @ middle + moment @ turn - shear @ slip
+        return work
 
     def advance(self, border: Array, distance: float) -> bool:
-        """Move the support on by a distance in units of the first; whether there is equilibrium."""
+        """Move the support on, and add the equilibrium there.
+
+        Args:
+            border: of no use here, for a support moves by displacement alone.
+            distance: in units of the first step.
+
+        Returns:
+            Whether there is one.
+        """
         part = self.parts[-1] + distance * self.unit[0] / self.reach
         model = self.model.moved(self.model.supports + part * self.motion)
         try:
@@ -245,51 +250,3 @@ class SupportPath:
 
 
 Path = LoadPath | SupportPath
-
-
-def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
-    """Add states until a rule ends it, and say which.
-
-    Args:
-        path: that begins with the dead load.
-        control: "displacement", "arc length" or "force".
-        stop: the rules.
-        criteria: what makes a joint hinge.
-    """
-    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
-    fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
-    while True:
-        if not path.advance(fixed.get(control, direction), distance):
-            distance /= 2.0
-            if distance < SMALLEST:
-                return _stuck(path, control)
-            continue
-        last = np.array([path.displacements[-2:], path.factors[-2:]])
-        moved = np.diff(last)[:, 0] / np.array(path.unit)
-        direction = moved / np.linalg.norm(moved)
-        if reason := _finished(path, stop, criteria, moved):
-            return reason
-        distance *= GROWTH
-
-
-def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:
-    """The rule that is met, in words, or None."""
-    slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
-    if slope <= stop.slope:
-        return f"the slope fell to {slope:.2g} of the initial one"
-    if reached >= stop.displacement * path.model.structure.size:
-        return f"the load moved by {reached:.3g} m"
-    if stop.hinges is not None:
-        joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
-        count = int((joints["hinge"] != 0).sum())
-        if count >= stop.hinges:
-            return f"{count} joints hinge"
-    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
-
-
-def _stuck(path: Path, control: str) -> str:
-    """Say that no further equilibrium was found; under force control that is the limit."""
-    if len(path.states) == 1:
-        raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
-    what = "the load cannot grow beyond" if control == "force" else "no equilibrium was found past"
-    return f"{what} a factor of {path.factors[-1]:.5g}"

@@ -8,19 +8,49 @@ import xarray as xr
 
 from archfem.arguments import instance
 from archfem.arrays import Array
-from archfem.errors import InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.statics.path import LoadPath, Path, Stop, SupportPath, follow
+from archfem.statics.path import LoadPath, Path, SupportPath
 
 CONTROLS = ("displacement", "arc length", "force")
 
 FLAT, STEEP = 1e-6, 0.2
 """Growth of the factor in the last step below which the limit has been reached, and the largest
 extrapolation beyond the last factor; both relative to it."""
+
+GROWTH, SMALLEST = 1.1, 1e-3
+"""Growth of steps, and the smallest one, relative to the first, to which they are halved before
+giving up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """When a pushover ends, whichever comes first.
+
+    Attributes:
+        slope: tangent of the curve relative to its initial tangent [-].
+        displacement: of the loaded point, relative to the structure's size [-].
+        hinges: number of hinged joints, or None not to count them.
+        steps: number of steps.
+    """
+
+    slope: float = 1e-6
+    displacement: float = 0.1
+    hinges: int | None = None
+    steps: int = 400
+
+    def __post_init__(self) -> None:
+        """Refuse what would stop at once, or never."""
+        if not 0.0 <= self.slope < 1.0:
+            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
+        if not (self.displacement > 0.0 and self.steps >= 1):
+            raise InvalidInput(
+                f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +123,9 @@ def pushover(
         stop: when to end.
         criteria: what makes a joint hinge; by default the usual ones.
 
+    Returns:
+        The curve, the joints along it, and the limit that it tends to.
+
     Raises:
         InvalidInput: control is unknown, or not by displacement for a settlement; the load misses
             the structure or is zero.
@@ -117,7 +150,61 @@ def pushover(
         actions = loads(load)
         path = LoadPath.of(model, actions, begin)
     criteria = criteria or Criteria()
-    return _read(path, criteria, follow(path, control, stop or Stop(), criteria))
+    return _read(path, criteria, _follow(path, control, stop or Stop(), criteria))
+
+
+def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
+    """Add states until a rule ends it, and say which.
+
+    Args:
+        path: that begins with the dead load.
+        control: "displacement", "arc length" or "force".
+        stop: the rules.
+        criteria: what makes a joint hinge.
+
+    Returns:
+        The rule that ended it, in words.
+
+    Raises:
+        DidNotConverge: there is no equilibrium just after the dead load.
+    """
+    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
+    fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
+    while True:
+        if not path.advance(fixed.get(control, direction), distance):
+            distance /= 2.0
+            if distance < SMALLEST:
+                return _stuck(path, control)
+            continue
+        last = np.array([path.displacements[-2:], path.factors[-2:]])
+        moved = np.diff(last)[:, 0] / np.array(path.unit)
+        direction = moved / np.linalg.norm(moved)
+        if reason := _finished(path, stop, criteria, moved):
+            return reason
+        distance *= GROWTH
+
+
+def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:
+    """The rule that is met, in words, or None."""
+    slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
+    if slope <= stop.slope:
+        return f"the slope fell to {slope:.2g} of the initial one"
+    if reached >= stop.displacement * path.model.structure.size:
+        return f"the {path.moving} moved by {reached:.3g} m"
+    if stop.hinges is not None:
+        joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
+        count = int((joints["hinge"] != 0).sum())
+        if count >= stop.hinges:
+            return f"{count} joints hinge"
+    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
+
+
+def _stuck(path: Path, control: str) -> str:
+    """Say that no further equilibrium was found; under force control that is the limit."""
+    if len(path.states) == 1:
+        raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
+    what = "the load cannot grow beyond" if control == "force" else "no equilibrium was found past"
+    return f"{what} a factor of {path.factors[-1]:.5g}"
 
 
 def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
@@ -161,7 +248,7 @@ def hinge_order(
 
 
 def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
-    """Limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
+    """Return the limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
 
     Taken over the last doubling of d, since points of a joint open one by one. While part of d is
     elastic it is too high, so that the limit lies in between; a flat last step has reached it.

@@ -91,8 +91,8 @@ def joint_stress(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     mean = normal / (structure.width * joints["depth"])
     to_edge = (0.5 - size).clip(min=0.0)
     beyond = 2.0 * mean / (3.0 * to_edge)
-    edge = xr.where(size <= 1.0 / 6.0, mean * (1.0 + 6.0 * size), beyond)
-    edge = xr.where(normal > 0.0, edge, 0.0).transpose(*normal.dims)
+    edge: xr.DataArray = (mean * (1.0 + 6.0 * size)).where(size <= 1.0 / 6.0, beyond)
+    edge = edge.where(normal > 0.0, 0.0).transpose(*normal.dims)
     return edge.rename("stress").assign_attrs(units="Pa", long_name="largest edge compression")
 
 
@@ -119,7 +119,7 @@ def utilisation(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
 
 
 def use_table(use: xr.Dataset) -> str:
-    """One line a part: the largest compression and tension in its blocks, and where.
+    """Return a line for each part: the largest compression and tension in its blocks, and where.
 
     Args:
         use: as made by `strength_use`.
@@ -144,7 +144,11 @@ def use_table(use: xr.Dataset) -> str:
 
 
 def use_sentence(use: xr.Dataset) -> str:
-    """The largest compression and tension of all blocks, in words."""
+    """Return the largest compression and tension of all blocks, in words.
+
+    Args:
+        use: as made by `strength_use`.
+    """
     hard, torn = _worst(use, "compression"), _worst(use, "tension")
     share = float(hard["use"])
     strength = f"{float(hard['strength']) / MPa:.3g} MPa"
@@ -156,9 +160,10 @@ def use_sentence(use: xr.Dataset) -> str:
 
 
 def utilisation_sentence(structure: Structure, joints: xr.Dataset) -> str:
-    """The largest use of strength over a run, in words, by joints that do not hinge just then.
+    """Return the largest use of strength over a run, in words.
 
-    A hinge rests on a strip whose width N and e do not tell.
+    Joints that hinge just then are left out: a hinge rests on a strip whose width N and e do not
+    tell.
 
     Args:
         structure: whose joints they are.

@@ -23,7 +23,7 @@ PATCH = 4
 
 
 def cell_stress(model: Model, q: Array) -> Array:
-    """Stress at the centres of all cells, σ_xx, σ_yy, σ_xy (cells, 3) [Pa].
+    """Return the stress at the centres of all cells, σ_xx, σ_yy, σ_xy (cells, 3) [Pa].
 
     Args:
         model: any rung with a mesh.
@@ -33,7 +33,8 @@ def cell_stress(model: Model, q: Array) -> Array:
         InvalidInput: the blocks are rigid, or q is not one vector of coordinates.
     """
     check_state(model, q)
-    return (_stress(model.cells) @ q).reshape(-1, 3)
+    stress: Array = _stress(model.cells) @ q
+    return stress.reshape(-1, 3)
 
 
 def principal(model: Model, q: Array) -> xr.Dataset:
@@ -73,13 +74,19 @@ def principal(model: Model, q: Array) -> xr.Dataset:
 
 
 def principal_values(across: Array, up: Array, shear: Array) -> tuple[Array, Array]:
-    """Larger and smaller principal stress of plane stresses σ_xx, σ_yy, σ_xy, of any one shape."""
+    """Return the larger and the smaller principal stress, each of the arguments' shape [Pa].
+
+    Args:
+        across: σ_xx, of any shape [Pa].
+        up: σ_yy, of the same [Pa].
+        shear: σ_xy, of the same [Pa].
+    """
     middle, radius = 0.5 * (across + up), np.hypot(0.5 * (across - up), shear)
     return middle + radius, middle - radius
 
 
 def at_corners(cells: Cells) -> sparse.csr_matrix:
-    """Stress at the cells' corners, (σ_xx, σ_yy, σ_xy) in turn, from coordinates (3 m, n).
+    """Return stress at the cells' corners, (σ_xx, σ_yy, σ_xy) in turn, from coordinates (3 m, n).
 
     Each value lies on the plane that fits the centres of the cells around the corner best; where
     these are too few, as at the faces of a block, their neighbours are taken in. No fit reaches
@@ -106,6 +113,10 @@ def _stress(cells: Cells) -> sparse.csr_matrix:
 
 def check_state(model: Model, q: Array) -> None:
     """Refuse what is not one vector of a model's coordinates.
+
+    Args:
+        model: whose coordinates they should be.
+        q: what was given for them.
 
     Raises:
         InvalidInput: q has another shape.

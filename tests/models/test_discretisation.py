@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.case import Case
-from archfem.errors import InvalidInput
-from archfem.joints.quadrature import Quadrature
 from archfem.models.discretisation import FIDELITIES, RUNGS, Discretisation
 
 BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
@@ -43,16 +40,16 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
 )
 def test_refusals(ring, given, says):
     """Both where it is made and by the keywords of `build`, before anything is meshed."""
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises(af.InvalidInput, match=says):
         Discretisation(**given)
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises(af.InvalidInput, match=says):
         af.build(ring, **given)
 
 
 def test_what_is_asked_is_kept():
     asked = Discretisation("faces", [2, np.int64(3)], quadrature="gauss", points=2)
     assert asked.cells == (asked.through, asked.along) == (2, 3)
-    assert asked.rule == Quadrature("gauss", 2)
+    assert asked.rule == af.joints.Quadrature("gauss", 2)
     assert asked == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
     assert [Discretisation(fidelity).name for fidelity in FIDELITIES] == list(FIDELITIES)
     mixed = Discretisation({"backfill": "full", "rest": "faces"})
@@ -62,11 +59,11 @@ def test_what_is_asked_is_kept():
 
 def test_a_case_says_it():
     changes = ["model={ fidelity = 'faces', cells = [2, 3], coarse = '50 cm', tolerance = 0.01 }"]
-    asked = Case.read(BRIDGE, changes).discretisation
+    asked = af.Case.read(BRIDGE, changes).discretisation
     assert asked == Discretisation("faces", (2, 3), coarse=0.5)
 
 
 def test_a_case_that_leaves_the_choice_may_still_say_its_mesh():
-    case = Case.read(BRIDGE, ["model.cells=[2, 2]"])
+    case = af.Case.read(BRIDGE, ["model.cells=[2, 2]"])
     assert case.model["fidelity"] == "auto"
     assert case.discretisation == Discretisation(cells=(2, 2))

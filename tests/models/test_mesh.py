@@ -7,35 +7,16 @@ import meshio
 import numpy as np
 import pytest
 
-from archfem.errors import InvalidInput, MeshError
-from archfem.joints.quadrature import Quadrature
-from archfem.masonry.assembly import assembled
-from archfem.masonry.block import Block
-from archfem.masonry.materials import STONE, STONE_TO_STONE
-from archfem.masonry.shapes import (
-    Arch,
-    Backfill,
-    Paving,
-    Pier,
-    Sidewall,
-    bridge,
-    circular_arch,
-)
-from archfem.models.discretisation import Discretisation
-from archfem.models.fem.division import divided
+import archfem as af
 from archfem.models.fem.mesh import mesh, read_mesh, write_mesh
-from archfem.models.fem.space import broken_space
-from archfem.models.full import full
-from archfem.statics.equilibrium import dead_load
-from archfem.statics.newton import Newton
 
 
 @pytest.mark.parametrize(
     ("meshing", "cells", "facets"),
     [
-        (Discretisation(), 17 * 16 + 2 * 4, 18 * 4),
-        (Discretisation(cells=(2, 3)), 17 * 6 + 2 * 2, 18 * 2),
-        (Discretisation(cells=(2, 3), cell="triangle"), 2 * (17 * 6 + 2 * 2), 18 * 2),
+        (af.models.Discretisation(), 17 * 16 + 2 * 4, 18 * 4),
+        (af.models.Discretisation(cells=(2, 3)), 17 * 6 + 2 * 2, 18 * 2),
+        (af.models.Discretisation(cells=(2, 3), cell="triangle"), 2 * (17 * 6 + 2 * 2), 18 * 2),
     ],
 )
 def test_numbers_of_cells_and_joint_facets(ring, meshing, cells, facets):
@@ -46,22 +27,22 @@ def test_numbers_of_cells_and_joint_facets(ring, meshing, cells, facets):
 
 def test_nodes_lie_on_the_circle(ring):
     """Four cells along a sector follow it by four chords: 1 - sin(φ/4)/(φ/4) is lost in weight."""
-    model = full(broken_space(mesh(ring)), Quadrature())
+    model = af.build(ring, fidelity="full")
     turn = np.radians(159.0) / 17 / 4
     weight = model.body[:, 1].sum() * ring.gravity
     assert weight / ring.weight == pytest.approx(np.sin(turn) / turn, rel=1e-10)
 
 
 def test_a_chorded_ring_keeps_its_own_weight():
-    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=2)
-    model = full(broken_space(mesh(ring, Discretisation(cells=(2, 6)))), Quadrature())
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=2)
+    model = af.build(ring, fidelity="full", cells=(2, 6))
     assert model.body[:, 1].sum() * ring.gravity == pytest.approx(ring.weight, rel=1e-10)
 
 
 def test_file_and_back(ring, tmp_path):
     path = tmp_path / "ring.msh"
-    write_mesh(ring, path, Discretisation(cells=(2, 2)))
-    again, fresh = read_mesh(ring, path), mesh(ring, Discretisation(cells=(2, 2)))
+    write_mesh(ring, path, af.models.Discretisation(cells=(2, 2)))
+    again, fresh = read_mesh(ring, path), mesh(ring, af.models.Discretisation(cells=(2, 2)))
     assert np.array_equal(np.bincount(again.blocks), np.bincount(fresh.blocks))
     assert np.array_equal(np.bincount(again.joints[1]), np.bincount(fresh.joints[1]))
     outside = meshio.read(path)
@@ -72,69 +53,67 @@ def test_file_and_back(ring, tmp_path):
 def test_an_unstructured_block_conforms_to_its_neighbours(stack):
     """A block without corners is meshed freely, with the nodes of the joints it shares."""
     top = stack.blocks[2]
-    free = Block((*top.outline, (0.0, 2.5)), top.material, top.name, part=top.part)
-    made = mesh(
-        replace(stack, blocks=(*stack.blocks[:2], free)),
-        Discretisation(cells=(4, 4), cell="triangle"),
-    )
+    free = af.Block((*top.outline, (0.0, 2.5)), top.material, top.name, part=top.part)
+    structure = replace(stack, blocks=(*stack.blocks[:2], free))
+    made = mesh(structure, af.models.Discretisation(cells=(4, 4), cell="triangle"))
     assert np.bincount(made.joints[1]).tolist() == [4, 4]
-    weight = full(broken_space(made), Quadrature()).body[:, 1].sum() * 9.81
+    model = af.build(structure, fidelity="full", cells=(4, 4), cell="triangle")
+    weight = model.body[:, 1].sum() * 9.81
     assert weight == pytest.approx(20e3 * 2.25, rel=1e-10)
 
 
 def test_the_mesh_of_another_structure_is_refused(ring, stack, tmp_path):
     path = tmp_path / "ring.msh"
-    write_mesh(ring, path, Discretisation(cells=(1, 1)))
-    with pytest.raises(MeshError, match="of another structure"):
+    write_mesh(ring, path, af.models.Discretisation(cells=(1, 1)))
+    with pytest.raises(af.errors.MeshError, match="of another structure"):
         read_mesh(stack, path)
-    narrower = circular_arch(radius=2.95, thickness=0.50, embrace=159.0, voussoirs=17)
-    with pytest.raises(MeshError, match="facets cover"):
+    narrower = af.circular_arch(radius=2.95, thickness=0.50, embrace=159.0, voussoirs=17)
+    with pytest.raises(af.errors.MeshError, match="facets cover"):
         read_mesh(narrower, path)
 
 
 def test_a_file_that_is_not_there(ring):
-    with pytest.raises(InvalidInput, match=r"no mesh file none\.msh"):
+    with pytest.raises(af.InvalidInput, match=r"no mesh file none\.msh"):
         read_mesh(ring, "none.msh")
 
 
 def test_a_face_of_several_chords_gets_a_cell_for_each():
-    ring = circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
-    assert len(mesh(ring, Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2
+    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
+    assert len(mesh(ring, af.models.Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2
 
 
 def test_a_file_that_is_no_mesh(stack, tmp_path):
     path = tmp_path / "bad.msh"
     path.write_text("not a mesh")
-    with pytest.raises(MeshError):
+    with pytest.raises(af.errors.MeshError):
         read_mesh(stack, path)
 
 
 def viaduct(**parts):
     """Two spans with fill, piers and sidewalls that rise above the springing."""
-    return bridge(
+    return af.bridge(
         arches=[
-            Arch(span=4.0, embrace=150.0, thickness=0.5, voussoirs=9, name="left arch"),
-            Arch(span=5.0, embrace=140.0, thickness=0.5, voussoirs=11, name="right arch"),
+            af.shapes.Arch(span=4.0, embrace=150.0, thickness=0.5, voussoirs=9, name="left arch"),
+            af.shapes.Arch(span=5.0, embrace=140.0, thickness=0.5, voussoirs=11, name="right arch"),
         ],
-        piers=[Pier(gap=1.2, height=1.0, name="pier")],
+        piers=[af.shapes.Pier(gap=1.2, height=1.0, name="pier")],
         sidewalls=[
-            Sidewall(length=2.0, height=1.0, name="left wall"),
-            Sidewall(length=6.0, height=1.0, above=0.8, setback=0.1, name="right wall"),
+            af.shapes.Sidewall(length=2.0, height=1.0, name="left wall"),
+            af.shapes.Sidewall(length=6.0, height=1.0, above=0.8, setback=0.1, name="right wall"),
         ],
-        backfill=Backfill(cover=0.4),
+        backfill=af.shapes.Backfill(cover=0.4),
         **parts,
     )
 
 
 def one_arch(**parts):
     """One span between fixed abutments, with fill that ends in wedges on the springings."""
-    ring = Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
-    return bridge(arches=[ring], backfill=Backfill(cover=0.3), **parts)
+    ring = af.shapes.Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=13)
+    return af.bridge(arches=[ring], backfill=af.shapes.Backfill(cover=0.3), **parts)
 
 
-def scaled_jacobians(made):
+def scaled_jacobians(cells):
     """Least scaled Jacobian of each cell: 1 for squares and equilateral triangles, 0 for lines."""
-    cells = full(broken_space(made), Quadrature()).cells
     points = cells.places[np.array(cells.polygons)]
     ahead = np.roll(points, -1, axis=1) - points
     behind = np.roll(ahead, 1, axis=1)
@@ -149,11 +128,10 @@ def scaled_jacobians(made):
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
 def test_meshes_of_bridges_are_sound(make, cell, count):
     """Sharp wedges and strips between stones included; slender triangles lie in slender stones."""
-    structure = make(paving=Paving(thickness=0.2))
-    made = mesh(structure, Discretisation(cells=(count, count), cell=cell))
-    quality = scaled_jacobians(made)
-    stones = [b.corners is not None for b in structure.blocks]
-    stones = np.array(stones)[made.blocks[np.isin(made.blocks, structure.free)]]
+    structure = make(paving=af.shapes.Paving(thickness=0.2))
+    cells = af.build(structure, fidelity="full", cells=(count, count), cell=cell).cells
+    quality = scaled_jacobians(cells)
+    stones = np.array([b.corners is not None for b in structure.blocks])[cells.owner]
     assert quality[~stones].min() > 0.15
     assert quality.min() > (0.15 if cell == "quadrilateral" else 0.05)
 
@@ -175,11 +153,9 @@ def test_cells_of_touching_blocks_meet(make, cell):
     The rim, edges of one cell, is as long as the blocks' outlines less twice the joints.
     """
     structure = make()
-    blocks = tuple(replace(block, material=STONE) for block in structure.blocks)
+    blocks = tuple(replace(block, material=af.STONE) for block in structure.blocks)
     structure = replace(structure, blocks=blocks)
-    model = full(
-        broken_space(mesh(structure, Discretisation(cells=(3, 4), cell=cell))), Quadrature()
-    )
+    model = af.build(structure, fidelity="full", cells=(3, 4), cell=cell)
     points, places = np.unique(model.cells.places.round(9), axis=0, return_inverse=True)
     rim = outer_edges(model.cells, places.ravel())
     length = np.linalg.norm(points[rim[:, 0]] - points[rim[:, 1]], axis=1).sum()
@@ -201,11 +177,9 @@ def test_cells_of_touching_blocks_meet(make, cell):
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_supports_of_a_bridge_carry_its_weight(cell):
-    structure = viaduct(paving=Paving(thickness=0.2))
-    made = full(
-        broken_space(mesh(structure, Discretisation(cells=(2, 2), cell=cell))), Quadrature()
-    )
-    joints, carried = dead_load(made, Newton(tolerance=1e-13)).joints, np.zeros(2)
+    structure = viaduct(paving=af.shapes.Paving(thickness=0.2))
+    made = af.build(structure, fidelity="full", cells=(2, 2), cell=cell)
+    joints, carried = af.dead_load(made, af.statics.Newton(tolerance=1e-13)).joints, np.zeros(2)
     for k, joint in enumerate(structure.joints):
         fixed = [structure.blocks[number].fixed for number in (joint.lower, joint.higher)]
         if any(fixed):
@@ -225,7 +199,7 @@ def test_soil_has_the_cells_that_its_stones_impose():
     assert len(extrados) == 20
     counts = []
     for coarse in (None, 0.3, 0.15):
-        made = mesh(structure, Discretisation(coarse=coarse))
+        made = mesh(structure, af.models.Discretisation(coarse=coarse))
         assert set(np.bincount(made.joints[1])[extrados]) == {4}
         counts.append(np.sum(made.blocks == soil))
     area = structure.blocks[soil].area
@@ -236,7 +210,7 @@ def test_soil_has_the_cells_that_its_stones_impose():
 
 def block(name, *outline, corners=(0, 1, 2, 3), fixed=False):
     """A stone with a structured mesh unless it is told otherwise."""
-    return Block(outline, STONE, name, fixed=fixed, corners=corners)
+    return af.Block(outline, af.STONE, name, fixed=fixed, corners=corners)
 
 
 def box(name, left, right, low, high, **given):
@@ -253,54 +227,17 @@ def wall_in_bond():
             box(f"stone {k}.{n}", left, right, 0.5 * k, 0.5 * k + 0.5)
             for n, (left, right) in enumerate(pairwise(ends))
         ]
-    return assembled(stones, STONE_TO_STONE)
+    return af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 @pytest.mark.parametrize("cells", [(1, 1), (4, 4), (2, 5)])
 def test_stones_in_bond_fit(cell, cells):
     """Opposite sides agree although a long side faces two short ones."""
-    made = mesh(wall_in_bond(), Discretisation(cells=cells, cell=cell))
-    of_block = np.bincount(made.blocks)[1:]
+    made = af.build(wall_in_bond(), fidelity="full", cells=cells, cell=cell).cells
+    of_block = np.bincount(made.owner)[1:]
     assert of_block.min() >= cells[0] * cells[1] * (1 if cell == "quadrilateral" else 2)
     assert scaled_jacobians(made).min() > (0.3 if cell == "quadrilateral" else 0.05)
-
-
-def cells_on_edges(structure, meshing):
-    """Middles of the edges of blocks that can move (m, 2), and the cells on each (m,)."""
-    division = divided(structure, meshing)
-    own = np.unique(np.concatenate([division.edges.around[k] for k in structure.free]))
-    middles = division.edges.points[division.edges.ends[own]].mean(axis=1)
-    return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
-
-
-@pytest.mark.parametrize("cells", [(2, 2), (3, 5), (4, 4)])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-@pytest.mark.parametrize("make", ["ring of 16", "ring in chords", "fill", "fill on chords"])
-def test_mirror_images_are_cut_alike(make, cell, cells):
-    lengths = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 16}
-    made = {
-        "ring of 16": lambda: circular_arch(**lengths),
-        "ring in chords": lambda: circular_arch(**lengths, chords=2),
-        "fill": one_arch,
-        "fill on chords": lambda: one_arch(chords=3),
-    }[make]()
-    middles, counts = cells_on_edges(made, Discretisation(cells=cells, cell=cell))
-    x = middles[:, 0]
-    turned = middles * [-1.0, 1.0] + [x.min() + x.max(), 0.0]
-    away = np.linalg.norm(middles[:, None] - turned, axis=2)
-    assert away.min(axis=0).max() < 1e-9
-    assert counts[away.argmin(axis=0)].tolist() == counts.tolist()
-
-
-def test_cells_forced_by_another_side_are_dealt_evenly():
-    """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
-    made = one_arch(chords=3)
-    division = divided(made, Discretisation(cells=(2, 2)))
-    keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
-    faces = division.edges.sides[keystone]
-    found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
-    assert sorted(found) == [[2], [2], [2, 2, 2], [2, 2, 2]]
 
 
 def test_neighbours_that_wish_different_numbers_take_the_larger():
@@ -308,7 +245,10 @@ def test_neighbours_that_wish_different_numbers_take_the_larger():
     low, high = box("low", 0.0, 1.0, 0.0, 1.0), box("high", 0.0, 1.0, 1.0, 2.0)
     high = replace(high, corners=(1, 2, 3, 0))
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
-    made = mesh(assembled([ground, low, high], STONE_TO_STONE), Discretisation(cells=(2, 5)))
+    made = mesh(
+        af.masonry.assembled([ground, low, high], af.masonry.STONE_TO_STONE),
+        af.models.Discretisation(cells=(2, 5)),
+    )
     assert np.bincount(made.blocks).tolist() == [5, 25, 10]
     assert np.bincount(made.joints[1]).tolist() == [5, 5]
 
@@ -317,8 +257,8 @@ def test_cells_of_a_long_stone_are_not_absurdly_long():
     """No longer than twice its thickness: ten cells in eight metres of 0.4 m."""
     ground = box("ground", 0.0, 8.0, -0.3, 0.0, fixed=True)
     made = mesh(
-        assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], STONE_TO_STONE),
-        Discretisation(cells=(2, 2)),
+        af.masonry.assembled([ground, box("bed", 0.0, 8.0, 0.0, 0.4)], af.masonry.STONE_TO_STONE),
+        af.models.Discretisation(cells=(2, 2)),
     )
     assert np.bincount(made.joints[1]).tolist() == [10]
 
@@ -332,16 +272,23 @@ def test_sides_that_cannot_agree():
     ]
     stones.append(block("last", rays[3][0], rays[3][1], (3.0, 0.0), rays[0][0]))
     stones.append(block("rest", (2.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.5, 1.0), fixed=True))
-    with pytest.raises(MeshError, match="leaving out their corners"):
-        mesh(assembled(stones, STONE_TO_STONE), Discretisation(cells=(2, 2)))
+    with pytest.raises(af.errors.MeshError, match="leaving out their corners"):
+        mesh(
+            af.masonry.assembled(stones, af.masonry.STONE_TO_STONE),
+            af.models.Discretisation(cells=(2, 2)),
+        )
     free = replace(stones[3], corners=None)
     assert mesh(
-        assembled([*stones[:3], free, stones[4]], STONE_TO_STONE), Discretisation(cells=(2, 2))
+        af.masonry.assembled([*stones[:3], free, stones[4]], af.masonry.STONE_TO_STONE),
+        af.models.Discretisation(cells=(2, 2)),
     )
 
 
 def test_an_outline_that_crosses_itself():
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
     bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
-    with pytest.raises(MeshError, match="cannot mesh block 'bow'"):
-        mesh(assembled([ground, bow], STONE_TO_STONE), Discretisation(cells=(2, 2)))
+    with pytest.raises(af.errors.MeshError, match="cannot mesh block 'bow'"):
+        mesh(
+            af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE),
+            af.models.Discretisation(cells=(2, 2)),
+        )

@@ -1,33 +1,29 @@
 """Pushover: it rises to the limit of rigid blocks, whichever way it is controlled."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from archfem.dynamics.ladder import build
-from archfem.errors import DidNotConverge
-from archfem.joints.criteria import Criteria
-from archfem.joints.quadrature import Quadrature
-from archfem.limit.collapse import collapse_factor
-from archfem.masonry.actions import BodyForce, PointLoad, Settlement
-from archfem.masonry.shapes import arch_on_piers, circular_arch, column
-from archfem.models.rigid import rigid
+import archfem as af
 from archfem.statics.pushover import CONTROLS, Stop, pushover
 
-RING = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
 
 
+def rigid(structure, **given):
+    return af.build(structure, fidelity="rigid", **given)
+
+
 def pair(x):
-    return [PointLoad(side * x, (0.0, -1e3)) for side in (-1.0, 1.0)]
+    return [af.PointLoad(side * x, (0.0, -1e3)) for side in (-1.0, 1.0)]
 
 
 LOADS = {
-    "sideways": BodyForce(1.0),
-    "eccentric": PointLoad(1.4, (0.0, -1e3)),
+    "sideways": af.BodyForce(1.0),
+    "eccentric": af.PointLoad(1.4, (0.0, -1e3)),
     "two at the crown": pair(KEYSTONE),
 }
+
 
 REACHED = 5e-3
 """Relative: how near a pushover must come to the limit of the polygon it models."""
@@ -36,7 +32,7 @@ REACHED = 5e-3
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
-    limit = collapse_factor(RING, live=load, friction=None).factor
+    limit = af.collapse_factor(RING, live=load, friction=None).factor
     found = pushover(rigid(RING), load, control=control)
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor <= limit * (1.0 + 1e-6)  # joints' end points carry the edge exactly
@@ -45,8 +41,8 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
 @pytest.mark.parametrize("load", ["sideways", "two at the crown"])
 @pytest.mark.parametrize("rung", ["faces", "condensed", "full"])
 def test_every_rung_reaches_the_limit_of_its_polygon(rung, load):
-    limit = collapse_factor(RING, live=LOADS[load], friction=None).factor
-    found = pushover(build(RING, fidelity=rung, cells=(4, 2)), LOADS[load])
+    limit = af.collapse_factor(RING, live=LOADS[load], friction=None).factor
+    found = pushover(af.build(RING, fidelity=rung, cells=(4, 2)), LOADS[load])
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor <= limit * (1.0 + 1e-5)
 
@@ -54,8 +50,8 @@ def test_every_rung_reaches_the_limit_of_its_polygon(rung, load):
 @pytest.mark.parametrize("rung", ["rigid", "faces"])
 def test_exact_facets_only_approach_it_and_their_extrapolation_reaches_it(rung):
     """The compressed strip never vanishes: 2 % are missing after 10 % of the span and rise."""
-    limit = collapse_factor(RING, live=LOADS["eccentric"], friction=None).factor
-    found = pushover(build(RING, fidelity=rung, quadrature="exact"), LOADS["eccentric"])
+    limit = af.collapse_factor(RING, live=LOADS["eccentric"], friction=None).factor
+    found = pushover(af.build(RING, fidelity=rung, quadrature="exact"), LOADS["eccentric"])
     assert found.factor < 0.99 * limit
     assert found.limit == pytest.approx(limit, rel=REACHED)
     assert found.uncertainty == pytest.approx(0.02 * limit, rel=0.2)
@@ -63,8 +59,8 @@ def test_exact_facets_only_approach_it_and_their_extrapolation_reaches_it(rung):
 
 def test_a_rule_without_points_at_the_faces_cannot_reach_it():
     """Gauss's outermost point is the lever arm: the curve is flat below the limit, and knows it."""
-    limit = collapse_factor(RING, live=LOADS["sideways"], friction=None).factor
-    found = pushover(rigid(RING, rule=Quadrature("gauss")), LOADS["sideways"])
+    limit = af.collapse_factor(RING, live=LOADS["sideways"], friction=None).factor
+    found = pushover(rigid(RING, quadrature="gauss"), LOADS["sideways"])
     assert "slope fell" in found.outcome
     assert found.factor == pytest.approx(0.93 * limit, rel=5e-3)
     outermost = 0.5 - 0.5 * (1.0 - np.sqrt(0.6)) / 4  # of three points on four facets
@@ -72,26 +68,26 @@ def test_a_rule_without_points_at_the_faces_cannot_reach_it():
 
 
 def test_hinges_are_those_of_the_mechanism():
-    collapse = collapse_factor(RING, live=BodyForce(1.0), friction=None)
-    found = pushover(rigid(RING), BodyForce(1.0))
+    collapse = af.collapse_factor(RING, live=af.BodyForce(1.0), friction=None)
+    found = pushover(rigid(RING), af.BodyForce(1.0))
     assert set(collapse.hinges) <= set(found.hinges)
     assert found.hinges[0] == (6, "extrados")
 
 
 def test_ring_on_piers_reaches_its_limit():
-    structure = arch_on_piers(
+    structure = af.arch_on_piers(
         radius=3.0, thickness=0.6, voussoirs=15, pier_breadth=1.2, courses=[0.5] * 4, chords=1
     )
-    limit = collapse_factor(structure, live=BodyForce(1.0), friction=None).factor
-    found = pushover(rigid(structure), BodyForce(1.0))
+    limit = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None).factor
+    found = pushover(rigid(structure), af.BodyForce(1.0))
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.hinges[-1][0] in range(5, 24)
 
 
 def test_curve_of_a_rocking_block_follows_the_joint_section():
     """Compressed depth c = 3 (h/2 - |e|) and turning θ = 2 N / (k_n w c²) once |e| > h/6."""
-    block = column(breadth=0.6, heights=[2.4])
-    found = pushover(rigid(block, 200), BodyForce(1.0), stop=Stop(displacement=1e-3))
+    block = af.column(breadth=0.6, heights=[2.4])
+    found = pushover(rigid(block, cells=(200, 1)), af.BodyForce(1.0), stop=Stop(displacement=1e-3))
     contact, weight = block.joints[0].contact, block.weight
     factor = found.curve["factor"].values
     slip = factor * weight / (contact.shear_stiffness * 0.6)
@@ -117,16 +113,16 @@ def test_curve_starts_at_the_dead_load_and_never_falls():
 
 
 def test_force_control_says_that_the_load_cannot_grow():
-    found = pushover(rigid(RING), BodyForce(1.0), control="force")
+    found = pushover(rigid(RING), af.BodyForce(1.0), control="force")
     assert "cannot grow beyond a factor of 0.457" in found.outcome
 
 
-@pytest.mark.parametrize("quadrature", [Quadrature(), Quadrature("gauss", 4)])
+@pytest.mark.parametrize("rule", [{}, {"quadrature": "gauss", "points": 4}])
 @pytest.mark.parametrize("reach", [3e-3, 1e-2])
-def test_limit_lies_between_what_was_reached_and_the_extrapolation(reach, quadrature):
-    model = rigid(RING, 32, quadrature)
-    limit = collapse_factor(RING, live=BodyForce(1.0), friction=None).factor
-    found = pushover(model, BodyForce(1.0), stop=Stop(displacement=reach))
+def test_limit_lies_between_what_was_reached_and_the_extrapolation(reach, rule):
+    model = rigid(RING, cells=(32, 1), **rule)
+    limit = af.collapse_factor(RING, live=af.BodyForce(1.0), friction=None).factor
+    found = pushover(model, af.BodyForce(1.0), stop=Stop(displacement=reach))
     assert "moved by" in found.outcome
     assert found.factor < limit < found.limit + REACHED * limit
     assert found.uncertainty == pytest.approx(found.limit - found.factor)
@@ -140,38 +136,36 @@ def test_a_load_without_a_limit_has_no_extrapolation():
 
 
 def test_other_rules_stop_it():
-    by_hinges = pushover(rigid(RING), BodyForce(1.0), stop=Stop(hinges=2))
+    by_hinges = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(hinges=2))
     assert 2 <= len(by_hinges.hinges) < 4
     assert "joints hinge" in by_hinges.outcome
-    early = Criteria(hinge=0.3)
-    sooner = pushover(rigid(RING), BodyForce(1.0), stop=Stop(hinges=2), criteria=early)
+    early = af.Criteria(hinge=0.3)
+    sooner = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(hinges=2), criteria=early)
     assert sooner.factor < by_hinges.factor
-    assert Criteria.of(sooner.joints) == early
-    by_steps = pushover(rigid(RING), BodyForce(1.0), stop=Stop(steps=5))
+    assert af.Criteria.of(sooner.joints) == early
+    by_steps = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(steps=5))
     assert by_steps.curve.sizes["step"] == 6
     assert "5 steps" in by_steps.outcome
 
 
 def test_a_ring_that_does_not_stand_is_not_pushed():
-    thin = circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
-    with pytest.raises(DidNotConverge, match="cannot carry it"):
-        pushover(rigid(thin), BodyForce(1.0))
+    thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
+    with pytest.raises(af.DidNotConverge, match="cannot carry it"):
+        pushover(rigid(thin), af.BodyForce(1.0))
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: pushover(rigid(RING), BodyForce(1.0), control="work"), "is not known"),
-        (lambda: pushover(rigid(RING), BodyForce(0.0)), "load is zero"),
-        (lambda: pushover(rigid(RING), PointLoad(9.0, (0.0, -1.0))), "misses the structure"),
+        (lambda: pushover(rigid(RING), af.BodyForce(1.0), control="work"), "is not known"),
+        (lambda: pushover(rigid(RING), af.BodyForce(0.0)), "load is zero"),
+        (lambda: pushover(rigid(RING), af.PointLoad(9.0, (0.0, -1.0))), "misses the structure"),
         (
-            lambda: pushover(rigid(RING), Settlement(0, (0.1, 0.0, 0.0)), control="force"),
+            lambda: pushover(rigid(RING), af.Settlement(0, (0.1, 0.0, 0.0)), control="force"),
             "settlement is a displacement",
         ),
-        (lambda: pushover(rigid(RING), Settlement(0, (0.0, 0.0, 0.0))), "is zero"),
-        (lambda: pushover(rigid(RING), Settlement(5, (0.1, 0.0, 0.0))), "cannot settle"),
-        (lambda: Stop(slope=1.5), "not between 0 and 1"),
-        (lambda: replace(Stop(), steps=0), "must be above 0"),
+        (lambda: pushover(rigid(RING), af.Settlement(0, (0.0, 0.0, 0.0))), "is zero"),
+        (lambda: pushover(rigid(RING), af.Settlement(5, (0.1, 0.0, 0.0))), "cannot settle"),
     ],
 )
 def test_input_that_cannot_be_meant_is_refused(call, message):
@@ -179,11 +173,29 @@ def test_input_that_cannot_be_meant_is_refused(call, message):
         call()
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"slope": 1.5}, "slope 1.5 is not between 0 and 1"),
+        ({"steps": 0}, "steps 0 must be above 0"),
+    ],
+)
+def test_rules_that_would_stop_at_once_or_never_are_refused(given, message):
+    with pytest.raises(af.InvalidInput, match=message):
+        Stop(**given)
+
+
+def test_what_moved_is_named():
+    stop = Stop(displacement=1e-5)
+    for load, what in ((af.BodyForce(1.0), "load"), (af.Settlement(0, (-1.0, 0, 0)), "support")):
+        assert f"the {what} moved by" in pushover(rigid(RING), load, stop=stop).outcome
+
+
 @pytest.mark.parametrize("spread", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
 def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(spread):
     """Out: the least thrust; in: the greatest; down: the least share of the weight."""
-    settlement = Settlement("left abutment", spread)
-    limit = collapse_factor(RING, live=settlement, friction=None).factor
+    settlement = af.Settlement("left abutment", spread)
+    limit = af.collapse_factor(RING, live=settlement, friction=None).factor
     found = pushover(rigid(RING), settlement)
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.limit == pytest.approx(limit, rel=REACHED)
@@ -196,15 +208,17 @@ def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(spread
 
 @pytest.mark.parametrize("rung", ["faces", "full"])
 def test_spreading_supports_bring_meshed_rungs_to_the_least_thrust(rung):
-    settlement = Settlement("left abutment", (-1.0, 0.0, 0.0))
-    limit = collapse_factor(RING, live=settlement, friction=None).factor
-    found = pushover(build(RING, fidelity=rung, cells=(4, 2)), settlement, stop=Stop(slope=1e-4))
+    settlement = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+    limit = af.collapse_factor(RING, live=settlement, friction=None).factor
+    found = pushover(af.build(RING, fidelity=rung, cells=(4, 2)), settlement, stop=Stop(slope=1e-4))
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor < 0.8 * float(found.curve["factor"][0])  # the thrust of the dead load
 
 
 def test_work_on_a_settlement_is_the_thrust_on_the_support():
-    found = pushover(rigid(RING), Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3))
+    found = pushover(
+        rigid(RING), af.Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3)
+    )
     joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
     thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
     assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)

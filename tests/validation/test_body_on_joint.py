@@ -20,7 +20,7 @@ from archfem.masonry.actions import BodyForce
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes import column
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import equilibrium, self_weight
+from archfem.statics.equilibrium import equilibrium_under, self_weight
 
 GRAVITY = 9.81
 STONE = Material(30e9, 0.2, 2000.0 * GRAVITY)
@@ -60,7 +60,7 @@ def test_section_law(e):
     model = build(block(), fidelity="rigid", cells=(64, 1))
     normal, depth = 1e6, 0.6
     load = np.array([0.0, -normal, -e * normal * depth])  # clockwise presses the right edge
-    found = equilibrium(model, load)
+    found = equilibrium_under(model, load)
     stiffness, width = JOINT.normal_stiffness, 1.0
     if e <= 1.0 / 6.0:
         rotation = 12.0 * e * normal * depth / (stiffness * width * depth**3)
@@ -75,7 +75,7 @@ def test_moment_approaches_its_limit_only_as_rotation_grows():
     """M = N (h/2 - (1/3) sqrt(2 N / (k_n w θ))) read at the rotation found."""
     model = build(block(), fidelity="rigid", cells=(256, 1))
     normal = 1e6
-    found = equilibrium(model, np.array([0.0, -normal, -0.49 * normal * 0.6]))
+    found = equilibrium_under(model, np.array([0.0, -normal, -0.49 * normal * 0.6]))
     rotation = -found.q[2]
     moment = normal * (0.3 - np.sqrt(2.0 * normal / (1e9 * rotation)) / 3.0)
     assert float(found.joints["M"][0]) == pytest.approx(moment, rel=2e-4)
@@ -86,17 +86,17 @@ def test_uplift_at_a_quarter_of_g(fidelity):
     """b/h = 0.25: just below, the base is hinged but holds; just above, nothing does."""
     model = build(block(), fidelity=fidelity, cells=(4, 8))
     weight = self_weight(model)
-    held = equilibrium(model, weight + model.load(BodyForce(0.245)))
+    held = equilibrium_under(model, weight + model.load(BodyForce(0.245)))
     assert float(held.joints["eccentricity"][0]) == pytest.approx(2.0 * 0.245, rel=1e-6)
     assert int(held.joints["hinge"][0]) == 1
     with pytest.raises(DidNotConverge, match="no equilibrium beyond"):
-        equilibrium(model, weight + model.load(BodyForce(0.255)))
+        equilibrium_under(model, weight + model.load(BodyForce(0.255)))
 
 
 def test_sliding_at_the_coefficient_of_friction():
     model = build(block(breadth=4.0, height=0.5), fidelity="rigid")
     for factor, slides in ((0.59, False), (0.61, True)):
-        found = equilibrium(model, self_weight(model) + model.load(BodyForce(factor)))
+        found = equilibrium_under(model, self_weight(model) + model.load(BodyForce(factor)))
         assert float(found.joints["friction"][0]) == pytest.approx(factor, rel=1e-9)
         assert bool(found.joints["slide"][0]) == slides
 

@@ -138,7 +138,7 @@ def assembled_matrix(form: Any) -> sparse.csr_matrix:
 def assembled_vector(form: Any) -> NDArray[np.float64]:
     """Assemble a linear form."""
     vector = fem.petsc.assemble_vector(form)
-    values = vector.array.copy()
+    values: NDArray[np.float64] = vector.array.copy()
     vector.destroy()
     return values
 

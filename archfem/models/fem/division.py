@@ -51,10 +51,15 @@ class Sizes:
     coarse: float
 
     def at(self, places: Array) -> Array:
-        """Size at places (..., 2) [m]."""
+        """Return the size of cells at places (...,) [m].
+
+        Args:
+            places: (..., 2) [m].
+        """
         away = np.linalg.norm(places[..., None, :] - self.middles, axis=-1)
         grown = self.lengths + GROWTH * np.maximum(away - 0.5 * self.lengths, 0.0)
-        return np.minimum(grown.min(axis=-1), self.coarse)
+        size: Array = np.minimum(grown.min(axis=-1), self.coarse)
+        return size
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,13 @@ class Division:
 
 def divided(structure: Structure, asked: Discretisation) -> Division:
     """Cut the edges of a structure's blocks into cells.
+
+    Args:
+        structure: whose blocks are to be meshed.
+        asked: least numbers of cells, and their kind.
+
+    Returns:
+        Where the cells on each edge end.
 
     Raises:
         MeshError: opposite sides cannot be made to agree.
@@ -116,7 +128,7 @@ def _wanted(edges: Edges, number: int, asked: Discretisation) -> list[int]:
 
 
 def _wishes(edges: Edges, asked: Discretisation) -> tuple[Numbers, Array]:
-    """Least number of cells on each edge, and whether it is a stone's or on a joint.
+    """Return the least number of cells on each edge, and whether it is a stone's or on a joint.
 
     Where a side has several edges, none of their cells is longer than the side's would be; so it
     is with a joint between two blocks without corners.
@@ -162,7 +174,8 @@ def _assigned(edges: Edges, units: Numbers, least: Numbers) -> Numbers:
             "no numbers of cells make opposite sides of all four-sided blocks agree: mesh some of "
             "them freely, by leaving out their corners"
         )
-    return units * np.round(found.x).astype(np.intp)
+    multiples: Numbers = np.round(found.x).astype(np.intp)
+    return units * multiples
 
 
 def _even(edges: Edges, units: Numbers, counts: Numbers, least: Numbers) -> Numbers:

@@ -37,7 +37,8 @@ class Edges:
     def lengths(self) -> Array:
         """Lengths of the edges (m,) [m]."""
         start, end = self.points[self.ends.T]
-        return np.linalg.norm(end - start, axis=1)
+        lengths: Array = np.linalg.norm(end - start, axis=1)
+        return lengths
 
     @cached_property
     def structured(self) -> tuple[int, ...]:
@@ -51,11 +52,16 @@ class Edges:
         return tuple(n for n in range(len(self.boundaries)) if n not in set(self.structured))
 
     def corners(self, number: int) -> Numbers:
-        """Points at the four corners of a structured block."""
+        """Return the points at the four corners of a structured block (4,).
+
+        Args:
+            number: of the block.
+        """
         block, boundary = self.structure.blocks[number], self.boundaries[number]
         corners = block.points[list(block.corners or ())]
         away = np.linalg.norm(self.points[boundary] - corners[:, None], axis=2)
-        return boundary[np.argmin(away, axis=1)]
+        nearest: Numbers = boundary[np.argmin(away, axis=1)]
+        return nearest
 
     @cached_property
     def sides(self) -> dict[int, list[Numbers]]:
@@ -90,6 +96,9 @@ def edges_of(structure: Structure, chords: Sequence[int]) -> Edges:
     Args:
         structure: its blocks touch along joints.
         chords: in which each block's arcs are drawn, where it has any (n_blocks,).
+
+    Returns:
+        The edges, cut wherever another block's corner lies on one.
     """
     near = TOUCHING * structure.size
     drawn = [block.drawn(n) for block, n in zip(structure.blocks, chords, strict=True)]
@@ -98,17 +107,19 @@ def edges_of(structure: Structure, chords: Sequence[int]) -> Edges:
     kept, number = np.unique(first, return_inverse=True)
     points = every[kept]
     starts = np.cumsum([0, *map(len, drawn)])
-    loops = tuple(_with_points_on_edges(number[a:b], points, near) for a, b in pairwise(starts))
-    pairs = [np.sort(np.stack([loop, np.roll(loop, -1)], axis=1), axis=1) for loop in loops]
+    boundaries = tuple(
+        _with_points_on_edges(number[a:b], points, near) for a, b in pairwise(starts)
+    )
+    pairs = [np.sort(np.stack([each, np.roll(each, -1)], axis=1), axis=1) for each in boundaries]
     ends, of_pair = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
-    around = np.split(of_pair.ravel(), np.cumsum([len(loop) for loop in loops])[:-1])
-    return Edges(structure, points, ends, loops, tuple(around))
+    around = np.split(of_pair.ravel(), np.cumsum([len(each) for each in boundaries])[:-1])
+    return Edges(structure, points, ends, boundaries, tuple(around))
 
 
-def _with_points_on_edges(loop: Numbers, points: Array, near: float) -> Numbers:
-    """Insert points of other blocks that lie on a loop's edges."""
-    loop = loop[loop != np.roll(loop, 1)]
-    starts = points[loop]
+def _with_points_on_edges(boundary: Numbers, points: Array, near: float) -> Numbers:
+    """Insert points of other blocks that lie on a boundary's edges."""
+    boundary = boundary[boundary != np.roll(boundary, 1)]
+    starts = points[boundary]
     edges = np.roll(starts, -1, axis=0) - starts
     lengths = np.linalg.norm(edges, axis=1)[:, None]
     low, high = starts.min(axis=0) - near, starts.max(axis=0) + near
@@ -118,4 +129,4 @@ def _with_points_on_edges(loop: Numbers, points: Array, near: float) -> Numbers:
     off = (y * edges[:, :1] - x * edges[:, 1:]) / lengths
     edge, point = np.nonzero((np.abs(off) <= near) & (along > near) & (along < lengths - near))
     order = np.lexsort((along[edge, point], edge))
-    return np.insert(loop, edge[order] + 1, others[point[order]])
+    return np.insert(boundary, edge[order] + 1, others[point[order]])

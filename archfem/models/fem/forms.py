@@ -4,7 +4,7 @@ Find u in the broken space such that for all v
 
     ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n g(v) + t_s s(v)) = ∫ w ρ b·v
 
-with plane stress σ, opening g(v) = ⟦v⟧·n, slip s(v) = ⟦v⟧·t and the tractions of `laws`.
+with plane stress σ, opening g(v) = ⟦v⟧·n, slip s(v) = ⟦v⟧·t and the tractions of `joints.law`.
 """
 
 from dataclasses import dataclass
@@ -24,12 +24,22 @@ from archfem.models.fem.space import BrokenSpace
 
 
 def strain(u: Any) -> Any:
-    """Small strain ε(u)."""
+    """Return the small strain ε(u), a UFL expression.
+
+    Args:
+        u: displacement, a UFL expression [m].
+    """
     return ufl.sym(ufl.grad(u))
 
 
 def plane_stress(u: Any, young: Any, poisson: Any) -> Any:
-    """Stress of a linear elastic sheet that is free out of plane [Pa]."""
+    """Return the stress of a linear elastic sheet that is free out of plane [Pa].
+
+    Args:
+        u: displacement, a UFL expression [m].
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+    """
     shear = young / (2.0 * (1.0 + poisson))
     plane = young * poisson / (1.0 - poisson**2)
     return 2.0 * shear * strain(u) + plane * ufl.tr(strain(u)) * ufl.Identity(2)
@@ -142,7 +152,7 @@ class Forms:
         return u, fem.form(force), fem.form(ufl.derivative(force, u))
 
     def force(self, displacement: Array) -> Array:
-        """Assemble internal forces of blocks and joints [N].
+        """Return the assembled internal forces of blocks and joints (2 m,) [N].
 
         Args:
             displacement: of all nodes (2 m,) [m].
@@ -152,7 +162,11 @@ class Forms:
         return _fenicsx.assembled_vector(force)
 
     def tangent(self, displacement: Array) -> sparse.csr_matrix:
-        """Assemble the derivative of `force` [N/m]."""
+        """Return the assembled derivative of `force` (2 m, 2 m) [N/m].
+
+        Args:
+            displacement: of all nodes (2 m,) [m].
+        """
         u, _, tangent = self._nonlinear
         u.x.array[:] = displacement
         return _fenicsx.assembled_matrix(tangent)
@@ -164,7 +178,11 @@ class Forms:
         return fem.form(0.5 * (self._bodies(u, u) + self._joints(u, u)))
 
     def energy(self, displacement: Array) -> float:
-        """Potential energy of blocks and joints [J]."""
+        """Return the potential energy of blocks and joints [J].
+
+        Args:
+            displacement: of all nodes (2 m,) [m].
+        """
         self._nonlinear[0].x.array[:] = displacement
         return float(fem.assemble_scalar(self._energy))
 
@@ -197,7 +215,11 @@ class Forms:
         return found
 
     def resultants(self, displacement: Array) -> Array:
-        """N, V, M of every joint, integrated from the tractions (n_joints, 3) [N, N, N m]."""
+        """Return N, V, M of every joint, integrated from the tractions (n_joints, 3) [N, N, N m].
+
+        Args:
+            displacement: of all nodes (2 m,) [m].
+        """
         self._nonlinear[0].x.array[:] = displacement
         return np.array([[fem.assemble_scalar(f) for f in joint] for joint in self._resultants])
 

@@ -48,6 +48,13 @@ class Mesh:
 def mesh(structure: Structure, asked: Discretisation | None = None) -> Mesh:
     """Mesh a structure.
 
+    Args:
+        structure: what to mesh.
+        asked: number and kind of cells; by default the usual ones.
+
+    Returns:
+        The mesh.
+
     Raises:
         MeshError: the blocks cannot be cut conformingly as asked.
     """
@@ -57,7 +64,16 @@ def mesh(structure: Structure, asked: Discretisation | None = None) -> Mesh:
 
 
 def write_mesh(structure: Structure, path: str | Path, asked: Discretisation | None = None) -> None:
-    """Mesh a structure and write a gmsh file (.msh) with named physical groups."""
+    """Mesh a structure and write a gmsh file with named physical groups.
+
+    Args:
+        structure: what to mesh.
+        path: of the file, *.msh.
+        asked: number and kind of cells; by default the usual ones.
+
+    Raises:
+        MeshError: the blocks cannot be cut conformingly as asked.
+    """
     with _model(structure.name):
         _generate(structure, asked or Discretisation())
         gmsh.write(str(path))
@@ -65,6 +81,13 @@ def write_mesh(structure: Structure, path: str | Path, asked: Discretisation | N
 
 def read_mesh(structure: Structure, path: str | Path) -> Mesh:
     """Read the mesh of a structure from a gmsh file with the same groups as `write_mesh` makes.
+
+    Args:
+        structure: what was meshed.
+        path: of the file.
+
+    Returns:
+        The mesh.
 
     Raises:
         InvalidInput: there is no such file.

@@ -53,7 +53,12 @@ class BrokenSpace:
 
 
 def broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
-    """Build the space of continuous displacements in each block."""
+    """Return the space of displacements that are continuous in each block.
+
+    Args:
+        mesh: conforming, of all blocks.
+        degree: of the polynomials, 1 or 2.
+    """
     whole = _fenicsx.space(mesh.grid, "CG", degree, 2)
     old = _fenicsx.cell_dofs(whole)
     count = int(old.max()) + 1
@@ -66,10 +71,14 @@ def broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
 
 
 def joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
-    """Opening and slip at the joint points in terms of the free nodal displacements.
+    """Return opening and slip at the joint points in terms of the free nodal displacements.
 
     Rows come from one-dimensional Lagrange polynomials on the facets, which are the trace of the
     elements, so entries are exact and only nodes on the joint appear.
+
+    Args:
+        space: broken across the joints.
+        rule: quadrature on each facet of a joint.
     """
     structure = space.mesh.structure
     sides = _joint_nodes(space)

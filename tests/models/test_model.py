@@ -1,0 +1,35 @@
+"""The waist: what every rung answers, and what is no model."""
+
+from types import SimpleNamespace
+
+import pytest
+
+import archfem as af
+from archfem.models.model import Model, Prediction, check_model
+
+
+@pytest.fixture(params=["rigid", "faces", "condensed", "full", "monolithic"])
+def model(request, stack):
+    return af.build(stack, fidelity=request.param, cells=(2, 2))
+
+
+def test_every_rung_answers_all_that_a_model_answers(model):
+    check_model(model)
+    assert isinstance(model, Model)
+
+
+def test_copies_leave_the_model_as_it_was(model):
+    promise = Prediction(error=0.01, tolerance=0.02, dt=0.005, considered=())
+    assert model.predicted(promise).prediction is promise
+    down = af.Settlement("base", (0.0, -0.1, 0.0))
+    twice = model.settled(down).settled(down)
+    assert twice.supports[0].tolist() == [0.0, -0.2, 0.0]
+    assert model.prediction is None
+    assert not model.supports.any()
+
+
+@pytest.mark.parametrize("given", [None, SimpleNamespace(tangent=None, supports=None)])
+def test_what_is_no_model_is_refused(stack, given):
+    for each in (given, stack):
+        with pytest.raises(af.InvalidInput, match=f"model is a {type(each).__name__}: build one"):
+            check_model(each)

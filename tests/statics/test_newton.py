@@ -1,0 +1,33 @@
+"""Newton's method: what it finds, and what it hands on to PETSc."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import archfem as af
+from archfem.statics.newton import Newton, Solver
+
+
+def test_a_kink_is_solved_exactly():
+    """k <x>_- = -1 from an open start: one step back to closed, one onto the answer."""
+    matrices = {closed: sparse.csr_matrix([[2.0 if closed else 1e-3]]) for closed in (True, False)}
+    solver = Solver(1)
+    solved = solver.solve(
+        lambda x: np.where(x < 0.0, 2.0, 1e-3) * x + 1.0,
+        lambda x: matrices[bool(x[0] < 0.0)],
+        np.array([5.0]),
+        1.0,
+    )
+    assert solved.q[0] == pytest.approx(-0.5, rel=1e-12)
+    assert solved.residual <= 1e-10
+
+
+def test_petsc_options_are_passed_on_and_removed(ring):
+    from petsc4py import PETSc
+
+    before = dict(PETSc.Options().getAll())
+    model = af.build(ring, fidelity="rigid")
+    default = af.dead_load(model)
+    other = af.dead_load(model, Newton(petsc={"pc_type": "svd"}))
+    assert other.q == pytest.approx(default.q, rel=1e-9, abs=1e-15)
+    assert dict(PETSc.Options().getAll()) == before

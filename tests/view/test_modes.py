@@ -1,0 +1,43 @@
+"""Pictures and films of modes."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.modes import FRAMES, REACH, animate_modes, draw_modes
+
+
+def drawn(axes):
+    """Corners of the blocks that move, as drawn."""
+    return [path.vertices[:-1] for path in axes.collections[-1].get_paths()]
+
+
+def test_picture_of_shapes(ring_model):
+    found = af.modes(ring_model, 3)
+    axes = draw_modes(found, [1, 3]).axes
+    assert axes[0].get_title() == "mode 1: 8.08 Hz, 72 % of the mass along x, 0 % along y"
+    assert axes[1].get_title().startswith("mode 3: 27.75 Hz")
+    blocks = drawn(axes[0])
+    assert len(blocks) == 17
+    cells, size = ring_model.cells, ring_model.structure.size
+    moves = cells.displacement(found.shapes[:, 0])
+    moved = cells.places + REACH * size * moves / np.linalg.norm(moves, axis=1).max()
+    for corner in np.concatenate(blocks):
+        assert np.linalg.norm(moved - corner, axis=1).min() < 1e-9 * size
+    for numbers in ([], [0], [4]):
+        with pytest.raises(af.InvalidInput, match="cannot be drawn: there are 1 to 3"):
+            draw_modes(found, numbers)
+
+
+def test_film_of_shapes(tmp_path):
+    import imageio.v2 as imageio
+
+    model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
+    path = animate_modes(af.modes(model, 2), tmp_path / "film.gif", [1])
+    frames = imageio.mimread(path)
+    assert len(frames) == FRAMES
+    moved = [np.mean(frames[0] != frame) for frame in frames]
+    assert moved[FRAMES // 4] > 0.005  # at the end of its swing
+    assert moved[FRAMES // 2] < 0.2 * moved[FRAMES // 4]  # back at rest
+    with pytest.raises(af.InvalidInput, match=r"film\.avi has suffix"):
+        animate_modes(af.modes(model, 2), tmp_path / "film.avi")

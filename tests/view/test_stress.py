@@ -1,0 +1,52 @@
+"""Maps of stress in the blocks."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.stress import draw_stress
+
+
+@pytest.fixture(scope="module")
+def dead(ring_model):
+    return af.dead_load(ring_model)
+
+
+def named(figure, name):
+    """The one thing of a figure that is called so."""
+    found = figure.findobj(lambda artist: artist.get_gid() == name)
+    return found[0] if found else None
+
+
+def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_model, dead):
+    figure = draw_stress(ring_model, dead.q)
+    shown = named(figure, "compression").get_array() * af.units.MPa
+    assert shown.max() == pytest.approx(
+        float(af.statics.strength_use(ring_model, dead.q)["compression"].max())
+    )
+    assert shown.min() >= 0.0
+    bar = figure.axes[0].child_axes[0]
+    assert bar.get_ylabel() == "largest compression [MPa]"
+    assert named(figure, "thrust").get_xydata().shape == (18, 2)
+    crosses = figure.axes[0].findobj(lambda artist: artist.get_label() == "compression")[0]
+    directions = np.diff(np.array(crosses.get_segments()), axis=1)[:, 0]
+    middles = np.array(crosses.get_segments()).mean(axis=1)
+    radial = np.abs(np.sum(directions * middles, axis=1))
+    apart = np.linalg.norm(directions, axis=1) * np.linalg.norm(middles, axis=1)
+    assert np.median(radial / apart) < 0.2  # compression follows the ring
+
+
+def test_the_map_of_one_part_has_its_own_scale():
+    """Soil is left out unless it is asked for; there stresses are kPa."""
+    bridge = af.Case.read(Path(__file__).parents[2] / "meshes" / "prusias.toml").structure
+    model = af.build(bridge, fidelity="full")
+    q = af.dead_load(model).q
+    labels = [
+        draw_stress(model, q, parts=parts).axes[0].child_axes[0].get_ylabel()
+        for parts in (None, ["backfill"])
+    ]
+    assert labels == ["largest compression [MPa]", "largest compression [kPa]"]
+    with pytest.raises(af.InvalidInput, match=r"parts \['deck'\] cannot be shaded: .*'backfill'"):
+        draw_stress(model, q, parts=["deck"])
