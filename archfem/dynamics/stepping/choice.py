@@ -131,7 +131,7 @@ def _fastest(
 ) -> Strategy | None:
     """Time those that apply, but for those whose set-up alone would take too much of the run."""
     times = start.time + dt * np.arange(1, round((equation.motion.duration - start.time) / dt) + 1)
-    peak = int(np.argmax(np.linalg.norm(equation.motion.at(times), axis=1)))
+    peak = int(np.linalg.norm(equation.motion.at(times), axis=1).argmax())
     first = min(max(peak, LEAD), len(times) - TIMED)
     before, timed = times[first - LEAD : first], times[first : first + TIMED]
     fastest, least, state = None, np.inf, None

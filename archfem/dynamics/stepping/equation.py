@@ -44,13 +44,13 @@ class Equation:
     damping: Rayleigh | None = None
     scheme: Scheme = field(default_factory=Newmark)
 
-    @property
+    @cached_property
     def lag(self) -> float:
         """β of damping that follows the joints [s]."""
         damping = self.damping
         return damping.stiffness if damping and damping.joints == "closed" else 0.0
 
-    @property
+    @cached_property
     def drag(self) -> float:
         """α of damping by mass [1/s]."""
         return self.damping.mass if self.damping else 0.0

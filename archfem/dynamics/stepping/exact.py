@@ -38,7 +38,7 @@ class Exact:
         self._attempts = attempts or self.attempt
         self._scale = magnitude(equation.weight)
         self._solver = Solver(equation.model.size, newton)
-        self._step: tuple[float, sparse.csr_matrix] | None = None
+        self._step: tuple[float, Numbers, sparse.csr_matrix] | None = None
         self._kept: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix] | None = None
 
     def steps(self, start: State, dt: float, end: float) -> Iterator[Step]:
@@ -78,32 +78,37 @@ class Exact:
         Raises:
             DidNotConverge: there was no equilibrium to be found.
         """
-        equation, numbers = self.equation, self.equation.numbers(dt)
+        equation, (numbers, linear) = self.equation, self._prepared(dt)
         load = equation.load(state.time + numbers.share * dt)
-        linear = self._linear(dt, numbers)
+        before = np.stack([state.q, state.velocity, state.acceleration])
+        unmoved = numbers.velocity[0] @ before, numbers.acceleration[0] @ before
+
+        def end(q: Array) -> State:
+            moved = q - state.q
+            velocity = numbers.velocity[1] * moved + unmoved[0]
+            return State(state.time + dt, q, velocity, numbers.acceleration[1] * moved + unmoved[1])
 
         def unbalanced(q: Array) -> Array:
-            now = _written(state, q, numbers)
+            now = _written(state, end(q), numbers.share)
             moving = equation.model.mass @ now.acceleration + equation.viscous @ now.velocity
             return np.asarray(moving + equation.model.force(equation.contact(now)) - load)
 
         def tangent(q: Array) -> sparse.csr_matrix:
-            contact = equation.contact(_written(state, q, numbers))
+            contact = equation.contact(_written(state, end(q), numbers.share))
             return self._tangent(contact, linear, numbers.gain)
 
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
         solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
-        end = _end(state, solved.q, numbers)
-        return replace(end, time=state.time + dt), solved.iterations
+        return end(solved.q), solved.iterations
 
-    def _linear(self, dt: float, numbers: Numbers) -> sparse.csr_matrix:
-        """μ M + ν R; the same object as before while the step stays."""
+    def _prepared(self, dt: float) -> tuple[Numbers, sparse.csr_matrix]:
+        """Numbers of a step, and μ M + ν R; the same objects as before while the step stays."""
         if self._step is None or abs(self._step[0] - dt) > 1e-9 * dt:
-            matrix = self.equation.rest.copy()
+            numbers, matrix = self.equation.numbers(dt), self.equation.rest.copy()
             mass = self.equation.model.mass.data
             matrix.data = numbers.inertia * mass + numbers.rate * matrix.data
-            self._step = (dt, matrix)
-        return self._step[1]
+            self._step = (dt, numbers, matrix)
+        return self._step[1:]
 
     def _tangent(self, contact: Array, linear: sparse.csr_matrix, gain: float) -> sparse.csr_matrix:
         """Tangent of a step; the same object as before while stiffness and step stay."""
@@ -135,18 +140,10 @@ class Exact:
         return Step(new, self.equation.contact(new), iterations, dt, energy)
 
 
-def _end(start: State, q: Array, numbers: Numbers) -> State:
-    """State after a step to these displacements, by Newmark's formulas."""
-    before = np.stack([start.q, start.velocity, start.acceleration])
-    rates = (numbers.velocity, numbers.acceleration)
-    return State(start.time, q, *(change * (q - start.q) + each @ before for each, change in rates))
-
-
-def _written(start: State, q: Array, numbers: Numbers) -> State:
+def _written(start: State, end: State, share: float) -> State:
     """State where the equation of a step is written, but with the acceleration at its end."""
-    end, share = _end(start, q, numbers), numbers.share
     between = start.velocity + share * (end.velocity - start.velocity)
-    return replace(end, q=start.q + share * (q - start.q), velocity=between)
+    return replace(end, q=start.q + share * (end.q - start.q), velocity=between)
 
 
 def _given(state: State, _: int) -> State:
