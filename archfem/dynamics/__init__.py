@@ -7,6 +7,7 @@
     stepping      the one stepper and its strategies
     energy        the energy balance of a run
     guard         doubts about a run while it goes on
+    glance        a quick look at joints at every step
     events        what ends a run: enough failed joints, or blocks that can move
     recorder      what a run leaves behind
     history       the record of a run, and its file

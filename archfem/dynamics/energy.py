@@ -72,6 +72,10 @@ class Meter:
 class Balance:
     """Sums the energies of a run.
 
+    Args:
+        kinetic: energy at the start [J].
+        potential: energy at the start, that of the weight included [J].
+
     Attributes:
         drift: energy that came from nowhere, or went nowhere, since the start [J].
         gain: of mechanical energy beyond the work of the ground, which cannot be positive [J].
@@ -86,11 +90,18 @@ class Balance:
         self.largest = max(kinetic, STILL * abs(potential), 1e-300)
 
     def add(self, steps: Array) -> Array:
-        """Go on by some steps, with the rows that `Meter.step` gives; the drift after each [J]."""
+        """Go on by some steps.
+
+        Args:
+            steps: their energies, a row a step, as by `Meter.step` (steps, 4) [J].
+
+        Returns:
+            The drift after each step (steps,) [J].
+        """
         kinetic, potential, work, lost = steps.T
         change = kinetic + potential - self._stored
         works, losses = self._work + np.cumsum(work), self._lost + np.cumsum(lost)
-        drift = change - works + losses
+        drift: Array = change - works + losses
         self._work, self._lost = works[-1], losses[-1]
         self.drift, self.gain = float(drift[-1]), float(change[-1] - works[-1])
         exchanged = [kinetic, np.abs(change), np.abs(works), np.full(1, self.largest)]

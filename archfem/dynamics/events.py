@@ -4,17 +4,17 @@ An event says what to look for. Each run has a fresh watch of its own made by it
 serves any number of runs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import InitVar, dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import xarray as xr
 
 from archfem.arrays import Array
+from archfem.dynamics.glance import Glance
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, chosen, failing
-from archfem.joints.resultants import joint_dataset, ratios
+from archfem.joints.criteria import Criteria, chosen
+from archfem.joints.resultants import joint_dataset
 from archfem.limit.counted import KINDS, counted_mechanism, counted_mechanisms
 from archfem.limit.verified import Verifier
 from archfem.masonry.structure import Structure
@@ -36,7 +36,12 @@ class Event(Protocol):
         """What makes a joint fail, or None for those of the run."""
 
     def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Begin to watch a run of a structure, by its criteria."""
+        """Return a fresh watch over one run.
+
+        Args:
+            structure: that moves.
+            criteria: of the run.
+        """
 
 
 Until = Event | Callable[[Structure, Array], str | None]
@@ -75,9 +80,14 @@ class CountedMechanism:
         _check_kinds(self.kinds)
 
     def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Begin to watch: words that say which joints have failed, or None."""
+        """Return a fresh watch, whose words say which joints have failed.
+
+        Args:
+            structure: that moves.
+            criteria: of the run.
+        """
         verifier = Verifier(structure)
-        glance = _Glance(structure, criteria, np.flatnonzero(structure.judged).tolist())
+        glance = Glance(structure, criteria, np.flatnonzero(structure.judged).tolist())
 
         def look(resultants: Array) -> str | None:
             joints = glance(resultants, criteria.failures)
@@ -120,9 +130,14 @@ class MovingMechanism:
         _check_kinds(self.kinds)
 
     def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Begin to watch: words that say which joints permit which motion, or None."""
+        """Return a fresh watch, whose words say which joints permit which motion.
+
+        Args:
+            structure: that moves.
+            criteria: of the run.
+        """
         verifier = Verifier(structure)
-        glance = _Glance(structure, criteria, verifier.skeleton.joints)
+        glance = Glance(structure, criteria, verifier.skeleton.joints)
 
         def look(resultants: Array) -> str | None:
             joints = glance(resultants, 1)
@@ -160,10 +175,15 @@ class EveryMechanism:
         object.__setattr__(self, "criteria", own)
 
     def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Begin to watch: words that say that all have been met, or None."""
+        """Return a fresh watch, which remembers what has been met.
+
+        Args:
+            structure: that moves.
+            criteria: of the run.
+        """
         verifier = Verifier(structure)
         concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
-        glance = _Glance(structure, criteria, sorted(concerned))
+        glance = Glance(structure, criteria, sorted(concerned))
         wanted = {"verified", *possible_counts(structure, criteria)}
         met: set[str] = set()
 
@@ -202,7 +222,7 @@ def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
 
 
 def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
-    """A fresh watch over one run.
+    """Return a fresh watch over one run.
 
     Args:
         until: an event, or a function of structure and resultants.
@@ -223,7 +243,7 @@ def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
 
 
 def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:
-    """Definitions of `counted_mechanisms` that the structure has joints enough for.
+    """Return the definitions of `counted_mechanisms` that the structure has joints enough for.
 
     Args:
         structure: what may fail.
@@ -231,35 +251,6 @@ def possible_counts(structure: Structure, criteria: Criteria | None = None) -> t
     """
     apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
     return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
-
-
-class _Glance:
-    """A quick look at some joints of a structure at every step of a run.
-
-    Labels, which take long, are given only to states of joints that have not been seen before.
-    """
-
-    def __init__(self, structure: Structure, criteria: Criteria, numbers: Sequence[int]) -> None:
-        self._structure, self._criteria = structure, criteria
-        self._numbers = np.array(numbers, dtype=np.intp)
-        self._depth = structure.depths[self._numbers]
-        self._coefficients = criteria.coefficients(structure.friction[self._numbers])
-        self._seen: set[bytes] = set()
-
-    def __call__(self, resultants: Array, least: int) -> xr.Dataset | None:
-        """All joints, labelled, where so many of those looked at fail in a way not yet seen."""
-        own = resultants[self._numbers]
-        e, friction = ratios(own, self._depth)
-        hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
-        apart = own[:, 0] <= 0.0
-        if np.count_nonzero(hinges | slides | apart) < least:
-            return None
-        senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)
-        key = np.stack([*senses, slides, apart]).astype(np.int8).tobytes()
-        if key in self._seen:
-            return None
-        self._seen.add(key)
-        return joint_dataset(self._structure, resultants, criteria=self._criteria)
 
 
 def _check_kinds(kinds: Any) -> None:

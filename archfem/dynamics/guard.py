@@ -46,7 +46,14 @@ class Guard:
         self._told: set[str] = set()
 
     def add(self, batch: Batch) -> Array:
-        """Look at the next steps; the drift of energy after each (steps,) [J]."""
+        """Look at the next steps.
+
+        Args:
+            batch: steps that follow those seen so far; the first is the start, alone.
+
+        Returns:
+            The drift of energy after each step (steps,) [J].
+        """
         drift = self._balance.add(batch.energy)
         fraction = self._balance.fraction
         if not abs(fraction) <= abs(self.worst):

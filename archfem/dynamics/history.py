@@ -5,10 +5,10 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
-from archfem.errors import InvalidInput
+from archfem.arrays import Array
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import one_joint
@@ -74,7 +74,7 @@ class History:
         return Criteria.of(self.dataset)
 
     def judged_by(self, criteria: Criteria) -> "History":
-        """The same run, judged by other criteria.
+        """Return the same run, judged by other criteria.
 
         Args:
             criteria: instead of its own. What ended the run stays as it was.
@@ -82,7 +82,7 @@ class History:
         return History(flagged(self.dataset, criteria), self.structure)
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> Array:
         """Times of the recorded steps (steps,) [s]."""
         return self.dataset["time"].values
 
@@ -129,7 +129,7 @@ class History:
         return first_verified_mechanism(self.structure, self.joints)
 
     def joint(self, joint: str | int) -> xr.Dataset:
-        """What one joint did over time.
+        """Return what one joint did over time.
 
         Args:
             joint: name or number.
@@ -144,6 +144,9 @@ class History:
 
         Args:
             path: the file; folders are made.
+
+        Returns:
+            The file.
         """
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
         with in_one_stroke(Path(path)) as draft:
@@ -152,7 +155,7 @@ class History:
 
     @classmethod
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
-        """Read a file written by `save`; one of an earlier version is judged by the usual criteria.
+        """Return what `save` wrote; an earlier version's file is judged by the usual criteria.
 
         Args:
             path: the file.
@@ -188,3 +191,17 @@ class History:
                 "versions do not: give the structure that was shaken too"
             )
         return cls(flagged(dataset), structure)
+
+
+def history_of(error: DidNotConverge) -> History:
+    """Return the history up to a failure.
+
+    Args:
+        error: of a time history.
+
+    Raises:
+        DidNotConverge: that error, where it has no history: no step was recorded.
+    """
+    if not isinstance(error.history, History):
+        raise error
+    return error.history

@@ -101,7 +101,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
     damping: Damping = None,
     dt: float | None = None,
 ) -> Model:
-    """Build a model of a structure, on a rung that is named or chosen.
+    """Return a model of a structure, on a rung that is named or chosen.
 
     Args:
         structure: what stands.
@@ -151,7 +151,7 @@ def choose(
     *,
     builder: Builder = plain.build,
 ) -> Model:
-    """Find the cheapest model, and time step, whose predicted error is within a tolerance.
+    """Return the cheapest model, and time step, whose predicted error is within a tolerance.
 
     Where none is, the best is given, and a warning says so.
 
@@ -162,6 +162,9 @@ def choose(
         damping: of the run to come, or a function that finds it of the finest model.
         dt: time step of the run to come [s]; without it the step is chosen too.
         builder: makes the models.
+
+    Raises:
+        DidNotConverge: the finest model failed.
     """
     yardstick = _yardstick(structure, motion, damping, builder, finer=0.5 if dt is None else 1.0)
     considered: list[tuple[Setting, float, Model]] = []
@@ -231,7 +234,12 @@ def _yardstick(
 
 
 def damping_for(model: Model, damping: Damping) -> Rayleigh | None:
-    """Damping of a run, asked of the finest model where it is yet to be found."""
+    """Return the damping of a run, asked of a model where it is yet to be found.
+
+    Args:
+        model: the finest.
+        damping: or a function that finds it of a model; None is undamped.
+    """
     return damping(model) if callable(damping) else damping
 
 
@@ -243,7 +251,7 @@ def _exact(structure: Structure, rung: str, cells: tuple[int, int]) -> Discretis
 
 
 def _candidates(structure: Structure, steps: tuple[float, ...]) -> Iterator[Setting]:
-    """Settings to try, the cheapest first; without soil, small enough for the contact stepper."""
+    """Settings to try, the cheapest first; without soil, with modes few enough to keep all."""
     soil = bool(soft_blocks(structure))
     rungs = CANDIDATES[1:] if soil else CANDIDATES
     for dt in steps:
@@ -254,9 +262,12 @@ def _candidates(structure: Structure, steps: tuple[float, ...]) -> Iterator[Sett
 
 
 def finest(structure: Structure) -> Setting:
-    """The model against which errors are measured, with half the smallest step.
+    """Return the model against which errors are measured, with half the smallest step.
 
-    Without soil the finest that the contact stepper still takes.
+    Without soil it is the finest whose modes are still few enough to keep all.
+
+    Args:
+        structure: what stands.
     """
     small = (each for each in REFERENCE if _size(structure, *each) <= LARGEST)
     rung, cells = WITH_SOIL if soft_blocks(structure) else next(small, REFERENCE[-1])

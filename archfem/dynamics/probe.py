@@ -21,14 +21,22 @@ SEVERE = 0.40
 
 
 def strongest(motion: Motion) -> Motion:
-    """The part of a motion around its peak."""
+    """Return the part of a motion around its horizontal peak, eight seconds long at most.
+
+    Args:
+        motion: of the ground.
+    """
     peak = float(motion.times()[np.argmax(np.abs(motion.horizontal))])
     start = max(0.0, min(peak - WINDOW / 2.0, motion.duration - WINDOW))
     return motion.cut(start, min(start + WINDOW, motion.duration))
 
 
 def severe_motion(model: Model) -> Motion:
-    """A synthetic motion whose peak, acting statically, brings |e| to a severe value."""
+    """Return a synthetic motion whose peak, acting statically, brings |e| to 0.4.
+
+    Args:
+        model: any rung of the ladder; its judged joints tell.
+    """
     weight, low, high = self_weight(model), 0.0, 2.0
     for _ in range(10):
         middle = 0.5 * (low + high)
@@ -43,7 +51,11 @@ def severe_motion(model: Model) -> Motion:
 
 
 def usual_damping(model: Model) -> Rayleigh:
-    """Five per cent at the first closed frequency and at three times that."""
+    """Return five per cent at the first closed frequency and at three times that.
+
+    Args:
+        model: any rung of the ladder.
+    """
     square = eigsh(
         model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
     )[0]
@@ -52,7 +64,7 @@ def usual_damping(model: Model) -> Rayleigh:
 
 
 def peaks(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
-    """Largest |e| of each joint that is judged over a run (n,); 0.5 where it came apart.
+    """Return the largest |e| of each judged joint over a run (n,) [-]; 0.5 where it came apart.
 
     Args:
         model: any rung of the ladder.
@@ -68,5 +80,10 @@ def peaks(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> 
 
 
 def largest_difference(first: Array, second: Array) -> float:
-    """Error in eccentricity: the largest difference of two runs' peaks over the joints."""
+    """Return the largest difference, over the joints, of two runs' peaks [-].
+
+    Args:
+        first: as given by `peaks` (n,) [-].
+        second: the same of another model of the same structure (n,) [-].
+    """
     return float(np.abs(first - second).max())

@@ -1,9 +1,12 @@
 """What a run leaves behind: records of its steps, the effort they took, and its energy balance."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from archfem.arrays import Array
 from archfem.dynamics.guard import Guard
@@ -21,111 +24,156 @@ _EFFORT = {
 }
 
 
-@dataclass
+class Rows:
+    """Rows of one array, made at once as long as it may become, and filled step by step.
+
+    Args:
+        most: rows that there can be.
+        shape: of each row.
+        kind: of the numbers.
+    """
+
+    def __init__(self, most: int, shape: tuple[int, ...] = (), kind: type = float) -> None:
+        self._array: NDArray[Any] = np.empty((most, *shape), kind)
+        self.count = 0
+
+    def add(self, rows: NDArray[Any]) -> None:
+        """Fill the next rows.
+
+        Args:
+            rows: (some, …), with the shape of the others.
+        """
+        self._array[self.count : self.count + len(rows)] = rows
+        self.count += len(rows)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The rows filled so far (count, …)."""
+        return self._array[: self.count]
+
+
+@dataclass(kw_only=True)
 class Recorder:
-    """What has been recorded so far.
+    """What has been recorded so far, from the start of a run.
 
     Attributes:
         model: that moves.
         method: name of its stepper.
         dt: time step that was asked for [s].
+        steps: most that the run can take, its start not counted.
         every: the joints' resultants are kept at every n-th step.
         fields_every: coordinates are kept at every n-th step; None keeps none.
         criteria: by which joints are judged.
         guard: watches over what is recorded.
-        halved: steps that had to be halved.
-        fallback: steps that a compiled stepper left to SNES.
+        state: at the end of the steps added last.
+        fallback: steps that a strategy left to SNES.
     """
 
     model: Model
     method: str
     dt: float
+    steps: int
     every: int
     fields_every: int | None
     criteria: Criteria
     guard: Guard
-    times: list[float] = field(default_factory=list)
-    resultants: list[Array] = field(default_factory=list)
-    effort: list[tuple[int, float, float]] = field(default_factory=list)
-    frames: list[float] = field(default_factory=list)
-    fields: list[Array] = field(default_factory=list)
-    halved: int = 0
+    state: State
     fallback: int = 0
-    _iterations: int = 0
-    _smallest: float = np.inf
 
-    def add(self, first: int, batch: Batch, *, last: bool = False) -> None:
-        """Keep of a batch, whose steps count from `first`, what was asked for.
+    def __post_init__(self) -> None:
+        most, frames = self.steps + 1, self.steps // (self.fields_every or self.steps + 1) + 1
+        records = self.steps // self.every + 2  # the start, and a last one that an event asks for
+        self._iterations = Rows(most, kind=np.int64)
+        self._smallest, self._drift = Rows(most), Rows(most)
+        self._numbers, self._times = Rows(records, kind=np.intp), Rows(records)
+        self._resultants = Rows(records, (len(self.model.structure.joints), 3))
+        self._frames, self._fields = Rows(frames), Rows(frames, (self.model.size,))
+
+    def add(self, batch: Batch, *, last: bool = False) -> None:
+        """Keep of a batch what was asked for.
 
         Args:
-            first: number of its first step.
-            batch: steps that follow those kept so far.
+            batch: steps that follow those kept so far; the first is the start, alone.
             last: whether an event ends the run with it; its last resultants are then kept anyhow,
                 since they are what ended it.
 
         Raises:
             DidNotConverge: the guard is certain that what was kept is wrong.
         """
+        self.state = batch.state(len(batch.times) - 1)
         drift = self.guard.add(batch)
-        self.halved += int(np.sum(batch.smallest < 0.75 * self.dt))
+        numbers = self._drift.count + np.arange(len(batch.times))
+        kept = numbers % self.every == 0
+        kept[-1] |= last
+        for rows, values in (  # Ctrl-C may come between any two: what is filled last counts
+            (self._iterations, batch.iterations),
+            (self._smallest, batch.smallest),
+            (self._drift, drift),
+            (self._numbers, numbers[kept]),
+            (self._times, batch.times[kept]),
+            (self._resultants, batch.resultants[kept]),
+        ):
+            rows.add(values)
         self.fallback += batch.fallback * len(batch.times)
-        for k, number in enumerate(range(first, first + len(batch.times))):
-            self._iterations += int(batch.iterations[k])
-            self._smallest = min(self._smallest, float(batch.smallest[k]))
-            if number % self.every == 0 or (last and k == len(batch.times) - 1):
-                self.times.append(batch.times[k])
-                self.resultants.append(batch.resultants[k])
-                self.effort.append((self._iterations, self._smallest, float(drift[k])))
-                self._iterations, self._smallest = 0, np.inf
-            if self.fields_every and number % self.fields_every == 0:
-                self.frames.append(batch.times[k])
-                self.fields.append(batch.state(k).q)
+        if self.fields_every:
+            for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
+                q = batch.state(k).q
+                self._frames.add(batch.times[k : k + 1])
+                self._fields.add(q[None])
         self.guard.judge()
 
-    def history(self, motion: Motion, state: State, ended: Ending, outcome: str) -> History:
-        """Everything as one dataset.
+    def history(self, motion: Motion, ended: Ending, outcome: str) -> History:
+        """Return everything as one dataset.
 
         Args:
             motion: of the ground.
-            state: in which the run ended.
-            ended: how it did.
+            ended: how the run ended.
             outcome: the same in words.
         """
-        times, resultants = np.array(self.times), np.array(self.resultants)
-        dataset = joint_dataset(self.model.structure, resultants, times, self.criteria)
-        ground = motion.at(times)
-        dataset["ground"] = (
-            ("time", "axis"),
-            ground,
-            {"units": "m/s2", "long_name": "acceleration of the ground"},
-        )
+        structure, resultants = self.model.structure, self._resultants.values
+        times = self._times.values[: len(resultants)]
+        dataset = joint_dataset(structure, resultants, times, self.criteria)
+        about = {"units": "m/s2", "long_name": "acceleration of the ground"}
+        dataset["ground"] = ("time", "axis"), motion.at(times), about
         dataset.coords["axis"] = ["x", "y"]
-        for (name, about), values in zip(
-            _EFFORT.items(), zip(*self.effort, strict=True), strict=True
-        ):
-            dataset[name] = ("time", np.array(values), about)
-        if self.fields:
-            dataset.coords["frame_time"] = ("frame", self.frames, {"units": "s"})
-            dataset["q"] = (("frame", "coordinate"), np.array(self.fields))
-        for name in ("q", "velocity", "acceleration"):
-            dataset[f"last_{name}"] = ("coordinate", getattr(state, name))
+        for (name, words), values in zip(_EFFORT.items(), self._effort(), strict=True):
+            dataset[name] = "time", values, words
+        self._add_coordinates(dataset)
         dataset.attrs |= {
-            "title": f"time history of {self.model.structure.name} under {motion.name or 'motion'}",
+            "title": f"time history of {structure.name} under {motion.name or 'motion'}",
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,
             "method": self.method,
-            "last_time": state.time,
+            "last_time": self.state.time,
             "energy_drift": self.guard.worst,
             "largest_displacement": self.guard.largest_displacement,
-            "halved_steps": self.halved,
+            "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)),
             "fallback_steps": self.fallback,
             "signs": SIGNS,
             "versions": versions(),
         }
         if self.model.prediction:
             dataset.attrs["predicted_error"] = self.model.prediction.error
-        return History(dataset, self.model.structure)
+        return History(dataset, structure)
+
+    def _effort(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Iterations and smallest step since the record before, and drift, at each record."""
+        ends = self._numbers.values[: self._resultants.count]
+        starts, recorded = np.append(0, ends[:-1] + 1), ends[-1] + 1
+        return (
+            np.add.reduceat(self._iterations.values[:recorded], starts),
+            np.minimum.reduceat(self._smallest.values[:recorded], starts),
+            self._drift.values[ends],
+        )
+
+    def _add_coordinates(self, dataset: xr.Dataset) -> None:
+        """Add the coordinates that were kept, and the state in which the run ended."""
+        if frames := self._fields.count:
+            dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
+            dataset["q"] = ("frame", "coordinate"), self._fields.values
+        for name in ("q", "velocity", "acceleration"):
+            dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
 
 
 def versions() -> str:

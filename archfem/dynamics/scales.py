@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem.dynamics.events import EveryMechanism, possible_counts
-from archfem.dynamics.history import Ending
+from archfem.dynamics.history import Ending, history_of
 from archfem.dynamics.schemes import Rayleigh
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
@@ -58,11 +58,19 @@ class ScaledRun:
         return self.ended is Ending.FAILED
 
     def fails(self, definition: str) -> bool:
-        """Whether a mechanism was met, or the run broke off."""
+        """Return whether a mechanism was met, or the run broke off.
+
+        Args:
+            definition: of a mechanism, one of `DEFINITIONS`.
+        """
         return self.found[definition] is not None or self.broken
 
     def survives(self, definition: str) -> bool:
-        """Whether the whole motion passed without a mechanism."""
+        """Return whether the whole motion passed without a mechanism.
+
+        Args:
+            definition: of a mechanism, one of `DEFINITIONS`.
+        """
         return not self.fails(definition) and not self.interrupted
 
 
@@ -75,13 +83,13 @@ class Bracket:
     Attributes:
         lower: largest scale below `upper` found to survive [-]; 0 where none is.
         upper: smallest scale found to fail [-]; infinite where none is.
-        trial: the run at `upper`, or None.
+        run: that at `upper`, or None.
         above: scales beyond `upper` that survived all the same.
     """
 
     lower: float
     upper: float
-    trial: ScaledRun | None
+    run: ScaledRun | None
     above: tuple[float, ...]
 
     @property
@@ -96,25 +104,29 @@ class MechanismScales:
 
     Attributes:
         asked: definitions that the structure has joints for.
-        trials: all runs, in order of their scales.
+        runs: all that were made, in order of their scales.
         interrupted: whether Ctrl-C ended the search.
     """
 
     asked: tuple[str, ...]
-    trials: tuple[ScaledRun, ...] = ()
+    runs: tuple[ScaledRun, ...] = ()
     interrupted: bool = False
 
-    def with_(self, trial: ScaledRun) -> "MechanismScales":
-        """These and one run more."""
-        trials = sorted([*self.trials, trial], key=lambda each: each.scale)
-        return MechanismScales(self.asked, tuple(trials))
+    def with_run(self, run: ScaledRun) -> "MechanismScales":
+        """Return these and one run more.
+
+        Args:
+            run: at a scale not yet tried.
+        """
+        runs = sorted([*self.runs, run], key=lambda each: each.scale)
+        return MechanismScales(self.asked, tuple(runs), run.interrupted)
 
     def __getitem__(self, definition: str) -> Bracket:
         """The bracket of one of `DEFINITIONS`; without bounds where it was not asked for."""
         if definition not in self.asked:
             return Bracket(0.0, inf, None, ())
-        failing = [trial for trial in self.trials if trial.fails(definition)]
-        surviving = [trial.scale for trial in self.trials if trial.survives(definition)]
+        failing = [run for run in self.runs if run.fails(definition)]
+        surviving = [run.scale for run in self.runs if run.survives(definition)]
         upper = failing[0].scale if failing else inf
         return Bracket(
             max((scale for scale in surviving if scale < upper), default=0.0),
@@ -130,10 +142,10 @@ class MechanismScales:
 
     def _row(self, definition: str) -> list[str]:
         bracket = self[definition]
-        found = bracket.trial.found[definition] if bracket.trial else None
+        found = bracket.run.found[definition] if bracket.run else None
         notes = []
-        if bracket.trial and found is None:
-            notes.append(bracket.trial.outcome)
+        if bracket.run and found is None:
+            notes.append(bracket.run.outcome)
         if definition not in self.asked:
             notes.append("has no such joints")
         if bracket.above:
@@ -141,7 +153,7 @@ class MechanismScales:
         return [
             definition,
             f"{bracket.lower:.3g}" if bracket.lower else "-",
-            f"{bracket.upper:.3g}" if bracket.trial else "-",
+            f"{bracket.upper:.3g}" if bracket.run else "-",
             found.kind if found else "-",
             f"{found.time:.3f} s" if found and found.time is not None else "-",
             found.part if found else "-",
@@ -197,7 +209,7 @@ def mechanism_scales(
     most = LARGEST_PEAK / peak if peak > 0.0 else inf  # no motion may be stronger
     least, largest = between
 
-    def trial(scale: float) -> ScaledRun:
+    def shaken(scale: float) -> ScaledRun:
         try:
             run = time_history(
                 model,
@@ -209,51 +221,56 @@ def mechanism_scales(
                 criteria=criteria,
             )
         except DidNotConverge as error:
-            if error.history is None:
-                raise
-            run = error.history
+            run = history_of(error)
         return ScaledRun(scale, first_mechanisms(run), run.ended, run.outcome)
 
     asked = (*possible_counts(model.structure, criteria), "verified")
-    return _searched(
-        MechanismScales(asked), trial, precision, (least, max(least, min(largest, most)))
-    )
+    return search(shaken, asked, precision, (least, max(least, min(largest, most))))
 
 
-def _searched(
-    found: MechanismScales,
-    trial: Callable[[float], ScaledRun],
+def search(
+    shaken: Callable[[float], ScaledRun],
+    asked: tuple[str, ...],
     precision: float,
     between: tuple[float, float],
 ) -> MechanismScales:
-    """Make trials until all brackets are narrow."""
+    """Make runs until all brackets are narrow, as `mechanism_scales` does.
+
+    Args:
+        shaken: makes the run at a scale.
+        asked: definitions to find brackets for, of `DEFINITIONS`.
+        precision: relative width of the last brackets [-].
+        between: least and largest scale tried [-].
+
+    Returns:
+        Brackets, mechanisms and runs; at most 40 runs are made.
+    """
+    found = MechanismScales(asked)
     try:
         with tqdm(unit="run", disable=None, leave=False, desc="scales") as bar:
             while (scale := _next(found, precision, between)) is not None:
                 bar.set_postfix_str(f"× {scale:.3g}")
-                made = trial(scale)
-                found = found.with_(made)
+                found = found.with_run(shaken(scale))
                 bar.update()
-                if made.interrupted:
-                    raise KeyboardInterrupt
     except KeyboardInterrupt:
-        logger.warning("interrupted after %d runs: what is known is kept", len(found.trials))
         found = replace(found, interrupted=True)
+    if found.interrupted:
+        logger.warning("interrupted after %d runs: what is known is kept", len(found.runs))
     return found
 
 
 def _next(found: MechanismScales, precision: float, between: tuple[float, float]) -> float | None:
     """The scale to try next, or None where nothing more is to be learnt."""
-    trials, (least, largest) = found.trials, between
-    if not trials:
+    runs, (least, largest) = found.runs, between
+    if not runs:
         return min(max(1.0, least), largest)
-    if len(trials) >= RUNS:
+    if len(runs) >= RUNS or found.interrupted:
         return None
     brackets = [found[definition] for definition in found.asked]
-    if trials[0].scale > least and any(bracket.lower == 0.0 for bracket in brackets):
-        return max(trials[0].scale / RUNG, least)
-    if trials[-1].scale < largest and any(bracket.trial is None for bracket in brackets):
-        return min(trials[-1].scale * RUNG, largest)
+    if runs[0].scale > least and any(bracket.lower == 0.0 for bracket in brackets):
+        return max(runs[0].scale / RUNG, least)
+    if runs[-1].scale < largest and any(bracket.run is None for bracket in brackets):
+        return min(runs[-1].scale * RUNG, largest)
     wide = [each for each in brackets if 1.0 + precision < each.ratio < inf]
     if not wide:
         return None

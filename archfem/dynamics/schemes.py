@@ -76,7 +76,11 @@ class EffectiveRayleigh:
             raise InvalidInput(f"share {self.share} of the mass is not between 0 and 1")
 
     def between(self, frequencies: tuple[float, float]) -> Rayleigh:
-        """The damping, once the two frequencies are known [Hz]."""
+        """Return the damping, once the frequencies are known.
+
+        Args:
+            frequencies: of the first and the last effective mode [Hz].
+        """
         return Rayleigh(self.ratio, frequencies, self.joints)
 
 

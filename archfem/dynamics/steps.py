@@ -49,7 +49,11 @@ class Batch:
     fallback: bool = False
 
     def cut(self, steps: int) -> "Batch":
-        """The first steps of the batch."""
+        """Return the first steps of the batch.
+
+        Args:
+            steps: how many.
+        """
         if steps == len(self.times):
             return self
         return replace(
@@ -81,7 +85,11 @@ class Step:
     energy: Array
 
     def after(self, first: "Step") -> "Step":
-        """This step as the second half of a longer one."""
+        """Return this step as the second half of a longer one.
+
+        Args:
+            first: its first half, whose effort, work and loss count too.
+        """
         return replace(
             self,
             iterations=first.iterations + self.iterations,

@@ -124,31 +124,18 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         start = equation.at_rest((start or dead_load(model, newton)).q)
     stepper = stepper_for(method, equation, start, dt, newton)
     first = _first(stepper, start, dt)
-    recorder = _recorder(stepper, first, dt, record or Record(), criteria)
-    taken, state = 0, start
-    ended, outcome = Ending.FINISHED, "reached the end of the motion"
+    recorder = _recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
     try:
-        recorder.add(0, first)
-        # Steps are too small for threads, which only get in each other's way.
-        with _bar(start, motion, dt) as bar, threadpool_limits(limits=1, user_api="blas"):
-            for batch in stepper.batches(start, dt, motion.duration):
-                reason, size = _reason(watch, batch)
-                batch = batch.cut(size)
-                state = batch.state(size - 1)
-                recorder.add(taken + 1, batch, last=reason is not None)
-                taken += size
-                bar.update(size)
-                if reason is not None:
-                    ended, outcome = Ending.EVENT, f"ended at {state.time:.4g} s by {reason}"
-                    break
+        recorder.add(first)
+        ended, outcome = _stepped(stepper, recorder, watch, motion.duration)
     except KeyboardInterrupt:
-        ended, outcome = Ending.INTERRUPTED, f"interrupted at {state.time:.4g} s"
+        ended, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
     except DidNotConverge as error:
-        words = f"failed at {state.time:.4g} s: {error}"
-        error.history = recorder.history(motion, state, Ending.FAILED, words)
+        words = f"failed at {recorder.state.time:.4g} s: {error}"
+        error.history = recorder.history(motion, Ending.FAILED, words)
         raise
-    return recorder.history(motion, state, ended, outcome)
+    return recorder.history(motion, ended, outcome)
 
 
 def _step(model: Model, dt: float | None) -> float:
@@ -181,15 +168,40 @@ def _first(stepper: Stepper, start: State, dt: float) -> Batch:
 
 
 def _recorder(
-    stepper: Stepper, first: Batch, dt: float, record: Record, criteria: Criteria
+    stepper: Stepper, first: Batch, dt: float, end: float, record: Record, criteria: Criteria
 ) -> Recorder:
-    """An empty recorder with a guard over it."""
-    model, kept = stepper.equation.model, (record.every, record.fields_every)
-    return Recorder(model, stepper.name, dt, *kept, criteria, Guard(model, first))
+    """A recorder of a run yet to begin, with a guard over it."""
+    model, start = stepper.equation.model, first.state(0)
+    return Recorder(
+        model=model,
+        method=stepper.name,
+        dt=dt,
+        steps=max(0, round((end - start.time) / dt)),
+        every=record.every,
+        fields_every=record.fields_every,
+        criteria=criteria,
+        guard=Guard(model, first),
+        state=start,
+    )
 
 
-def _bar(start: State, motion: Motion, dt: float) -> tqdm:
-    steps = max(0, round((motion.duration - start.time) / dt))
+def _stepped(
+    stepper: Stepper, recorder: Recorder, watch: Watch | None, end: float
+) -> tuple[Ending, str]:
+    """Record steps to the end of the motion, or up to an event; which of both, also in words."""
+    # Steps are too small for threads, which only get in each other's way.
+    with _bar(recorder.steps) as bar, threadpool_limits(limits=1, user_api="blas"):
+        for batch in stepper.batches(recorder.state, recorder.dt, end):
+            reason, size = _reason(watch, batch)
+            recorder.add(batch.cut(size), last=reason is not None)
+            bar.update(size)
+            if reason is not None:
+                time = recorder.state.time
+                return Ending.EVENT, f"ended at {time:.4g} s by {reason}"
+    return Ending.FINISHED, "reached the end of the motion"
+
+
+def _bar(steps: int) -> tqdm:
     return tqdm(total=steps, unit="step", disable=None, leave=False)
 
 
@@ -203,7 +215,12 @@ def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:
 
 
 def last_state(history: History) -> State:
-    """The state in which a run ended, from which another can go on."""
+    """Return the state in which a run ended, from which another can go on.
+
+    Args:
+        history: of that run, also as read from its file; the coordinates of the other run's model
+            must be the same.
+    """
     dataset = history.dataset
     return State(
         float(dataset.attrs["last_time"]),

@@ -1,4 +1,4 @@
-"""The stepper and its loop, apart from the strategies that archfem has."""
+"""The loop over steps, apart from the strategies that archfem has."""
 
 import os
 from typing import NamedTuple
@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 from numba.extending import overload
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.stepping.equation import Equation
+import archfem as af
 from archfem.dynamics.stepping.loop import advance, begin, forget_stale, measure, settle
-from archfem.dynamics.stepping.stepper import BATCH, Stepper
-from archfem.dynamics.time_history import time_history
-from archfem.masonry.shapes import column
-from archfem.motion.motion import Motion
+from archfem.dynamics.stepping.stepper import BATCH
 
 GRAVITY = 9.81
 FRICTION = 0.5
@@ -98,14 +94,14 @@ def _measure(system, kept, step, states, ground, resultants, energy):
 
 def test_a_strategy_with_memory_and_friction_is_stepped_by_the_same_loop():
     """Newmark's block: a pulse a for a time t slides it by ½ (a - μ g) t² a/(μ g)."""
-    model = build(column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
     dt, pulse, lasts = 1e-4, 0.8 * GRAVITY, 0.3
     ground = np.where(np.arange(10_001) * dt < lasts, -pulse, 0.0)
-    equation = Equation(model, Motion(ground, dt))
+    equation = af.dynamics.Equation(model, af.Motion(ground, dt))
     sliding = Sliding.of(equation)
     loop = numba.njit(advance.py_func)  # not kept: this file may change
-    stepper = Stepper(equation, sliding, advance=loop)
-    run = time_history(model, equation.motion, dt=dt, method=stepper)
+    stepper = af.dynamics.Stepper(equation, sliding, advance=loop)
+    run = af.time_history(model, equation.motion, dt=dt, method=stepper)
     over = pulse - FRICTION * GRAVITY
     slid = 0.5 * over * lasts**2 * pulse / (FRICTION * GRAVITY)
     assert len(run.time) > 10 * BATCH

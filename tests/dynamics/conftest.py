@@ -1,0 +1,39 @@
+"""The ring on rigid blocks, and a motion that makes it a mechanism."""
+
+import pytest
+
+import archfem as af
+
+
+@pytest.fixture(scope="session")
+def model(ring):
+    return af.build(ring, fidelity="rigid")
+
+
+@pytest.fixture(scope="session")
+def motion():
+    return af.Motion.synthetic(duration=3.0, pga=6.0, seed=2)
+
+
+@pytest.fixture(scope="session")
+def run(model, motion):
+    damping, record = af.Rayleigh(0.05, (8.0, 16.0)), af.Record(fields_every=50)
+    return af.time_history(model, motion, damping=damping, record=record)
+
+
+@pytest.fixture(scope="session")
+def breaking():
+    """A function that gives a stepper whose attempts fail where `breaks(time, dt)` says so."""
+
+    def stepper(model, motion, breaks):
+        equation = af.dynamics.Equation(model, motion, af.Rayleigh(0.05, (8.0, 16.0)))
+        real = af.dynamics.Exact(equation)
+
+        def attempt(state, dt):
+            if breaks(state.time, dt):
+                raise af.DidNotConverge("made to fail")
+            return real.attempt(state, dt)
+
+        return af.dynamics.Stepper(equation, exact=af.dynamics.Exact(equation, attempts=attempt))
+
+    return stepper

@@ -1,0 +1,27 @@
+"""Steps solved by SNES, and what is done where one fails."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+
+def test_a_step_that_fails_is_halved(model, motion, breaking):
+    short = motion.cut(0.0, 0.4)
+    stepper = breaking(model, short, lambda time, dt: 0.2 < time < 0.21 and dt > 0.002)
+    found = af.time_history(model, short, method=stepper)
+    smallest = found.dataset["smallest_step"].values
+    assert smallest.min() == pytest.approx(0.00125)
+    assert found.time[-1] == pytest.approx(0.4)
+
+
+def test_balance_of_a_step_taken_in_halves(model, breaking):
+    """Work and loss of both halves count."""
+    short = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3).cut(0.0, 1.0)
+    damping = af.Rayleigh(0.05, (8.0, 16.0))
+    fine = af.time_history(model, short, damping=damping, dt=0.0025, method="snes")
+    halved = af.time_history(model, short, method=breaking(model, short, lambda _, dt: dt > 0.003))
+    assert halved.dataset.attrs["halved_steps"] == 200
+    drift = fine.dataset["energy_drift"].values[::2]
+    scale = np.abs(drift).max()
+    assert halved.dataset["energy_drift"].values == pytest.approx(drift, abs=1e-3 * scale)

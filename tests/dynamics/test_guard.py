@@ -1,0 +1,58 @@
+"""What is said of runs that are doubtful, and what ends those that are wrong."""
+
+import logging
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
+
+
+def test_energy_from_nowhere_ends_a_run(model):
+    """Undamped under average acceleration impacts feed the highest modes: e = 0.5, 3 m away."""
+    with pytest.raises(af.DidNotConverge, match=r"come from nowhere.*use damping") as caught:
+        af.time_history(model, MOTION)
+    history = caught.value.history
+    assert history.outcome.startswith("failed at")
+    assert history.dataset.attrs["energy_drift"] > 0.5
+    assert caught.value.last.time < history.time[-1] < 4.0
+
+
+def test_drift_is_told_once(model, caplog):
+    with caplog.at_level(logging.WARNING, "archfem"):
+        run = af.time_history(model, MOTION, scheme=af.HHT(-0.1))
+    told = [record.message for record in caplog.records if "energy drifts" in record.message]
+    assert len(told) == 1
+    assert "lost to the scheme; compare with a smaller dt" in told[0]
+    assert run.dataset.attrs["energy_drift"] < -0.05
+
+
+def test_displacements_that_are_not_small(stack, caplog):
+    """Ground that drops at 3 g lets go of its blocks, which then are farther than small."""
+    model = af.build(stack, fidelity="rigid")
+    down = af.Motion(np.zeros(97), 0.004, np.full(97, -3.0 * 9.81))
+    with caplog.at_level(logging.WARNING, "archfem"):
+        run = af.time_history(model, down, dt=0.004)
+    assert "beyond the small displacements" in caplog.text
+    # relative to the ground they rise at 2 g, 96 steps of 4 ms long
+    moved = run.dataset.attrs["largest_displacement"]
+    assert moved == pytest.approx(9.81 * 0.384**2, rel=0.01)
+    longer = af.Motion(np.zeros(501), 0.002, np.full(501, -3.0 * 9.81))
+    with pytest.raises(af.DidNotConverge, match=r"it has fallen apart.*until=CountedMechanism"):
+        af.time_history(model, longer)
+
+
+def test_numbers_that_overflow_end_in_an_error():
+    """A state that cannot be meant, in a joint as stiff as can be."""
+    stiff = af.Contact(1e16, 1e16)
+    model = af.build(af.column(breadth=1.0, heights=[1.0], contact=stiff), fidelity="rigid")
+    state = af.dynamics.State(0.0, np.zeros(3), np.array([0.0, 1e200, 0.0]), np.zeros(3))
+    for method in ("snes", "contact", "chain", "compliance"):
+        with (
+            np.errstate(all="ignore"),
+            pytest.raises(af.DidNotConverge, match="not numbers any more") as caught,
+        ):
+            af.time_history(model, MOTION, start=state, method=method)
+        assert caught.value.history.outcome.startswith("failed at 0 s")

@@ -1,0 +1,132 @@
+"""The record of a run: its mechanisms, the criteria it obeys, and its file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import archfem as af
+from archfem.dynamics.history import History, history_of
+
+DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
+
+
+def test_everything_said_of_a_run_obeys_its_criteria(run, model, tmp_path):
+    loose = run.judged_by(af.Criteria(hinge=0.3, failures=5))
+    assert loose.mechanism.time < run.mechanism.time
+    assert len(loose.mechanism.joints) >= 5
+    assert loose.verified.moved.time < run.verified.moved.time
+    again = History.read(loose.save(tmp_path / "run.nc"), model.structure)
+    assert again.criteria == loose.criteria
+    assert again.mechanism == loose.mechanism
+    assert run.criteria == af.Criteria()
+
+
+def test_flags_are_in_the_file_for_plain_xarray(run, tmp_path):
+    with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
+        assert plain["slide"].dtype == plain["open"].dtype == plain["judged"].dtype == bool
+        assert plain["hinge"].dtype == np.int8
+        assert plain["hinge"].equals(run.joints["hinge"])
+        assert plain.attrs["criteria_hinge"] == 0.46
+        assert plain.attrs["ended"] == "finished"
+
+
+def test_a_file_of_an_earlier_version(run, tmp_path):
+    """It is judged by the usual criteria, and tells only in words how its run ended."""
+    old = run.dataset.drop_vars(["hinge", "slide", "open", "judged"])
+    old.attrs = {
+        key: value
+        for key, value in old.attrs.items()
+        if key != "ended" and not key.startswith("criteria_")
+    }
+    read = History.read(History(old).save(tmp_path / "old.nc"), run.structure)
+    assert read.mechanism == run.mechanism
+    assert read.verified.moved == run.verified.moved
+    with pytest.raises(af.InvalidInput, match=r"only in words .* 'reached the end of the motion'"):
+        _ = read.ended
+
+
+def test_file_and_back(run, tmp_path):
+    path = run.save(tmp_path / "deep" / "run.nc")
+    again = History.read(path, run.structure)
+    assert again.joints["eccentricity"].equals(run.joints["eccentricity"])
+    assert again.mechanism == run.mechanism
+    with xr.open_dataset(path) as plain:
+        assert plain["N"].attrs["units"] == "N"
+        assert plain.attrs["outcome"] == run.outcome
+    assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
+
+
+def test_a_history_knows_what_can_move(run, model, motion, tmp_path):
+    """The blocks at the counted instant, and the first motion of all: looked for anew."""
+    assert run.structure is model.structure
+    instant = run.joints.sel(time=run.mechanism.time)
+    assert run.mechanism.blocks == af.verified_mechanism(model.structure, instant).moved.blocks
+    assert run.mechanism.blocks == ()  # four hinges, too many of them on one face
+    first = int(np.flatnonzero(run.time == run.verified.moved.time)[0])
+    before = [
+        af.verified_mechanism(model.structure, run.joints.isel(time=k)).kind
+        for k in range(first - 40, first + 1)
+    ]
+    assert before == ["none"] * 40 + ["local"]
+    assert run.verified.moved.blocks
+    assert run.verified is run.verified
+    calm = af.time_history(model, motion.scaled(0.1), damping=DAMPING)
+    assert calm.verified is None
+    assert calm.mechanism is None
+
+
+def test_a_history_without_its_structure_says_so(run, tmp_path, stack):
+    path = run.save(tmp_path / "run.nc")
+    alone = History.read(path)
+    assert alone.mechanism == replace(run.mechanism, blocks=())
+    with pytest.raises(af.InvalidInput, match=r"History\.read\(path, structure\)"):
+        _ = alone.verified
+    again = History.read(path, run.structure)
+    assert again.verified.moved == run.verified.moved
+    with pytest.raises(af.InvalidInput, match="18 joints from 'joint 0' to 'joint 17'"):
+        History.read(path, stack)
+
+
+def test_a_joint_by_name_or_number(run, model):
+    by_name = run.joint("joint 7")
+    assert by_name["N"].dims == ("time",)
+    assert by_name["N"].equals(run.joints["N"].isel(joint=7))
+    assert run.joint(7).identical(by_name)
+    assert float(af.dead_load(model).joint("joint 7")["N"]) == pytest.approx(float(by_name["N"][0]))
+    with pytest.raises(af.InvalidInput, match="no joint 'jiont 7': did you mean 'joint 7'"):
+        run.joint("jiont 7")
+    with pytest.raises(af.InvalidInput, match="no joint 18: give a number from 0 to 17"):
+        run.joint(18)
+
+
+def test_a_failed_write_leaves_the_old_file(run, tmp_path):
+    path = run.save(tmp_path / "run.nc")
+    before = path.read_bytes()
+    unknown = History(run.dataset.assign_attrs(thing=object()))
+    with pytest.raises(TypeError, match="Invalid value for attr 'thing'"):
+        unknown.save(path)
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_files_that_are_no_history(tmp_path):
+    with pytest.raises(af.InvalidInput, match="no history file"):
+        History.read(tmp_path / "none.nc")
+    bad = tmp_path / "bad.nc"
+    bad.write_text("nothing")
+    with pytest.raises(af.InvalidInput, match="not a NetCDF file"):
+        History.read(bad)
+    other = tmp_path / "other.nc"
+    xr.Dataset({"N": ("x", [1.0])}).to_netcdf(other)
+    with pytest.raises(af.InvalidInput, match="not a time history"):
+        History.read(other)
+
+
+def test_the_history_that_a_failure_carries(run):
+    assert history_of(af.DidNotConverge("failed", history=run)) is run
+    early = af.DidNotConverge("failed before the first step")
+    with pytest.raises(af.DidNotConverge, match="before the first step") as caught:
+        history_of(early)
+    assert caught.value is early

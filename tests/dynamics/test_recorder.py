@@ -1,0 +1,96 @@
+"""What is recorded of a run, and how often."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.guard import Guard
+from archfem.dynamics.recorder import Recorder, Rows
+
+DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
+MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
+
+
+def test_what_is_recorded(run, model, motion):
+    assert run.joints["eccentricity"].dims == ("time", "joint")
+    assert run.joints.sizes == {"time": 601, "joint": 18}
+    assert run.time[-1] == pytest.approx(3.0)
+    assert run.dataset["q"].shape == (13, model.size)
+    assert run.dataset["ground"].values == pytest.approx(motion.at(run.time))
+    assert run.outcome == "reached the end of the motion"
+    assert run.ended is af.dynamics.Ending.FINISHED
+    assert "archfem" in run.dataset.attrs["versions"]
+    assert "extrados" in run.dataset.attrs["signs"]
+
+
+def test_the_first_record_is_the_dead_load(run, model):
+    dead = af.dead_load(model).joints
+    assert run.joints["N"][0].values == pytest.approx(dead["N"].values, rel=1e-9)
+
+
+def test_fields_are_kept_only_on_demand(model, motion):
+    short = af.time_history(
+        model, motion.cut(0.0, 0.5), damping=DAMPING, record=af.Record(every=10)
+    )
+    assert "q" not in short.dataset
+    assert short.joints.sizes["time"] == 11
+
+
+def test_every_third_step_is_the_same_run(run, model, motion):
+    sparse = af.time_history(model, motion, damping=DAMPING, record=af.Record(every=3))
+    assert sparse.joints["M"].values == pytest.approx(run.joints["M"].values[::3], abs=1e-6)
+
+
+@pytest.mark.parametrize("every", [1, 7, 100])
+def test_the_step_that_ends_a_run_is_kept(model, motion, every):
+    record = af.Record(every=every)
+    halted = af.time_history(
+        model, motion, damping=DAMPING, record=record, until=af.CountedMechanism(), dt=0.0049
+    )
+    assert halted.mechanism.time == halted.time[-1] == halted.dataset.attrs["last_time"]
+
+
+def test_effort_between_records_is_kept(model):
+    every = af.time_history(model, MOTION, damping=DAMPING)
+    third = af.time_history(model, MOTION, damping=DAMPING, record=af.Record(every=4))
+    assert third.dataset["iterations"].sum() == every.dataset["iterations"].sum()
+    drift = every.dataset["energy_drift"].values[::4]
+    assert third.dataset["energy_drift"].values == pytest.approx(drift, rel=1e-12)
+
+
+def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
+    """It comes when the coordinates of the third step are asked for."""
+    start = af.dynamics.Equation(model, motion).at_rest(af.dead_load(model).q)
+    given = {"method": "by hand", "dt": 0.005, "steps": 10, "every": 1, "fields_every": 1}
+
+    def batch(times, state):
+        resultants = np.ones((len(times), len(model.structure.joints), 3))
+        energy = np.zeros((len(times), 4))
+        ones = np.ones(len(times), dtype=np.int64)
+        return af.dynamics.Batch(times, resultants, ones, 0.005 * ones, energy, state)
+
+    def pressed(k):
+        if k == 2:
+            raise KeyboardInterrupt
+        return start
+
+    first = batch(np.zeros(1), lambda _: start)
+    guard = Guard(model, first)
+    recorder = Recorder(model=model, criteria=af.Criteria(), guard=guard, state=start, **given)
+    recorder.add(first)
+    with pytest.raises(KeyboardInterrupt):
+        recorder.add(batch(0.005 * np.arange(1.0, 5.0), pressed))
+    kept = recorder.history(motion, af.dynamics.Ending.INTERRUPTED, "by hand").dataset
+    assert kept["frame_time"].values == pytest.approx([0.0, 0.005, 0.01])
+    assert kept["q"].shape == (3, model.size)
+    assert kept["N"].notnull().all()
+    assert kept.sizes["time"] == 5
+
+
+def test_rows_are_those_filled_so_far():
+    rows = Rows(4, (2,))
+    assert rows.values.shape == (0, 2)
+    for filled in (np.ones((1, 2)), np.full((2, 2), 3.0)):
+        rows.add(filled)
+    assert rows.values.tolist() == [[1.0, 1.0], [3.0, 3.0], [3.0, 3.0]]
+    assert np.shares_memory(rows.values, rows.values)
