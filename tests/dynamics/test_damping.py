@@ -74,3 +74,5 @@ def test_too_few_effective_modes():
         effective_range(block(), share=0.5)
     with pytest.raises(af.InvalidInput, match=r"share 5\.0 of the mass"):
         effective_range(block(), share=5.0)
+    with pytest.raises(af.InvalidInput, match="modes to compute at first = 0"):
+        effective_range(block(), few=0)

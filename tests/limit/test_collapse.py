@@ -14,7 +14,6 @@ from archfem.limit.collapse import Outcome, collapse_factor, stands
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""
 
-
 SIDEWAYS = af.BodyForce(1.0)
 ECCENTRIC = af.PointLoad(1.4, (0.0, -1e3))
 LOADS = [

@@ -27,11 +27,8 @@ def random_state(structure, rng):
 @pytest.mark.parametrize("structure", [piers(chords=1), filled(), beside("side wall")], ids="abc")
 def test_loops_rule_out_only_what_the_programme_rules_out(structure):
     """Two formulations: the cone of gaps that close every loop, and the programme in motions."""
-    verifier, rng, agreed = (
-        af.limit.Verifier(structure),
-        np.random.default_rng(1),
-        {True: 0, False: 0},
-    )
+    verifier, rng = af.limit.Verifier(structure), np.random.default_rng(1)
+    agreed = {True: 0, False: 0}
     for _ in range(60):
         joints = random_state(structure, rng)
         moves = verifier.verified(joints).kind != "none"

@@ -11,7 +11,6 @@ import archfem as af
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""
 
-
 SIDEWAYS = af.BodyForce(1.0)
 
 

@@ -11,7 +11,6 @@ from archfem.statics.freebody import forces_on
 BALANCED = 1e-9
 """Newton's method stops at 1e-10 of the load, and forces on a block are of its order."""
 
-
 BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
 
 
