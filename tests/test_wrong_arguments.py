@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.events import EveryMechanism, MovingMechanism
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
 QUAKE = af.Motion(np.zeros(11), dt=0.01)
@@ -31,9 +30,9 @@ MADE = [
     (lambda: af.CountedMechanism(kinds="local"), "kinds = 'local': give some of"),
     (lambda: af.CountedMechanism(kinds=3), "kinds = 3: give some of"),
     (lambda: af.CountedMechanism(criteria=0.46), "criteria is a float: give Criteria"),
-    (lambda: MovingMechanism(kinds=("all",)), r"kinds = \('all',\): give some of"),
-    (lambda: EveryMechanism(limit=0), "criteria hinge = 0"),
-    (lambda: EveryMechanism(criteria=af.Criteria(), limit=0.4), "not both"),
+    (lambda: af.dynamics.MovingMechanism(kinds=("all",)), r"kinds = \('all',\): give some of"),
+    (lambda: af.dynamics.EveryMechanism(limit=0), "criteria hinge = 0"),
+    (lambda: af.dynamics.EveryMechanism(criteria=af.Criteria(), limit=0.4), "not both"),
     (lambda: af.Rayleigh("5 %", (8.0, 16.0)), "damping ratio .* = '5 %' is not a finite number"),
     (lambda: af.Rayleigh(0.05, 8.0), r"damping frequencies \[Hz\] = 8.0 is not a row of values"),
     (lambda: af.Rayleigh(0.05, (8.0, 16.0, 24.0)), "has 3 values"),

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
+from numbers import Integral
 
 from archfem.errors import InvalidInput
 
@@ -21,7 +22,7 @@ def number_of(kind: str, names: Sequence[str], wanted: str | int) -> int:
         if wanted in names:
             return list(names).index(wanted)
         raise InvalidInput(f"there is no {kind} '{wanted}': {did_you_mean(wanted, names, 0.0)}")
-    if not 0 <= wanted < len(names):
+    if not isinstance(wanted, Integral) or not 0 <= wanted < len(names):
         raise InvalidInput(
             f"there is no {kind} {wanted}: give a number from 0 to {len(names) - 1}, or a name "
             f"such as '{names[0]}'"

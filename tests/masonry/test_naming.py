@@ -24,6 +24,7 @@ def test_by_name_and_by_number():
         ("", "did you mean"),
         (3, "from 0 to 2, or a name such as 'north pier, base'"),
         (-1, "there is no joint -1"),
+        (1.5, "there is no joint 1.5"),
     ],
 )
 def test_near_misses(joint, says):

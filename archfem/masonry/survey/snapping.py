@@ -53,16 +53,18 @@ def snapped(
     places, number = _merged(turned, snap)
     parts = np.split(number, np.cumsum([len(points) for points in turned])[:-1])
     boundaries = [[int(n) for n, _ in groupby(part)] for part in parts]
-    boundaries = [loop[:-1] if loop[0] == loop[-1] else loop for loop in boundaries]
+    boundaries = [
+        boundary[:-1] if boundary[0] == boundary[-1] else boundary for boundary in boundaries
+    ]
     ties = _ties(boundaries, places, snap)
     ties |= _bends(boundaries, places, ties, snap)
     places = _settled(places, ties)
     moved = np.linalg.norm(places[number] - given, axis=1)
     owners = [name for name, points in zip(names, turned, strict=True) for _ in points]
     _check_moved(moved, given, owners, snap)
-    found = [places[loop] for loop in boundaries]
-    for name, points, loop in zip(names, found, boundaries, strict=True):
-        if len(loop) < 3:
+    found = [places[boundary] for boundary in boundaries]
+    for name, points, boundary in zip(names, found, boundaries, strict=True):
+        if len(boundary) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
         check_simple(points, name)
     check_apart(found, names, NEARLY * snap)
@@ -77,9 +79,9 @@ def _area(points: Array) -> float:
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
-    """Number of a loop, and the two points of each edge of it."""
-    for number, loop in enumerate(boundaries):
-        for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
+    """Number of a boundary, and the two points of each edge of it."""
+    for number, boundary in enumerate(boundaries):
+        for a, b in zip(boundary, boundary[1:] + boundary[:1], strict=True):
             yield number, a, b
 
 
@@ -137,11 +139,14 @@ def _bends(
         whole[number] += [a, *sorted(on.get(frozenset((a, b)), []), key=lambda n: along[n])]
     across = {(a, b): number for number, a, b in _edges(whole)}
     found: dict[int, Edge] = {}
-    for loop in whole:
-        beyond = [across.get((b, a), -1) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
-        turn = next((k for k in range(len(loop)) if beyond[k] != beyond[k - 1]), 0)
-        nodes, beyond = loop[turn:] + loop[:turn], beyond[turn:] + beyond[:turn]
-        for other, run in groupby(range(len(loop)), beyond.__getitem__):
+    for boundary in whole:
+        beyond = [
+            across.get((b, a), -1)
+            for a, b in zip(boundary, boundary[1:] + boundary[:1], strict=True)
+        ]
+        turn = next((k for k in range(len(boundary)) if beyond[k] != beyond[k - 1]), 0)
+        nodes, beyond = boundary[turn:] + boundary[:turn], beyond[turn:] + beyond[:turn]
+        for other, run in groupby(range(len(boundary)), beyond.__getitem__):
             which = list(run)
             ends = nodes[which[0]], nodes[(which[-1] + 1) % len(nodes)]
             middle = [nodes[k] for k in which[1:]]
@@ -182,9 +187,13 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     import shapely
 
     near = TOUCHING * float(np.linalg.norm(np.ptp(places, axis=0)))
-    polygons = [shapely.Polygon(places[loop]) for loop in boundaries]
+    polygons = [shapely.Polygon(places[boundary]) for boundary in boundaries]
     tree = shapely.STRtree(polygons)
-    first = {place: number for number, loop in reversed([*enumerate(boundaries)]) for place in loop}
+    first = {
+        place: number
+        for number, boundary in reversed([*enumerate(boundaries)])
+        for place in boundary
+    }
     found = []
     for number, a, b in _edges(boundaries):
         along, off, length = _beside(places, a, b)
