@@ -7,6 +7,7 @@ import pytest
 
 from archfem.cases.case import Case
 from archfem.cases.report import write_dead
+from archfem.cases.run import Rest
 from archfem.dynamics.ladder import build
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
@@ -169,6 +170,6 @@ def test_a_case_may_ask_for_a_free_body(tmp_path):
     for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):
         case = Case.of({**tables, "model": cells})
         dead = dead_load(build(case.structure, **case.model))
-        files = [path.name for path in write_dead(case, dead, tmp_path)]
+        files = [path.name for path in write_dead(Rest(case, dead), tmp_path)]
         assert files == ["dead.png", *(f"dead_stress.{kind}" for kind in more), "free_body.png"]
     assert (tmp_path / "dead_stress.txt").read_text().splitlines()[1].startswith("arch ")
