@@ -36,9 +36,9 @@ MODEL = {
     "points": int,
     "tolerance": "1",
 }
-DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
+DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
 OUTPUT = {
@@ -140,9 +140,9 @@ class Case:
         analysis = checked(settings.get("analysis", {}), ANALYSIS, "analysis")
         if "damping" in analysis:
             analysis["damping"] = checked(analysis["damping"], DAMPING, "analysis.damping")
-        if "motion" in settings and "suite" in settings:
-            raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
+        if motion is not None and suite is not None:
+            raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
             title=str(settings.get("title", "case")),
             structure=planned(settings, folder),
@@ -258,14 +258,11 @@ class Case:
         if self.suite is None:
             raise InvalidInput("the case has no [suite] to take pairs of: give a table for each")
         refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
-        suite, settings = (
-            {
-                **said,
-                "pairs": {name: said["pairs"][name] for name in said["pairs"] if name in pairs},
-            }
+        kept, told = (
+            {**said, "pairs": {key: said["pairs"][key] for key in said["pairs"] if key in pairs}}
             for said in (self.suite, self.settings["suite"])
         )
-        return replace(self, suite=suite, settings={**self.settings, "suite": settings})
+        return replace(self, suite=kept, settings={**self.settings, "suite": told})
 
     def text(self) -> str:
         """The case as TOML, changes included."""

@@ -42,6 +42,8 @@ Shake = Callable[[Case, Motion, Equilibrium, Rayleigh | None], History]
 class Rest:
     """A case under its dead load, from which its runs start.
 
+    What follows from the dead load is worked out when first asked for, and once.
+
     Attributes:
         case: what was asked.
         dead: the equilibrium.
@@ -104,7 +106,7 @@ Result = Collapse | Rest | Suite | Run
 
 def carried_out(
     case: Case,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     *,
     pairs: Collection[str] | None = None,
     shake: Shake | None = None,
@@ -132,7 +134,7 @@ def carried_out(
         DidNotConverge: the structure does not stand, a motion cannot be matched, or not even the
             first step of a run could be made.
     """
-    shake = shake or shaken
+    shake, folder = shake or shaken, None if folder is None else Path(folder)
     if case.limit is not None:
         yield case.limit.of(case.structure)
     rest = Rest.of(case)
@@ -165,7 +167,7 @@ def at_rest(case: Case) -> Equilibrium:
 
 
 def _chosen(case: Case) -> Model:
-    """Choose a model for the runs to come."""
+    """Choose a model for the runs to come, by the case's motion where it has one."""
     motion = None
     if case.motion is not None:
         motion = case.ground_motion()

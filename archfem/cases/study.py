@@ -25,13 +25,13 @@ logger = logging.getLogger("archfem")
 
 CASE = {"case": str, "set": [str]}
 SCALES = {"precision": "1", "between": ["1"]}
+STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
+
 CarryOut = Callable[..., Iterator[Result]]
 """Carries out a case, as `archfem.cases.run.carried_out` does."""
 
 Search = Callable[..., MechanismScales]
 """Finds the factors on a motion at which mechanisms begin, as `mechanism_scales` does."""
-
-STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,11 @@ class Study:
 
 
 def compared(
-    study: Study, folder: Path, *, carry_out: CarryOut = carried_out, search: Search | None = None
+    study: Study,
+    folder: Path,
+    *,
+    carry_out: CarryOut = carried_out,
+    search: Search = mechanism_scales,
 ) -> Iterator[tuple[str, Finding]]:
     """Carry out a study, case by case; what an earlier command found is kept.
 
@@ -110,7 +114,7 @@ def compared(
         study: what to compare.
         folder: for a file of each case's findings, written after every pair.
         carry_out: carries out a case under those of its pairs of which not all is known.
-        search: finds the factors at which mechanisms begin; by default `mechanism_scales`.
+        search: finds the factors at which mechanisms begin.
 
     Yields:
         Name of a case, and what was found of it.
@@ -128,7 +132,7 @@ def compared(
         if missing:
             results = carry_out(case, pairs=missing)
             try:
-                finding = _found(study, results, finding, path, search or mechanism_scales)
+                finding = _found(study, results, finding, path, search)
             except DidNotConverge as error:
                 error.args = (f"'{name}': {error}",)
                 raise

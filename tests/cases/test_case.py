@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
+from archfem.cases.case import MODEL
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
@@ -147,3 +148,12 @@ def test_a_case_with_some_of_its_pairs_keeps_its_structure(small):
         case.alone("secnd")
     with pytest.raises(af.InvalidInput, match=r"no .suite. to take pairs of"):
         af.Case.read(RING).alone("second")
+
+
+def test_a_case_may_say_all_that_a_discretisation_takes():
+    fields = set(af.models.Discretisation.__dataclass_fields__)
+    assert set(MODEL) == fields | {"tolerance"}
+    case = af.Case.read(RING, ["model.fidelity=auto", "model.tolerance=0.02"])
+    assert (case.chooses, case.tolerance) == (True, 0.02)
+    assert case.discretisation == af.models.Discretisation("full", (4, 4))
+    assert af.Case.read(RING, ["model.coarse=50 cm"]).discretisation.coarse == pytest.approx(0.5)

@@ -15,7 +15,7 @@ def names(results):
 
 def test_results_come_as_they_are_found_and_histories_are_kept(small, tmp_path):
     case = af.Case.read(small, ["limit.horizontal=1"])
-    results = list(analysis.carried_out(case, tmp_path / "out"))
+    results = list(analysis.carried_out(case, str(tmp_path / "out")))
     assert names(results) == ["Collapse", "Rest", "Suite", "Run", "Run"]
     collapse, rest, suite, *runs = results
     assert collapse.factor == pytest.approx(0.5)  # two blocks 1 m wide, 2 m high in all
