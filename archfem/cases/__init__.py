@@ -3,12 +3,13 @@
     settings    tables of a case file and changes to them
     structures  [structure], [materials], [contacts] as a `Structure`
     motions     [motion], [suite] as a `Motion`, a `Suite`
+    limits      [limit] as loads and friction for limit analysis
     case        one analysis as one value, read from a TOML file
     run         carry out a case; go on where an earlier run ended
-    summary     tables and sentences of what was found
-    report      the pictures of a case, into its folder
     findings    what a study finds of its cases, kept in files
     study       several cases side by side
+    summary     tables and sentences of what was found
+    report      tables and pictures, into a folder
     commands    the commands of the command line
     cli         the command line itself
 

@@ -6,13 +6,15 @@ not known, a wrong unit or an impossible geometry is an error that names the key
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from archfem.cases import motions as ground
+from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.cases.structures import planned
 from archfem.dynamics.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
@@ -34,6 +36,8 @@ MODEL = {
     "points": int,
     "tolerance": "1",
 }
+"""What a `Discretisation` takes, which checks it, and a tolerance."""
+
 DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
@@ -54,6 +58,7 @@ SECTIONS = (
     "suite",
     "analysis",
     "criteria",
+    "limit",
     "output",
 )
 
@@ -70,6 +75,7 @@ class Case:
         suite: what it says of a suite of them, or None; without either there is dead load alone.
         analysis: what it says of the time history.
         criteria: what makes a joint fail, and how many failed joints make a mechanism.
+        limit: what it asks of limit analysis, or None.
         output: what it says of what to keep and draw.
         settings: the whole case as it was understood, to be written again.
         folder: where relative file names start.
@@ -82,6 +88,7 @@ class Case:
     suite: dict[str, Any] | None
     analysis: dict[str, Any]
     criteria: Criteria
+    limit: Limit | None
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
@@ -98,6 +105,9 @@ class Case:
             path: a TOML file.
             changes: "section.key=value" each, instead of what the file says.
 
+        Returns:
+            The case.
+
         Raises:
             InvalidInput: what cannot be meant, with the key, the value and the remedy.
             InvalidStructure: lengths that do not make a structure.
@@ -113,7 +123,16 @@ class Case:
 
     @classmethod
     def of(cls, settings: Table, folder: Path = Path()) -> "Case":
-        """Make a case of tables such as a TOML file holds."""
+        """Return a case of tables such as a TOML file holds.
+
+        Args:
+            settings: the tables by name.
+            folder: where relative file names start.
+
+        Raises:
+            InvalidInput: what cannot be meant, with the key, the value and the remedy.
+            InvalidStructure: lengths that do not make a structure.
+        """
         refuse_unknown(settings, SECTIONS)
         for key in set(SECTIONS) - {"title"}:
             if not isinstance(settings.get(key, {}), dict):
@@ -121,9 +140,9 @@ class Case:
         analysis = checked(settings.get("analysis", {}), ANALYSIS, "analysis")
         if "damping" in analysis:
             analysis["damping"] = checked(analysis["damping"], DAMPING, "analysis.damping")
-        if "motion" in settings and "suite" in settings:
+        motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
+        if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
-        motion, suite = settings.get("motion"), settings.get("suite")
         case = cls(
             title=str(settings.get("title", "case")),
             structure=planned(settings, folder),
@@ -132,6 +151,7 @@ class Case:
             suite=None if suite is None else ground.suite_settings(suite),
             analysis=analysis,
             criteria=Criteria(**checked(settings.get("criteria", {}), CRITERIA, "criteria")),
+            limit=None if limit is None else limit_asked(limit),
             output=checked(settings.get("output", {}), OUTPUT, "output"),
             settings=dict(settings),
             folder=folder,
@@ -141,7 +161,7 @@ class Case:
 
     def _check(self) -> None:
         """Refuse what would otherwise be found out only after the dead load."""
-        _ = self.discretisation, self.damping, self.scheme, self.joints
+        _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
@@ -149,12 +169,23 @@ class Case:
             self.structure.block_number(self.output["free_body"])
 
     @property
+    def chooses(self) -> bool:
+        """Whether the model is to be chosen, by fidelity = "auto"."""
+        return self.model.get("fidelity") == "auto"
+
+    @cached_property
     def discretisation(self) -> Discretisation:
         """What the structure is modelled by; its mesh alone counts where "auto" is to choose."""
-        given = {key: value for key, value in self.model.items() if key != "tolerance"}
-        if given.get("fidelity") == "auto":
-            del given["fidelity"]
-        return Discretisation(**given)
+        idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
+        return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
+
+    @property
+    def tolerance(self) -> float:
+        """Error in the largest |e| of every joint that a model to be chosen may have [-]."""
+        tolerance = float(self.model.get("tolerance", 0.005))
+        if not 0.0 < tolerance < 1.0:
+            raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
+        return tolerance
 
     @property
     def damping(self) -> Rayleigh | EffectiveRayleigh | None:
@@ -190,7 +221,7 @@ class Case:
         return Newmark()
 
     def ground_motion(self) -> Motion:
-        """Read or make the ground motion.
+        """Return the ground motion, read or made.
 
         Raises:
             InvalidInput: there is none, or its file cannot be read.
@@ -200,7 +231,7 @@ class Case:
         return ground.ground_motion(self.motion, self.folder)
 
     def ground_suite(self) -> Suite:
-        """Read or make the suite of ground motions, matched where the case says so.
+        """Return the suite of ground motions, read or made, and matched where the case says so.
 
         Raises:
             InvalidInput: there is none, or a pair cannot be read or matched.
@@ -215,11 +246,23 @@ class Case:
         """Target spectrum of the suite, or None."""
         return ground.target_spectrum(self.suite or {})
 
-    def alone(self, pair: str) -> "Case":
-        """Return the case with this one pair of its suite."""
-        suite = self.settings["suite"]
-        kept = {**suite, "pairs": {pair: suite["pairs"][pair]}}
-        return self.of({**self.settings, "suite": kept}, self.folder)
+    def alone(self, *pairs: str) -> "Case":
+        """Return the case with some of the pairs of its suite.
+
+        Args:
+            pairs: their names; they keep the order of the suite.
+
+        Raises:
+            InvalidInput: the case has no such pair.
+        """
+        if self.suite is None:
+            raise InvalidInput("the case has no [suite] to take pairs of: give a table for each")
+        refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
+        kept, told = (
+            {**said, "pairs": {key: said["pairs"][key] for key in said["pairs"] if key in pairs}}
+            for said in (self.suite, self.settings["suite"])
+        )
+        return replace(self, suite=kept, settings={**self.settings, "suite": told})
 
     def text(self) -> str:
         """The case as TOML, changes included."""
@@ -227,11 +270,14 @@ class Case:
 
 
 def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
-    """Tables of a case file over those of its base.
+    """Return the tables of a case file over those of its base.
 
     Args:
         path: the file.
         above: files that are based on it, one on the other.
+
+    Raises:
+        InvalidInput: there is no such file, it is not TOML, or its base cannot be meant.
     """
     if not path.is_file():
         raise InvalidInput(f"there is no case file {path}")

@@ -4,7 +4,7 @@ import argparse
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from archfem.cases import commands
 from archfem.errors import ArchfemError
@@ -14,11 +14,30 @@ INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 is success, 1 an error of the case, 2 of the command, 130 after Ctrl-C."""
+    """Run a command and return its exit code.
+
+    Args:
+        arguments: words after `archfem`; by default those that the process was given.
+
+    Returns:
+        As by `exit_code`; where the words are not understood, the process ends with 2.
+    """
     given = _parser().parse_args(arguments)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    return exit_code(lambda: given.command(given))
+
+
+def exit_code(command: Callable[[], None]) -> int:
+    """Run a command, print the error that ends it, if one does, and return its exit code.
+
+    Args:
+        command: what to do.
+
+    Returns:
+        0 for success, 1 for an error of the case or of a file, 130 after Ctrl-C.
+    """
     try:
-        given.command(given)
+        command()
     except ArchfemError as error:
         print(f"archfem: {error}", file=sys.stderr)
         return 1

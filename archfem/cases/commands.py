@@ -2,37 +2,46 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING
 
 from archfem.cases.case import Case
-from archfem.dynamics.schemes import Rayleigh
+from archfem.cases.run import Rest, Result, Run, carried_out, expected_damping
+from archfem.dynamics.history import Ending, History
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import judged
+from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
-
-if TYPE_CHECKING:
-    from archfem.dynamics.history import History
-    from archfem.motion.suite import Suite
-    from archfem.statics.equilibrium import Equilibrium
+from archfem.motion.suite import Suite
+from archfem.statics.strength import use_sentence
 
 
 def check(given: argparse.Namespace) -> None:
-    """Read a case, build its model, find its dead load, read its motions."""
+    """Read a case, do its limit analysis, find its dead load, read its motions.
+
+    Args:
+        given: `case`, a file, and `changes` to it.
+    """
     case = Case.read(given.case, given.changes)
-    dead = _dead_load(case)
+    print(case.title)
+    if case.limit is not None:
+        _tell_limit(case, case.limit.of(case.structure))
+    rest = Rest.of(case)
+    _tell_rest(rest)
     if case.suite is not None:
         _tell_motions(case.ground_suite())
     elif case.motion is not None:
         motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, peak {motion.pga:.3f} m/s²")
-    print(f"{given.case}: ready; dead load in {dead.iterations} iterations")
+    print(f"{given.case}: ready; dead load in {rest.dead.iterations} iterations")
 
 
 def motion(given: argparse.Namespace) -> None:
-    """Print the measures of records and draw them."""
+    """Print the measures of records and draw them.
+
+    Args:
+        given: `files`, the `column`, `units` and `dt` [s] of plain ones, and the folder `out`.
+    """
     from archfem.cases.report import named_apart, write_motions
     from archfem.cases.summary import motion_table
 
@@ -46,57 +55,52 @@ def motion(given: argparse.Namespace) -> None:
 
 
 def accuracy(given: argparse.Namespace) -> None:
-    """Run a case over rungs, meshes, rules and steps: table and picture."""
-    from archfem.cases.run import expected_damping
-    from archfem.dynamics.tradeoff import accuracy as compared
-    from archfem.view.accuracy import draw_accuracy
-    from archfem.view.style import save
+    """Run a case over rungs, meshes, rules and steps: table and picture.
 
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
+    Args:
+        given: `case`, a file, `changes` to it, and the folder `out`.
+    """
+    from archfem.cases.report import write_accuracy
+    from archfem.cases.summary import accuracy_words
+    from archfem.dynamics.tradeoff import accuracy as compared
+
+    case = Case.read(given.case, given.changes)
     found = compared(
         case.structure,
         case.ground_motion(),
         damping=expected_damping(case),
-        tolerance=case.model.get("tolerance", 0.005),
+        tolerance=case.tolerance,
     )
-    chosen = found.chosen.setting.label if found.chosen else "none: a finer model is needed"
-    lines = [
-        found.table(),
-        "",
-        f"reference: {found.reference.label}, in doubt by {found.doubt:.2g}",
-        f"chosen for an error of {found.tolerance:g}: {chosen}",
-    ]
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "accuracy.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    print("\n".join(lines))
-    _tell_written([folder / "accuracy.txt", save(draw_accuracy(found), folder / "accuracy.png")])
+    print(accuracy_words(found))
+    _tell_written(write_accuracy(found, Path(given.out)))
 
 
 def study(given: argparse.Namespace) -> None:
-    """Carry out a study: its tables, and a picture of the factors at first mechanism."""
+    """Carry out a study: its tables, and a picture of the factors at first mechanism.
+
+    Args:
+        given: `case`, the file of a study, `changes` to its cases, and the folder `out`.
+    """
     from archfem.cases.findings import study_table
-    from archfem.cases.study import Study, carried_out
-    from archfem.view.studies import draw_study
-    from archfem.view.style import save
+    from archfem.cases.report import write_study
+    from archfem.cases.study import Study, compared
 
     asked, folder = Study.read(given.case, given.changes), Path(given.out)
     print(asked.title)
     found = {}
-    for name, finding in carried_out(asked, folder):
+    for name, finding in compared(asked, folder):
         found[name] = finding
         print(f"{name}: {len(finding.runs)} pairs")
-    table = study_table(found)
-    (folder / "study.txt").write_text(f"{asked.title}\n\n{table}\n", encoding="utf-8")
-    print(table)
-    written = [folder / "study.txt"]
-    if asked.scales is not None:
-        factors = {name: each.factors for name, each in found.items()}
-        written.append(save(draw_study(factors, asked.reduction), folder / "study.png"))
-    _tell_written(written)
+    print(study_table(found))
+    _tell_written(write_study(asked, found, folder))
 
 
 def mesh(given: argparse.Namespace) -> None:
-    """Write the mesh of a case as a gmsh file."""
+    """Write the mesh of a case as a gmsh file.
+
+    Args:
+        given: `case`, a file, `changes` to it, and the mesh file `out`.
+    """
     from archfem.models.fem.mesh import write_mesh
 
     case = Case.read(given.case, given.changes)
@@ -105,64 +109,115 @@ def mesh(given: argparse.Namespace) -> None:
 
 
 def modes(given: argparse.Namespace) -> None:
-    """Find the modes of a case about its dead load: table, picture, film of the first two."""
-    from archfem.cases.run import damping_of
-    from archfem.statics.modes import modes as lowest
-    from archfem.view.modes import animate_modes, draw_modes
-    from archfem.view.style import save
+    """Find the modes of a case about its dead load: table, picture, film of the first two.
 
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
-    dead = _dead_load(case)
-    found = lowest(dead.model, given.count, about=dead)
-    text = f"{found.table()}\n\n{damping_of(case, dead)[1]}"
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "modes.txt").write_text(text + "\n", encoding="utf-8")
-    print(text)
-    film = animate_modes(found, folder / "modes.gif", range(1, min(given.count, 2) + 1))
-    _tell_written([folder / "modes.txt", save(draw_modes(found), folder / "modes.png"), film])
+    Args:
+        given: `case`, a file, `changes` to it, the `count` of modes, and the folder `out`.
+    """
+    from archfem.cases.report import write_modes
+    from archfem.statics.modes import modes as lowest
+
+    case = Case.read(given.case, given.changes)
+    print(case.title)
+    rest = Rest.of(case)
+    _tell_rest(rest)
+    found = lowest(rest.dead.model, given.count, about=rest.dead)
+    damping = rest.damping[1]
+    print(f"{found.table()}\n\n{damping}")
+    _tell_written(write_modes(found, damping, Path(given.out)))
 
 
 def run(given: argparse.Namespace) -> None:
-    """Find the dead load of a case and run its time histories: tables and pictures."""
-    from archfem.cases.report import write_dead, write_run
-    from archfem.cases.run import damping_of
+    """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
+    Args:
+        given: `case`, a file, `changes` to it, and the folder `out`.
+    """
     case, folder = Case.read(given.case, given.changes), Path(given.out)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
-    dead = _dead_load(case)
-    _tell_written(write_dead(case, dead, folder))
-    damping, how = damping_of(case, dead)
-    print(how)
-    if case.suite is not None:
-        _run_suite(case, dead, damping, folder)
-    elif case.motion is not None:
-        run = _shake(case, case.ground_motion(), dead, damping, folder=folder)
-        _tell(run, dead, folder)
-        _tell_written(write_run(case, run, dead, folder))
+    print(case.title)
+    tell(case, carried_out(case, folder), folder)
 
 
-def _run_suite(case: Case, dead: "Equilibrium", damping: Rayleigh | None, folder: Path) -> None:
-    """Run all pairs of a suite, each to its own folder; those finished before are kept."""
-    from archfem.cases.report import write_envelopes, write_suite
-    from archfem.cases.summary import pair_table
-    from archfem.dynamics.history import Ending
+def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
+    """Print the results of a case as they come, and write their tables and pictures.
 
-    suite = case.ground_suite()
-    _tell_motions(suite)
-    _tell_written(write_suite(suite, case.target, folder))
+    Args:
+        case: what was asked.
+        results: as by `carried_out`.
+        folder: for the files.
+
+    Raises:
+        DidNotConverge: a step of a run failed.
+        KeyboardInterrupt: Ctrl-C ended a pair of a suite.
+    """
+    from archfem.cases.report import write_dead, write_limit, write_suite
+
     runs: dict[str, History] = {}
-    for motion in suite.motions:
-        alone, own = case.alone(motion.name), folder / motion.name
-        run = _run_pair(alone, motion, dead, damping, folder=own)
-        runs[motion.name] = run
-        if run.ended is Ending.INTERRUPTED:
-            break
-    table = pair_table(runs)
-    (folder / "suite.txt").write_text(table + "\n", encoding="utf-8")
-    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{table}")
-    _tell_written(write_envelopes(runs, dead, folder))
-    if run.ended is Ending.INTERRUPTED:
+    for result in results:
+        if isinstance(result, Collapse):
+            _tell_limit(case, result)
+            _tell_written(write_limit(case, result, folder))
+        elif isinstance(result, Rest):
+            rest = result
+            _tell_rest(rest)
+            _tell_written(write_dead(rest, folder))
+            print(rest.damping[1])
+        elif isinstance(result, Suite):
+            suite = result
+            _tell_motions(suite)
+            _tell_written(write_suite(suite, case.target, folder))
+        else:
+            _tell_run(result, rest)
+            runs[result.motion.name] = result.history
+    if case.suite is not None:
+        _tell_pairs(suite, runs, rest, folder)
+
+
+def _tell_run(done: Run, rest: Rest) -> None:
+    """Print what a run did and write its files, unless an earlier command has.
+
+    Raises:
+        DidNotConverge: a step of the only run failed; one of a suite ends its own pair alone.
+    """
+    from archfem.cases.report import is_written, write_run
+    from archfem.cases.summary import run_words
+
+    assert done.path is not None
+    motion, history = done.motion, done.history
+    if done.kept:
+        print(f"{motion.name}: finished before, kept {done.path}")
+        if is_written(done):
+            return
+    elif done.error is not None:
+        print(f"what was computed is kept in {done.path}", file=sys.stderr)
+        if done.case.suite is None:
+            raise done.error
+        print(f"archfem: {motion.name}: {done.error}", file=sys.stderr)
+    else:
+        print(
+            f"time history: {motion.name}, peak {motion.pga:.2f} m/s², "
+            f"{float(history.time[-1]):.2f} s in {done.seconds:.1f} s; {history.outcome}"
+        )
+        _tell_written([done.path])
+    print(run_words(done.case.structure, history, rest.dead.joints))
+    _tell_written(write_run(done, rest, done.path.parent))
+
+
+def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path) -> None:
+    """Print one line for each pair that was run, and say where not all of them were.
+
+    Raises:
+        DidNotConverge: a step of some pairs failed.
+        KeyboardInterrupt: Ctrl-C ended the last.
+    """
+    from archfem.cases.report import write_pairs
+    from archfem.cases.summary import pair_table
+
+    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{pair_table(runs)}")
+    _tell_written(write_pairs(runs, rest, folder))
+    if any(run.ended is Ending.INTERRUPTED for run in runs.values()):
         print("run the same command again to go on with the pairs that are left", file=sys.stderr)
         raise KeyboardInterrupt
     broken = [name for name, run in runs.items() if not run.ended.by_itself]
@@ -173,101 +228,38 @@ def _run_suite(case: Case, dead: "Equilibrium", damping: Rayleigh | None, folder
         )
 
 
-def _run_pair(
-    case: Case, motion: Motion, dead: "Equilibrium", damping: Rayleigh | None, *, folder: Path
-) -> "History":
-    """Run one pair, or take what an earlier command left of it; a failed step ends the pair only.
+def _tell_limit(case: Case, found: Collapse) -> None:
+    """Print what limit analysis found."""
+    from archfem.cases.summary import collapse_words
 
-    Raises:
-        DidNotConverge: not even the first step could be made.
-    """
-    from archfem.cases.report import write_motion, write_run
-    from archfem.cases.run import finished
-
-    summary = folder / "summary.txt"  # written last
-    run = finished(folder / "history.nc", case, motion)
-    if run is not None:
-        print(f"{motion.name}: finished before, kept {folder / 'history.nc'}")
-        if summary.is_file():
-            return run
-    else:
-        summary.unlink(missing_ok=True)
-        try:
-            run = _shake(case, motion, dead, damping, folder=folder)
-        except DidNotConverge as error:
-            if error.history is None:
-                raise
-            print(f"archfem: {motion.name}: {error}", file=sys.stderr)
-            run = error.history
-    _tell_written([*write_motion(motion, folder), *write_run(case, run, dead, folder)])
-    _tell(run, dead, folder)
-    return run
+    print(collapse_words(case.structure, found))
 
 
-def _dead_load(case: Case) -> "Equilibrium":
-    from archfem.cases.run import at_rest
-    from archfem.statics.strength import strength_use, use_sentence
-
-    print(case.title)
-    start = perf_counter()
-    dead = at_rest(case)
-    model, joints = dead.model, judged(dead.joints)
+def _tell_rest(rest: Rest) -> None:
+    """Print the size of the model and how its joints and blocks are used under dead load."""
+    model, joints = rest.dead.model, judged(rest.dead.joints)
+    structure = rest.case.structure
     print(
-        f"model: {model.fidelity}, {len(case.structure.free)} blocks, "
-        f"{len(case.structure.joints)} joints, {model.size} coordinates "
-        f"({perf_counter() - start:.2f} s with the dead load)"
+        f"model: {model.fidelity}, {len(structure.free)} blocks, "
+        f"{len(structure.joints)} joints, {model.size} coordinates "
+        f"({rest.seconds:.2f} s with the dead load)"
     )
     print(
         f"dead load: |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "
         f"N ≥ {float(joints['N'].min()) / 1e3:.2f} kN"
     )
-    if model.cells.stress is not None:
-        print(f"dead load: {use_sentence(strength_use(model, dead.q))}")
-    return dead
+    if rest.use is not None:
+        print(f"dead load: {use_sentence(rest.use)}")
 
 
-def _shake(
-    case: Case, motion: Motion, dead: "Equilibrium", damping: Rayleigh | None, *, folder: Path
-) -> "History":
-    """Run a time history and keep it in its folder, also where it fails."""
-    from archfem.cases.run import shaken
-
-    start = perf_counter()
-    try:
-        run = shaken(case, motion, dead, damping)
-    except DidNotConverge as error:
-        if error.history is not None:
-            error.history.save(folder / "history.nc")
-            print(f"what was computed is kept in {folder / 'history.nc'}", file=sys.stderr)
-        raise
-    taken = perf_counter() - start
-    print(
-        f"time history: {motion.name}, peak {motion.pga:.2f} m/s², "
-        f"{float(run.time[-1]):.2f} s in {taken:.1f} s; {run.outcome}"
-    )
-    _tell_written([run.save(folder / "history.nc")])
-    return run
-
-
-def _tell(run: "History", dead: "Equilibrium", folder: Path) -> None:
-    """Print the table of joints and the mechanisms, and keep them as text."""
-    from archfem.cases.summary import joint_table, verdict
-    from archfem.statics.strength import utilisation_sentence
-
-    strength = utilisation_sentence(dead.model.structure, run.joints)
-    text = f"{joint_table(run.joints, dead.joints)}\n\n{strength}\n{verdict(run)}"
-    (folder / "summary.txt").write_text(text + "\n", encoding="utf-8")
-    print(text)
-
-
-def _tell_motions(suite: "Suite") -> None:
+def _tell_motions(suite: Suite) -> None:
     """Print what matching did, or how strong the motions are."""
     from archfem.cases.summary import match_table, motion_table
 
     print(match_table(suite.matches) if suite.matches else motion_table(suite.motions))
 
 
-def _tell_written(files: Sequence[Path]) -> None:
+def _tell_written(files: Iterable[Path]) -> None:
     for path in files:
         print(f"wrote {path}")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem.arrays import Array
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.files import in_one_stroke
@@ -42,22 +43,38 @@ class Finding:
     search: dict[str, Any] | None = None
 
     def of_pairs(self, pairs: Sequence[str]) -> "Finding":
-        """What was found under some of the pairs."""
+        """Return what was found under some of the pairs.
+
+        Args:
+            pairs: their names; those of which nothing is known are left out.
+        """
         runs, scales = ({p: of[p] for p in pairs if p in of} for of in (self.runs, self.scales))
         return replace(self, runs=runs, scales=scales)
 
-    def least(self, definition: str) -> np.ndarray:
-        """Least factor that fails by a definition, of each pair (pairs,) [-]."""
+    def least(self, definition: str) -> Array:
+        """Return the least factor that fails by a definition, of each pair (pairs,) [-].
+
+        Args:
+            definition: one of `DEFINITIONS`.
+        """
         return np.array([found[definition][0] for found in self.scales.values()])
 
     @property
-    def factors(self) -> dict[str, np.ndarray]:
+    def factors(self) -> dict[str, Array]:
         """`least` of each definition."""
         return {definition: self.least(definition) for definition in DEFINITIONS}
 
 
 def of_run(run: History) -> dict[str, Any]:
-    """What a study keeps of a run: maxima by part, and the first mechanism by each definition."""
+    """Return what a study keeps of a run.
+
+    Args:
+        run: what happened.
+
+    Returns:
+        The largest |e| and V / N of each part [-], the first mechanism by each definition, and how
+        the run ended, ready to be written as JSON.
+    """
     joints = judged(run.joints)
     return {
         "eccentricity": by_part(abs(joints["eccentricity"]).max("time").fillna(0.5)),
@@ -72,13 +89,17 @@ def of_run(run: History) -> dict[str, Any]:
 
 
 def by_part(values: xr.DataArray) -> dict[str, float]:
-    """Largest value of each part's joints."""
+    """Return the largest value of each part's joints.
+
+    Args:
+        values: over joint, with the coordinate `part`.
+    """
     largest = values.groupby("part").max()
     return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
 
 
 def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | None:
-    """Read what an earlier command found of the same case, without factors searched for otherwise.
+    """Return what an earlier command found of a case, without factors searched for otherwise.
 
     What an earlier version wrote, which kept only words of how runs ended, is not taken.
 
@@ -86,6 +107,9 @@ def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | N
         path: of the file that `write` has written.
         case: as text.
         search: options of the search for factors, None where none are wanted.
+
+    Returns:
+        The findings; None where there are none of the same case.
     """
     try:
         found = Finding(**json.loads(path.read_text(encoding="utf-8")))
@@ -99,13 +123,18 @@ def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | N
 
 
 def write(finding: Finding, path: Path) -> None:
-    """Write findings in one stroke."""
+    """Write findings in one stroke.
+
+    Args:
+        finding: what was found of a case.
+        path: the file, JSON.
+    """
     with in_one_stroke(path) as draft:
         draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
 
 
 def study_table(findings: Mapping[str, Finding]) -> str:
-    """Two tables, a line for each case.
+    """Return two tables, a line for each case.
 
     The first tells of the motions as each case applies them: the first mode, the gravest joint of
     rings and piers (its median over the pairs), and in how many pairs each definition of a
@@ -159,7 +188,7 @@ def _largest(finding: Finding, role: str) -> str:
     return f"{np.median(known):.3f}" if known else "-"
 
 
-def _range(factors: np.ndarray) -> str:
+def _range(factors: Array) -> str:
     """Median and range of factors; a dash where there is none up to the largest that was tried."""
     if not len(factors) or np.isinf(factors).all():
         return "-"

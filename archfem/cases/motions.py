@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from archfem.cases.settings import Table, checked
+from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum, Eurocode8, TableSpectrum, Tbec2018
 from archfem.motion.motion import Motion
@@ -42,7 +42,7 @@ TARGETS: dict[str, tuple[Callable[..., DesignSpectrum], Table]] = {
 
 
 def motion_settings(given: Any, section: str = "motion") -> dict[str, Any]:
-    """Check what a case says of one motion.
+    """Return what a case says of one motion, checked.
 
     Args:
         given: the table as read.
@@ -58,7 +58,7 @@ def motion_settings(given: Any, section: str = "motion") -> dict[str, Any]:
 
 
 def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion") -> Motion:
-    """Read or make a motion, then resample, cut and scale it.
+    """Return a motion as a case describes it: read or made, then resampled, cut and scaled.
 
     Args:
         settings: as checked by `motion_settings`.
@@ -88,7 +88,10 @@ def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion
 
 
 def suite_settings(given: Any) -> dict[str, Any]:
-    """Check what a case says of a suite.
+    """Return what a case says of a suite, checked.
+
+    Args:
+        given: the table as read.
 
     Raises:
         InvalidInput: a key or value cannot be meant, there is no pair, or no target to match.
@@ -118,7 +121,10 @@ def suite_settings(given: Any) -> dict[str, Any]:
 
 
 def target_spectrum(settings: Table) -> DesignSpectrum | None:
-    """Make the target spectrum of a suite, or None where it has none.
+    """Return the target spectrum of a suite, or None where it has none.
+
+    Args:
+        settings: as checked by `suite_settings`.
 
     Raises:
         InvalidInput: the code is not known, or what it needs is missing or out of range.
@@ -126,9 +132,7 @@ def target_spectrum(settings: Table) -> DesignSpectrum | None:
     if "target" not in settings:
         return None
     given = dict(settings["target"])
-    code = given.pop("code", None)
-    if code not in list(TARGETS):
-        raise InvalidInput(f"suite.target.code = {code!r} is not known: use one of {list(TARGETS)}")
+    code = chosen(given.pop("code", None), TARGETS, "suite.target.code")
     make, keys = TARGETS[code]
     try:
         return make(**checked(given, keys, "suite.target"))
@@ -137,7 +141,7 @@ def target_spectrum(settings: Table) -> DesignSpectrum | None:
 
 
 def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
-    """Read or make the pairs of a suite, under their own names, and match them where asked.
+    """Return a suite of pairs, read or made, under their own names, and matched where asked.
 
     Args:
         settings: as checked by `suite_settings`.

@@ -1,4 +1,4 @@
-"""The pictures of runs, suites and motions, written to a folder."""
+"""Files of what was found: tables and pictures, in a folder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,60 +7,87 @@ from pathlib import Path
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.findings import Finding, study_table
+from archfem.cases.run import Rest, Run
+from archfem.cases.study import Study
+from archfem.cases.summary import accuracy_words, collapse_words, pair_table, run_words
 from archfem.dynamics.history import History
+from archfem.dynamics.tradeoff import Accuracy
+from archfem.files import in_one_stroke
 from archfem.joints.criteria import judged
+from archfem.limit.collapse import Collapse
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.strength import strength_use, use_table
+from archfem.statics.modes import Modes
+from archfem.statics.strength import use_table
+from archfem.view.accuracy import draw_accuracy
+from archfem.view.collapse import collapse_figure
 from archfem.view.envelopes import draw_envelope
 from archfem.view.freebody import draw_free_body
 from archfem.view.joints import draw_joint_histories
+from archfem.view.modes import animate_modes, draw_modes
 from archfem.view.motions import accelerogram, spectra, suite_spectra
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_structure
+from archfem.view.studies import draw_study
 from archfem.view.style import LINES, save
 
+SUMMARY = "summary.txt"
+"""Table of a run; it is written last, and so tells that the other files of the run are there."""
 
-def write_dead(case: Case, dead: Equilibrium, folder: Path) -> list[Path]:
+
+def write_limit(case: Case, found: Collapse, folder: Path) -> list[Path]:
+    """Write what limit analysis found, and draw the mechanism over the structure.
+
+    Args:
+        case: what was asked.
+        found: what limit analysis found.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
+    words = collapse_words(case.structure, found)
+    figure = collapse_figure(case.structure, found)
+    return [_write(words, folder / "limit.txt"), save(figure, folder / "collapse.png")]
+
+
+def write_dead(rest: Rest, folder: Path) -> list[Path]:
     """Draw the dead load: thrust lines; where there is a mesh, stress; a free body where asked.
 
     Args:
-        case: names the block to be cut free, if any.
-        dead: the equilibrium.
+        rest: a case, which names the block to be cut free, if any, and its dead load.
         folder: for the files.
 
     Returns:
         The files, a table of stress by part among them.
     """
-    model, structure = dead.model, dead.model.structure
+    case, dead, model, structure = rest.case, rest.dead, rest.dead.model, rest.case.structure
     files = [
         save(draw_structure(structure, dead.joints, criteria=case.criteria), folder / "dead.png")
     ]
-    if model.cells.stress is not None:
+    if rest.use is not None:
         files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))
-        table = folder / "dead_stress.txt"
-        table.write_text(use_table(strength_use(model, dead.q)) + "\n", encoding="utf-8")
-        files.append(table)
+        files.append(_write(use_table(rest.use), folder / "dead_stress.txt"))
     if "free_body" in case.output:
         body = draw_free_body(structure, dead.joints, case.output["free_body"], cells=model.cells)
         files.append(save(body, folder / "free_body.png"))
     return files
 
 
-def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list[Path]:
+def write_run(done: Run, rest: Rest, folder: Path) -> list[Path]:
     """Draw a run: its gravest instant, envelope, two joints over time, and film it where asked.
 
     Args:
-        case: tells title, which joints, and whether to film.
-        run: what happened.
-        dead: the state before.
+        done: a case, which tells title, which joints, and whether to film, and what happened.
+        rest: the state before.
         folder: for the files.
 
     Returns:
-        The files.
+        The files, the table of joints last.
     """
+    case, run, dead = done.case, done.history, rest.dead
     worst = abs(judged(run.joints)["eccentricity"]).max("time").fillna(0.5)
     chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
     figures = {
@@ -68,16 +95,32 @@ def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
         "joints.png": draw_joint_histories(run, chosen),
     }
-    files = [save(figure, folder / name) for name, figure in figures.items()]
+    files = write_motion(done.motion, folder) if case.suite is not None else []
+    files += [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
         from archfem.view.films.scenes import animate  # loads pyvista, which is slow
 
         files.append(animate(dead.model, run, folder / "hinges.mp4"))
-    return files
+    return [*files, _write(run_words(case.structure, run, dead.joints), folder / SUMMARY)]
+
+
+def is_written(done: Run) -> bool:
+    """Return whether the files of a run are there already, and not older than its history.
+
+    Args:
+        done: a run that was kept in a file.
+    """
+    if done.path is None or not (summary := done.path.with_name(SUMMARY)).is_file():
+        return False
+    return summary.stat().st_mtime_ns >= done.path.stat().st_mtime_ns
 
 
 def gravest(run: History) -> xr.Dataset:
-    """Joints at the instant of the first mechanism, or of the largest eccentricity."""
+    """Return the joints at the instant of the first mechanism, or of the largest eccentricity.
+
+    Args:
+        run: what happened.
+    """
     if run.mechanism is not None:
         return run.joints.sel(time=run.mechanism.time, method="nearest")
     worst = abs(judged(run.joints)["eccentricity"]).max("joint")
@@ -85,24 +128,104 @@ def gravest(run: History) -> xr.Dataset:
 
 
 def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
-    """Draw the spectra of a suite beside its target."""
+    """Draw the spectra of a suite beside its target.
+
+    Args:
+        suite: the motions.
+        target: spectrum they were matched to, if any.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
     return [save(suite_spectra(suite, target), folder / "spectra.png")]
 
 
 def write_motion(motion: Motion, folder: Path) -> list[Path]:
-    """Draw a motion as it is applied, with its integrals."""
+    """Draw a motion as it is applied, with its integrals.
+
+    Args:
+        motion: of the ground.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
     return [save(accelerogram(motion), folder / "motion.png")]
 
 
-def write_envelopes(runs: Mapping[str, History], dead: Equilibrium, folder: Path) -> list[Path]:
-    """Draw the envelopes of all runs in one picture, or six to a picture where there are more."""
+def write_pairs(runs: Mapping[str, History], rest: Rest, folder: Path) -> list[Path]:
+    """Write one line a run of a suite, and draw the envelopes of all, at most six to a picture.
+
+    Args:
+        runs: what to call each run, and the run.
+        rest: the state before.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
     pairs, most = list(runs.items()), len(LINES)
     parts = [dict(pairs[first : first + most]) for first in range(0, len(pairs), most)]
     names = ["envelope.png", *(f"envelope_{number}.png" for number in range(2, len(parts) + 1))]
-    return [
-        save(draw_envelope(part, dead=dead.joints), folder / name)
+    files = [
+        save(draw_envelope(part, dead=rest.dead.joints), folder / name)
         for name, part in zip(names, parts, strict=True)
     ]
+    return [_write(pair_table(runs), folder / "suite.txt"), *files]
+
+
+def write_modes(found: Modes, damping: str, folder: Path) -> list[Path]:
+    """Write the table of modes, draw their shapes, and film the first two.
+
+    Args:
+        found: the modes.
+        damping: in words, below the table.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
+    first = range(1, min(len(found.frequencies), 2) + 1)
+    return [
+        _write(f"{found.table()}\n\n{damping}", folder / "modes.txt"),
+        save(draw_modes(found), folder / "modes.png"),
+        animate_modes(found, folder / "modes.gif", first),
+    ]
+
+
+def write_accuracy(found: Accuracy, folder: Path) -> list[Path]:
+    """Write and draw speed against error.
+
+    Args:
+        found: as by `archfem.accuracy`.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
+    return [
+        _write(accuracy_words(found), folder / "accuracy.txt"),
+        save(draw_accuracy(found), folder / "accuracy.png"),
+    ]
+
+
+def write_study(study: Study, findings: Mapping[str, Finding], folder: Path) -> list[Path]:
+    """Write the tables of a study, and draw the factors at first mechanism where it asks for them.
+
+    Args:
+        study: what was compared.
+        findings: by name of the case.
+        folder: for the files.
+
+    Returns:
+        The files.
+    """
+    files = [_write(f"{study.title}\n\n{study_table(findings)}", folder / "study.txt")]
+    if study.scales is not None:
+        factors = {name: each.factors for name, each in findings.items()}
+        files.append(save(draw_study(factors, study.reduction), folder / "study.png"))
+    return files
 
 
 def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
@@ -111,15 +234,30 @@ def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
     Args:
         motions: with names of their own, which the files bear.
         folder: for the files.
+
+    Returns:
+        The files.
     """
     files = [save(accelerogram(motion), folder / f"{motion.name}.png") for motion in motions]
     return [*files, save(spectra(motions), folder / "spectra.png")]
 
 
 def named_apart(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:
-    """Give motions the names of their files; where names are the same, with a number behind."""
+    """Return motions with the names of their files; where names are the same, with a number behind.
+
+    Args:
+        motions: as read.
+        names: of their files, as many.
+    """
     named: list[Motion] = []
     for index, (motion, name) in enumerate(zip(motions, names, strict=True)):
         before = list(names[:index]).count(name)
         named.append(replace(motion, name=f"{name} ({before + 1})" if before else name))
     return named
+
+
+def _write(text: str, path: Path) -> Path:
+    """Write lines of text in one stroke."""
+    with in_one_stroke(path) as draft:
+        draft.write_text(text + "\n", encoding="utf-8")
+    return path

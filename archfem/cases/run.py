@@ -1,20 +1,32 @@
-"""Carry out what a case describes: dead load, time histories, and what earlier runs have left."""
+"""Carry out what a case describes: limit analysis, dead load, runs; go on where one was ended."""
 
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from time import perf_counter
 
 import numpy as np
+import xarray as xr
 
 from archfem.cases.case import Case
 from archfem.dynamics.damping import effective_range
 from archfem.dynamics.events import CountedMechanism
-from archfem.dynamics.history import History
-from archfem.dynamics.ladder import Damping, build
+from archfem.dynamics.history import Ending, History
+from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveRayleigh, Rayleigh
 from archfem.dynamics.time_history import Record, time_history
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.collapse import Collapse
+from archfem.models.build import build
+from archfem.models.model import Model
 from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.strength import strength_use
+
+HISTORY = "history.nc"
+"""Name of a history's file."""
 
 FRAMES = 10
 """Steps between two fields that are kept for an animation, unless the case says otherwise."""
@@ -22,40 +34,170 @@ FRAMES = 10
 SAME = 1e-6
 """Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
 
+Shake = Callable[[Case, Motion, Equilibrium, Rayleigh | None], History]
+"""Runs a motion of a case from its dead load, with damping, as `shaken` does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A case under its dead load, from which its runs start.
+
+    What follows from the dead load is worked out when first asked for, and once.
+
+    Attributes:
+        case: what was asked.
+        dead: the equilibrium.
+        seconds: that finding it took [s].
+    """
+
+    case: Case
+    dead: Equilibrium
+    seconds: float = 0.0
+
+    @classmethod
+    def of(cls, case: Case) -> "Rest":
+        """Return a case with its dead load, as found by `at_rest`.
+
+        Args:
+            case: what was asked.
+        """
+        start = perf_counter()
+        dead = at_rest(case)
+        return cls(case, dead, perf_counter() - start)
+
+    @cached_property
+    def use(self) -> xr.Dataset | None:
+        """Stress in the blocks and use of their strength, as by `strength_use`; None if rigid."""
+        model = self.dead.model
+        return None if model.cells.stress is None else strength_use(model, self.dead.q)
+
+    @cached_property
+    def damping(self) -> tuple[Rayleigh | None, str]:
+        """Damping of the runs, and in words how it was found, as by `damping_of`."""
+        return damping_of(self.case, self.dead)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A case under one motion.
+
+    Attributes:
+        case: what was asked, with this motion alone.
+        motion: as it was applied.
+        history: what happened, also where a step failed or Ctrl-C ended it.
+        path: file of the history; None where it was not to be kept.
+        kept: whether an earlier command had finished it.
+        seconds: that it took [s]; zero where it was kept.
+        error: of the step that failed, if one did.
+    """
+
+    case: Case
+    motion: Motion
+    history: History
+    path: Path | None = None
+    kept: bool = False
+    seconds: float = 0.0
+    error: DidNotConverge | None = None
+
+
+Result = Collapse | Rest | Suite | Run
+"""What carrying out a case finds."""
+
+
+def carried_out(
+    case: Case,
+    folder: str | Path | None = None,
+    *,
+    pairs: Collection[str] | None = None,
+    shake: Shake | None = None,
+) -> Iterator[Result]:
+    """Carry out a case, and give each result as soon as it is found.
+
+    Where there is a folder, each history is kept in it, one motion's as history.nc, that of a pair
+    in a folder of the pair's name. A pair that an earlier call has finished, of the same case and
+    under the same motion, is taken from there, so that the same call again goes on where one was
+    ended. A step that fails ends its run only; Ctrl-C ends the run, which is still given, and with
+    it the suite.
+
+    Args:
+        case: what is asked.
+        folder: for the histories; None keeps none.
+        pairs: names of the pairs of its suite that are run; None for all.
+        shake: runs a motion; by default `shaken`.
+
+    Yields:
+        A `Collapse` where the case asks for limit analysis; a `Rest`, the dead load; where there
+        is a suite, the `Suite`; and for each motion a `Run`.
+
+    Raises:
+        InvalidInput: a motion cannot be read, or a structure not be taken as rigid blocks.
+        DidNotConverge: the structure does not stand, a motion cannot be matched, or not even the
+            first step of a run could be made.
+    """
+    shake, folder = shake or shaken, None if folder is None else Path(folder)
+    if case.limit is not None:
+        yield case.limit.of(case.structure)
+    rest = Rest.of(case)
+    yield rest
+    if case.suite is not None:
+        suite = (case if pairs is None else case.alone(*pairs)).ground_suite()
+        yield suite
+        for motion in suite.motions:
+            run = _of_pair(rest, motion, folder, shake)
+            yield run
+            if run.history.ended is Ending.INTERRUPTED:
+                break
+    elif case.motion is not None:
+        path = None if folder is None else folder / HISTORY
+        yield _run(case, case.ground_motion(), rest, path, shake)
+
 
 def at_rest(case: Case) -> Equilibrium:
-    """Build the model of a case and find its dead load.
+    """Return the dead load of a case, on the model that it names.
 
     With fidelity "auto" the model is chosen for the case's own motion, or the first of its suite.
+
+    Args:
+        case: what was asked.
 
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    return dead_load(build(case.structure, **case.model, **_wanted(case)))
+    return dead_load(_chosen(case) if case.chooses else build(case.structure, case.discretisation))
 
 
-def _wanted(case: Case) -> dict[str, Any]:
-    """What the choice of a model needs to know of the run to come."""
-    if case.model.get("fidelity") != "auto":
-        return {}
+def _chosen(case: Case) -> Model:
+    """Choose a model for the runs to come, by the case's motion where it has one."""
     motion = None
     if case.motion is not None:
         motion = case.ground_motion()
     elif case.suite is not None:
         first = next(iter(case.suite["pairs"]))  # the others need not be matched for this
         motion = case.alone(first).ground_suite().motions[0]
-    return {"motion": motion, "damping": expected_damping(case), "dt": case.analysis.get("dt")}
+    damping, dt = expected_damping(case), case.analysis.get("dt")
+    return choose(case.structure, case.tolerance, motion, damping, dt)
 
 
 def expected_damping(case: Case) -> Damping:
-    """Damping of a case whose model is not yet chosen: known, or a function of the finest model."""
+    """Return the damping of a case whose model is not chosen yet.
+
+    Args:
+        case: what was asked.
+
+    Returns:
+        What the case says, or a function that finds it of the finest model.
+    """
     if isinstance(case.damping, EffectiveRayleigh):
         return lambda model: damping_of(case, dead_load(model))[0]
     return case.damping
 
 
 def damping_of(case: Case, dead: Equilibrium) -> tuple[Rayleigh | None, str]:
-    """Damping of a case about its dead load, and in words how it was found.
+    """Return the damping of a case about its dead load, and in words how it was found.
+
+    Args:
+        case: what was asked.
+        dead: its dead load.
 
     Raises:
         InvalidInput: it is to be that of the effective modes, and fewer than two are.
@@ -73,7 +215,7 @@ def damping_of(case: Case, dead: Equilibrium) -> tuple[Rayleigh | None, str]:
 def shaken(
     case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None = None
 ) -> History:
-    """Run the time history of a case under a motion; the history carries the case.
+    """Return the time history of a case under a motion; the history carries the case.
 
     Args:
         case: tells steps, scheme, damping, and what to record.
@@ -109,12 +251,15 @@ def shaken(
 
 
 def finished(path: Path, case: Case, motion: Motion) -> History | None:
-    """Read what an earlier run left, where it ended by itself, of the same case and motion.
+    """Return what an earlier run left, where it ended by itself, of the same case and motion.
 
     Args:
         path: file of the history.
         case: to compare with the one in the file.
         motion: to compare with the ground motion in the file.
+
+    Returns:
+        The history; None where there is none, or one that broke off, or of another case or motion.
     """
     try:
         run = History.read(path, case.structure)
@@ -125,3 +270,27 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
         return None
     before, now = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
+
+
+def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> Run:
+    """Run a pair, or take what an earlier command left of it."""
+    case = rest.case.alone(motion.name)
+    path = None if folder is None else folder / motion.name / HISTORY
+    if path is not None and (history := finished(path, case, motion)) is not None:
+        return Run(case, motion, history, path, kept=True)
+    return _run(case, motion, rest, path, shake)
+
+
+def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake) -> Run:
+    """Run a motion and keep its history, also where a step fails."""
+    start, failure = perf_counter(), None
+    try:
+        history = shake(case, motion, rest.dead, rest.damping[0])
+    except DidNotConverge as error:
+        if error.history is None:
+            raise
+        history, failure = error.history, error
+    seconds = perf_counter() - start
+    if path is not None:
+        history.save(path)
+    return Run(case, motion, history, path, seconds=seconds, error=failure)

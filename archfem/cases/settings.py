@@ -25,6 +25,9 @@ def checked(given: Any, keys: Table, section: str) -> dict[str, Any]:
         keys: what each key may hold.
         section: name of the table, for errors.
 
+    Returns:
+        The table with its numbers in the units asked for.
+
     Raises:
         InvalidInput: it is no table, a key is unknown or a value of the wrong kind.
     """
@@ -37,6 +40,11 @@ def checked(given: Any, keys: Table, section: str) -> dict[str, Any]:
 def refuse_unknown(given: Table, keys: Iterable[str], section: str = "") -> None:
     """Refuse keys that nothing would read.
 
+    Args:
+        given: the table as read.
+        keys: those there are.
+        section: name of the table, for errors; none for the whole case.
+
     Raises:
         InvalidInput: names the key, and the nearest one there is.
     """
@@ -46,8 +54,30 @@ def refuse_unknown(given: Table, keys: Iterable[str], section: str = "") -> None
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 
+def chosen(value: Any, known: Iterable[str], key: str) -> str:
+    """Return a word that must be one of several.
+
+    Args:
+        value: as read.
+        known: the words there are.
+        key: where it stands, for errors.
+
+    Raises:
+        InvalidInput: it is none of them.
+    """
+    words = list(known)
+    if value not in words:
+        raise InvalidInput(f"{key} = {value!r} is not known: use one of {words}")
+    return str(value)
+
+
 def merged(below: Table, above: Table) -> dict[str, Any]:
-    """Tables of one case over those of another: what both have is taken from `above`."""
+    """Return the tables of one case over those of another, key by key.
+
+    Args:
+        below: tables of the one that is changed.
+        above: tables of the other, from which is taken what both have.
+    """
     result = dict(below)
     for key, value in above.items():
         under = result.get(key)
@@ -58,6 +88,10 @@ def merged(below: Table, above: Table) -> dict[str, Any]:
 
 def remove(settings: dict[str, Any], path: str) -> None:
     """Take out the table or value at "section.key".
+
+    Args:
+        settings: tables of a case, which are changed.
+        path: names of tables and the key, with dots between them.
 
     Raises:
         InvalidInput: there is none.
@@ -73,6 +107,10 @@ def remove(settings: dict[str, Any], path: str) -> None:
 
 def change(settings: dict[str, Any], text: str) -> None:
     """Set one value from "section.key=value", read as TOML, or as a word.
+
+    Args:
+        settings: tables of a case, which are changed.
+        text: names of tables and the key with dots between them, "=" and the value.
 
     Raises:
         InvalidInput: the text is no change, or a parent of the key is not a table.

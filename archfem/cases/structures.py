@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from archfem.cases.settings import Table, checked
+from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
 from archfem.masonry.shapes.bridges import bridge
@@ -12,6 +12,8 @@ from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.shapes.rings import arch_on_piers, circular_arch, column
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.survey import Layer, surveyed
+
+Made = TypeVar("Made")
 
 WORDS = {"shape": str, "material": str, "contact": str}
 COMMON = {"width": "m", "gravity": "m/s**2"}
@@ -95,7 +97,7 @@ CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1
 
 
 def planned(settings: Table, folder: Path = Path()) -> Structure:
-    """Build the structure that a case describes.
+    """Return the structure that a case describes.
 
     Args:
         settings: tables "structure", "materials" and "contacts".
@@ -106,9 +108,7 @@ def planned(settings: Table, folder: Path = Path()) -> Structure:
         InvalidStructure: the lengths do not make a structure.
     """
     given = settings.get("structure", {})
-    name = given.get("shape")
-    if name not in list(SHAPES):
-        raise InvalidInput(f"structure.shape = {name!r} is not known: use one of {list(SHAPES)}")
+    name = chosen(given.get("shape"), SHAPES, "structure.shape")
     shape, keys = SHAPES[name]
     values = checked(given, {**WORDS, **keys}, "structure")
     del values["shape"]
@@ -165,7 +165,7 @@ def _outlines(values: dict[str, Any], settings: Table, folder: Path) -> dict[str
     return drawn
 
 
-def _several(make: Callable[..., Any], keys: Table, given: Table, section: str) -> list[Any]:
+def _several(make: Callable[..., Made], keys: Table, given: Table, section: str) -> list[Made]:
     """Parts of one kind: what the table says of all, and each subtable of the part it names."""
     each = {name: own for name, own in given.items() if isinstance(own, dict)}
     if not each:
@@ -181,7 +181,7 @@ def _several(make: Callable[..., Any], keys: Table, given: Table, section: str) 
     ]
 
 
-def _made(make: Callable[..., Any], section: str, **values: Any) -> Any:
+def _made(make: Callable[..., Made], section: str, **values: Any) -> Made:
     """Make something of the values of a table, naming the table where a value is missing."""
     try:
         return make(**values)
@@ -199,7 +199,9 @@ def _contact(settings: Table, name: str) -> Contact:
     return _named(settings, "contacts", name, CONTACT, (CONTACTS, Contact))
 
 
-def _named(settings: Table, section: str, name: str, keys: Table, kind: tuple[Any, type]) -> Any:
+def _named(
+    settings: Table, section: str, name: str, keys: Table, kind: tuple[Table, Callable[..., Made]]
+) -> Made:
     presets, make = kind
     own = settings.get(section, {})
     if name not in presets and name not in own:

@@ -3,23 +3,22 @@
 import logging
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from archfem.cases.case import Case
 from archfem.cases.findings import Finding, by_part, kept, of_run, write
-from archfem.cases.run import at_rest, damping_of, shaken
+from archfem.cases.run import Rest, Result, Run, carried_out
 from archfem.cases.settings import checked, refuse_unknown
-from archfem.dynamics.history import Ending
-from archfem.dynamics.scales import mechanism_scales
-from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.history import Ending, History
+from archfem.dynamics.scales import MechanismScales, mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import judged, roles_of
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
+from archfem.motion.suite import Suite
 from archfem.statics.modes import modes
 
 logger = logging.getLogger("archfem")
@@ -27,6 +26,12 @@ logger = logging.getLogger("archfem")
 CASE = {"case": str, "set": [str]}
 SCALES = {"precision": "1", "between": ["1"]}
 STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
+
+CarryOut = Callable[..., Iterator[Result]]
+"""Carries out a case, as `archfem.cases.run.carried_out` does."""
+
+Search = Callable[..., MechanismScales]
+"""Finds the factors on a motion at which mechanisms begin, as `mechanism_scales` does."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Study:
     def reduction(self) -> float:
         """Factor R of the first case's suite [-]."""
         suite = next(iter(self.cases.values())).suite or {}
-        return suite.get("reduction", 1.0) / suite.get("scale", 1.0)
+        return float(suite.get("reduction", 1.0) / suite.get("scale", 1.0))
 
     @classmethod
     def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Study":
@@ -60,6 +65,9 @@ class Study:
             path: with a table [cases."name"] for each, of `case`, a file, and `set`, a list of
                 "section.key=value"; `set` above the tables changes all cases, before their own.
             changes: made to every case.
+
+        Returns:
+            The study.
 
         Raises:
             InvalidInput: the file or one of its cases cannot be meant.
@@ -93,12 +101,23 @@ class Study:
         )
 
 
-def carried_out(study: Study, folder: Path) -> Iterator[tuple[str, Finding]]:
+def compared(
+    study: Study,
+    folder: Path,
+    *,
+    carry_out: CarryOut = carried_out,
+    search: Search = mechanism_scales,
+) -> Iterator[tuple[str, Finding]]:
     """Carry out a study, case by case; what an earlier command found is kept.
 
     Args:
         study: what to compare.
         folder: for a file of each case's findings, written after every pair.
+        carry_out: carries out a case under those of its pairs of which not all is known.
+        search: finds the factors at which mechanisms begin.
+
+    Yields:
+        Name of a case, and what was found of it.
 
     Raises:
         DidNotConverge: a case does not stand under dead load.
@@ -111,8 +130,9 @@ def carried_out(study: Study, folder: Path) -> Iterator[tuple[str, Finding]]:
         wanted = _wanted(study, case, name)
         missing = [pair for pair in wanted if not _complete(study, finding, pair)]
         if missing:
+            results = carry_out(case, pairs=missing)
             try:
-                finding = _found(study, case, missing, finding, path)
+                finding = _found(study, results, finding, path, search)
             except DidNotConverge as error:
                 error.args = (f"'{name}': {error}",)
                 raise
@@ -132,29 +152,33 @@ def _wanted(study: Study, case: Case, name: str) -> list[str]:
 
 
 def _found(
-    study: Study, case: Case, pairs: Sequence[str], finding: Finding | None, path: Path
+    study: Study, results: Iterator[Result], finding: Finding | None, path: Path, search: Search
 ) -> Finding:
-    """Run some pairs of a case, and add to what was found of it before."""
-    dead = at_rest(case)
-    damping, _ = damping_of(case, dead)
-    finding = finding or _at_rest(case, dead)
-    finding.search = study.scales
-    for name in pairs:
-        suite = case.alone(name).ground_suite()
-        finding.runs[name] = _run(case, suite.motions[0], dead, damping)
-        if study.scales is not None:
-            whole = suite.pairs[0].scaled(suite.scale)
-            finding.scales[name] = _scales(case, whole, dead, damping, study.scales)
-        write(finding, path)
+    """Add the results of some pairs of a case to what was found of it before."""
+    for result in results:
+        if isinstance(result, Rest):
+            rest = result
+            finding = finding or _at_rest(rest)
+            finding.search = study.scales
+        elif isinstance(result, Suite):
+            whole = {pair.name: pair.scaled(result.scale) for pair in result.pairs}
+        elif isinstance(result, Run):
+            assert finding is not None
+            name = result.motion.name
+            finding.runs[name] = of_run(_whole(result))
+            if study.scales is not None:
+                finding.scales[name] = _scales(rest, whole[name], search, study.scales)
+            write(finding, path)
+    assert finding is not None
     return finding
 
 
-def _at_rest(case: Case, dead: Equilibrium) -> Finding:
+def _at_rest(rest: Rest) -> Finding:
     """What there is to say before the ground moves."""
-    first = modes(dead.model, 1, about=dead)
-    joints = judged(dead.joints)
+    first = modes(rest.dead.model, 1, about=rest.dead)
+    joints = judged(rest.dead.joints)
     return Finding(
-        case.text(),
+        rest.case.text(),
         float(first.frequencies[0]),
         float(first.mass_ratios[0, 0]),
         roles_of(joints),
@@ -162,18 +186,13 @@ def _at_rest(case: Case, dead: Equilibrium) -> Finding:
     )
 
 
-def _run(case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None) -> dict[str, Any]:
-    """Run one pair; where a step fails, what was found up to it counts."""
-    try:
-        run = shaken(case, motion, dead, damping)
-    except DidNotConverge as error:
-        if error.history is None:
-            raise
-        logger.warning("%s, %s: %s", case.title, motion.name, error)
-        run = error.history
-    if run.ended is Ending.INTERRUPTED:
+def _whole(run: Run) -> History:
+    """The history of a run that Ctrl-C has not ended; where a step failed, that up to it."""
+    if run.history.ended is Ending.INTERRUPTED:
         raise KeyboardInterrupt
-    return of_run(run)
+    if run.error is not None:
+        logger.warning("%s, %s: %s", run.case.title, run.motion.name, run.error)
+    return run.history
 
 
 def _search(given: Any) -> dict[str, Any] | None:
@@ -187,20 +206,16 @@ def _search(given: Any) -> dict[str, Any] | None:
 
 
 def _scales(
-    case: Case,
-    motion: Motion,
-    dead: Equilibrium,
-    damping: Rayleigh | None,
-    options: Mapping[str, Any],
+    rest: Rest, motion: Motion, search: Search, options: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
     """Factors on a motion at which mechanisms begin, and the largest below at which they do not."""
-    found = mechanism_scales(
-        dead.model,
+    found = search(
+        rest.dead.model,
         motion,
-        start=dead,
-        damping=damping,
-        dt=case.analysis.get("dt"),
-        criteria=case.criteria,
+        start=rest.dead,
+        damping=rest.damping[0],
+        dt=rest.case.analysis.get("dt"),
+        criteria=rest.case.criteria,
         **options,
     )
     if found.interrupted:

@@ -1,4 +1,4 @@
-"""What runs did to the joints, and how strong motions are, as tables of text."""
+"""What limit analysis and runs found, and how strong motions are, as text."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,11 +6,15 @@ import numpy as np
 import xarray as xr
 
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.tradeoff import Accuracy
 from archfem.joints.criteria import envelope, first_time, flagged, judged, longest_duration
+from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.counted import Mechanism
+from archfem.masonry.structure import Structure
 from archfem.motion.matching import Match
 from archfem.motion.measures import measures
 from archfem.motion.motion import Motion
+from archfem.statics.strength import utilisation_sentence
 from archfem.tables import aligned
 from archfem.units import STANDARD_GRAVITY
 
@@ -25,7 +29,7 @@ LOOSE = 100.0
 
 
 def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
-    """One line a joint: envelope, and when and how long it hinged, slid and was open.
+    """Return one line a joint: envelope, and when and how long it hinged, slid and was open.
 
     Only joints that are `judged` have a line.
 
@@ -57,7 +61,7 @@ def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
 
 
 def pair_table(runs: Mapping[str, History]) -> str:
-    """One line a run of a suite: its ground, the gravest joint, the mechanism, and how it ended.
+    """Return one line a run of a suite: its ground, the gravest joint, the mechanism, its end.
 
     Args:
         runs: what to call each run, and the run.
@@ -91,8 +95,59 @@ def pair_table(runs: Mapping[str, History]) -> str:
     return aligned(head, rows)
 
 
+def collapse_words(structure: Structure, found: Collapse) -> str:
+    """Return what limit analysis found in words: outcome and factor, hinges, sliding joints.
+
+    Args:
+        structure: whose joints they are.
+        found: as by `collapse_factor`.
+    """
+    joints = structure.joints
+    outcome = f"limit analysis: {found.outcome.sentence}"
+    if found.outcome is Outcome.COLLAPSES:
+        outcome += f", at a factor of {found.factor:.4g} on the load"
+    hinges = [f"{joints[number].name} at the {side}" for number, side in found.hinges]
+    sliding = [joints[number].name for number in found.sliding]
+    lines = [outcome]
+    lines += [f"hinges, by the face in contact: {_shortened(hinges, ', ')}"] if hinges else []
+    lines += [f"sliding: {_shortened(sliding, ', ')}"] if sliding else []
+    return "\n".join(lines)
+
+
+def accuracy_words(found: Accuracy) -> str:
+    """Return the table of a comparison of settings, its reference, and the setting to choose.
+
+    Args:
+        found: as by `archfem.accuracy`.
+    """
+    chosen = found.chosen.setting.label if found.chosen else "none: a finer model is needed"
+    lines = [
+        found.table(),
+        "",
+        f"reference: {found.reference.label}, in doubt by {found.doubt:.2g}",
+        f"chosen for an error of {found.tolerance:g}: {chosen}",
+    ]
+    return "\n".join(lines)
+
+
+def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
+    """Return what a run did: the table of its joints, use of strength, and its mechanisms.
+
+    Args:
+        structure: what was shaken.
+        run: what happened.
+        dead: joints under dead load alone.
+    """
+    strength = utilisation_sentence(structure, run.joints)
+    return f"{joint_table(run.joints, dead)}\n\n{strength}\n{verdict(run)}"
+
+
 def verdict(run: History) -> str:
-    """What a run's mechanisms are: a line for the first by count, one for the first verified."""
+    """Return a run's mechanisms in words: a line for the first by count, one for the verified.
+
+    Args:
+        run: what happened. Where it does not know its structure, there is no line for the verified.
+    """
     found = run.mechanism
     if found is None:
         count = run.criteria.failures
@@ -132,7 +187,7 @@ def _shortened(words: Sequence[str], comma: str) -> str:
 
 
 def motion_table(motions: Sequence[Motion]) -> str:
-    """One line a component: its step and its intensity measures.
+    """Return one line a component: its step and its intensity measures.
 
     The only component of a motion may have any direction, and is named so.
 
@@ -165,7 +220,7 @@ def motion_table(motions: Sequence[Motion]) -> str:
 
 
 def match_table(matches: Sequence[Match]) -> str:
-    """One line a component of matched motions: misfit, and measures before and after.
+    """Return one line a component of matched motions: misfit, and measures before and after.
 
     Args:
         matches: as a `Suite` keeps them.

@@ -1,0 +1,55 @@
+"""The command line: exit codes, and errors of one line."""
+
+from pathlib import Path
+
+import pytest
+
+import archfem as af
+from archfem.cases.cli import INTERRUPTED, exit_code, main
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+
+
+def test_an_output_that_is_no_folder_is_an_error_of_one_line(tmp_path, capsys):
+    (tmp_path / "out").write_text("a file")
+    given = ["run", str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / "out")]
+    assert main(given) == 1
+    assert "File exists" in capsys.readouterr().err
+
+
+def test_check_command(capsys):
+    assert main(["check", str(RING), "--set", "model.fidelity=rigid"]) == 0
+    assert "ready" in capsys.readouterr().out
+    assert main(["check", str(RING), "--set", "structure.radus=3"]) == 1
+    assert "did you mean 'radius'" in capsys.readouterr().err
+
+
+def test_run_of_a_ring_that_falls(tmp_path, capsys):
+    given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
+    assert main(["run", str(RING), "--out", str(tmp_path), *given]) == 1
+    assert "no equilibrium" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (None, 0, ""),
+        (af.InvalidInput("no such key"), 1, "archfem: no such key"),
+        (OSError("disk full"), 1, "archfem: disk full"),
+        (KeyboardInterrupt(), INTERRUPTED, "archfem: interrupted"),
+    ],
+)
+def test_exit_codes_say_how_a_command_ended(error, code, says, capsys):
+    def command():
+        if error is not None:
+            raise error
+
+    assert exit_code(command) == code
+    assert capsys.readouterr().err.strip() == says
+    assert INTERRUPTED == 130
+
+
+def test_words_that_are_no_command_end_with_two(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["rum", "ring.toml"])
+    assert "invalid choice: 'rum'" in capsys.readouterr().err

@@ -1,0 +1,61 @@
+"""What a study finds: kept in files, set side by side in tables."""
+
+import json
+
+from archfem.cases.findings import Finding, kept, study_table, write
+
+DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
+
+
+def finding(**given):
+    brackets = dict.fromkeys(DEFINITIONS, (1.0, 0.9))
+    run = {
+        "eccentricity": {"arch": 0.4},
+        "friction": {"arch": float("inf")},
+        "mechanisms": dict.fromkeys(DEFINITIONS),
+        "ended": "finished",
+        "outcome": "reached the end of the motion",
+    }
+    every = {
+        "case": "text",
+        "frequency": 9.0,
+        "mass": 0.7,
+        "roles": {"arch": "ring"},
+        "dead": {"arch": 0.2},
+        "runs": {"a": run, "b": run},
+        "scales": {"a": brackets, "b": brackets},
+    }
+    return Finding(**every | given)
+
+
+def test_a_study_tells_rings_from_piers_by_their_roles():
+    named = {"runs": {}, "scales": {}, "dead": {"vault": 0.2, "stem": 0.1}}
+    found = finding(roles={"vault": "ring", "stem": "pier"}, **named)
+    run = finding().runs["a"] | {"eccentricity": {"vault": 0.41, "stem": 0.32}}
+    found.runs = {"a": run}
+    head, row = study_table({"bridge": found}).splitlines()[:2]
+    assert row[head.index("|e| rings") :].split()[:2] == ["0.410", "0.320"]
+
+
+def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):
+    path = tmp_path / "case.json"
+    write(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
+    same = kept(path, "text", {"precision": 0.1, "between": [0.2, 2.0]})
+    assert set(same.scales) == {"a", "b"}
+    assert same.runs["a"]["friction"]["arch"] == float("inf")
+    finer = kept(path, "text", {"precision": 0.05, "between": [0.2, 2.0]})
+    assert (set(finer.runs), finer.scales) == ({"a", "b"}, {})
+    assert kept(path, "another text", None) is None
+    found = json.loads(path.read_text())
+    del found["runs"]["a"]["ended"]  # as an earlier version wrote it
+    path.write_text(json.dumps(found))
+    assert kept(path, "text", None) is None
+    assert kept(tmp_path / "none.json", "text", None) is None
+
+
+def test_a_table_counts_the_pairs_asked_for_and_runs_that_broke_off():
+    broken = finding().runs["a"] | {"ended": "failed", "outcome": "failed at 0.4 s: …"}
+    found = finding(runs={"a": finding().runs["a"], "b": broken})
+    assert "ring: 1 of 2 runs broke off" in study_table({"ring": found})
+    assert "broke off" not in study_table({"ring": found.of_pairs(["a"])})
+    assert "0 of 1" in study_table({"ring": found.of_pairs(["a"])})

@@ -1,0 +1,48 @@
+"""Tables of a case file: quantities, words, and changes."""
+
+import pytest
+
+import archfem as af
+from archfem.cases.settings import change, chosen, merged, remove
+
+
+def test_quantities():
+    assert af.units.in_unit("1.48 MPa/mm", "Pa/m", "k") == pytest.approx(1.48e9)
+    assert af.units.in_unit("20 kN/m^3", "N/m**3", "weight") == pytest.approx(20e3)
+    assert af.units.in_unit(159, "degree", "embrace") == 159.0
+    assert af.units.in_unit("0.5 g_0", "m/s**2", "pga") == pytest.approx(0.5 * 9.80665)
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        ("2 kg", "not in a unit like m"),
+        ("two", "not a quantity"),
+        ("2 furlonks", "not a quantity"),
+        ("(", "not a quantity"),
+        (float("nan"), "not finite"),
+        ("nan m", "not finite"),
+        (True, "not a number"),
+        ([1.0], "not a number"),
+    ],
+)
+def test_what_is_no_quantity(value, says):
+    with pytest.raises(af.InvalidInput, match=f"key = .*{says}"):
+        af.units.in_unit(value, "m", "key")
+
+
+def test_words_must_be_among_those_there_are():
+    assert chosen("a", {"a": 1, "b": 2}, "section.key") == "a"
+    for wrong in ("c", None, ["a"]):
+        with pytest.raises(af.InvalidInput, match=r"section.key = .* is not known: use one of"):
+            chosen(wrong, ("a", "b"), "section.key")
+
+
+def test_tables_go_over_those_of_another_case():
+    below = {"a": {"x": 1, "y": 2}, "b": 3}
+    assert merged(below, {"a": {"y": 4}, "b": {"z": 5}}) == {"a": {"x": 1, "y": 4}, "b": {"z": 5}}
+    assert below == {"a": {"x": 1, "y": 2}, "b": 3}
+    remove(below, "a.x")
+    change(below, "a.z='5 m'")
+    change(below, "c.d=word")
+    assert below == {"a": {"y": 2, "z": "5 m"}, "b": 3, "c": {"d": "word"}}
