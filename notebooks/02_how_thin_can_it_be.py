@@ -23,7 +23,7 @@ from archfem.limit.collapse import collapse_factor
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.actions import BodyForce, Settlement
 from archfem.masonry.shapes import circular_arch
-from archfem.view.collapse import capacity_figure, collapse_figure
+from archfem.view.collapse import draw_capacity, draw_collapse
 from archfem.view.structure import draw_structure
 
 # %% [markdown]
@@ -69,7 +69,7 @@ f"a semicircle stands down to t/R = {least:.4f}"
 # %%
 thinnest = semicircle(least)
 spread = collapse_factor(thinnest, live=Settlement("left abutment", (-0.01, 0.0, 0.0)))
-collapse_figure(thinnest, spread)
+draw_collapse(thinnest, spread)
 
 # %% [markdown]
 # Two per cent thinner, there is no line of thrust, and the limit analysis shows how it falls: the
@@ -78,7 +78,7 @@ collapse_figure(thinnest, spread)
 # %%
 too_thin = semicircle(0.98 * least)
 fall = collapse_factor(too_thin, live=BodyForce(1.0))
-collapse_figure(too_thin, fall)
+draw_collapse(too_thin, fall)
 
 # %% [markdown]
 # ## Check against theory
@@ -125,7 +125,7 @@ capacity = xr.DataArray(
     {"embrace": embraces, "ratio": ratios},
     ("embrace", "ratio"),
 )
-capacity_figure(capacity, {embrace: least_of(embrace) for embrace in embraces}, KNOWN)
+draw_capacity(capacity, {embrace: least_of(embrace) for embrace in embraces}, KNOWN)
 
 # %% [markdown]
 # ## What to try next

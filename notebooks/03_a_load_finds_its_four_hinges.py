@@ -22,7 +22,7 @@ import pandas as pd
 
 import archfem as af
 from archfem.statics.pushover import Stop
-from archfem.view.collapse import collapse_figure
+from archfem.view.collapse import draw_collapse
 from archfem.view.pushover import draw_pushover
 from archfem.view.structure import draw_structure
 
@@ -81,7 +81,7 @@ f"limit analysis {limit.factor:.2f} kN each; pushover {push.factor:.2f}: {push.o
 draw_pushover({"five springs a joint": push}, limits={"limit analysis": limit.factor})
 
 # %%
-collapse_figure(ring, limit)
+draw_collapse(ring, limit)
 
 # %% [markdown]
 # Crown, haunches and springings turn; each of the three comes as a pair, since ring and loads are
@@ -150,7 +150,7 @@ f"{unlimited.outcome.sentence}; at {heavy.factor:.0f} kN each, {len(heavy.hinges
 
 # %%
 single = af.collapse_factor(ring, live=af.PointLoad(x=1.40, force=(0.0, -1e3)))
-collapse_figure(ring, single)
+draw_collapse(ring, single)
 
 # %% [markdown]
 # ## Check

@@ -108,7 +108,8 @@ def modes(given: argparse.Namespace) -> None:
     """Find the modes of a case about its dead load: table, picture, film of the first two."""
     from archfem.cases.run import damping_of
     from archfem.statics.modes import modes as lowest
-    from archfem.view.modes import animate_modes, draw_modes
+    from archfem.view.films.modes import film_modes
+    from archfem.view.modes import draw_modes
     from archfem.view.style import save
 
     case, folder = Case.read(given.case, given.changes), Path(given.out)
@@ -118,7 +119,7 @@ def modes(given: argparse.Namespace) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "modes.txt").write_text(text + "\n", encoding="utf-8")
     print(text)
-    film = animate_modes(found, folder / "modes.gif", range(1, min(given.count, 2) + 1))
+    film = film_modes(found, folder / "modes.gif", range(1, min(given.count, 2) + 1))
     _tell_written([folder / "modes.txt", save(draw_modes(found), folder / "modes.png"), film])
 
 

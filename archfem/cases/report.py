@@ -16,8 +16,8 @@ from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.strength import strength_use, use_table
 from archfem.view.envelopes import draw_envelope
 from archfem.view.freebody import draw_free_body
-from archfem.view.joints import draw_joint_histories
-from archfem.view.motions import accelerogram, spectra, suite_spectra
+from archfem.view.joints import draw_joints
+from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_structure
 from archfem.view.style import LINES, save
@@ -61,37 +61,37 @@ def write_run(case: Case, run: History, dead: Equilibrium, folder: Path) -> list
     Returns:
         The files.
     """
-    worst = abs(judged(run.joints)["eccentricity"]).max("time").fillna(0.5)
+    tilt = abs(judged(run.joints)["eccentricity"])
+    worst = tilt.max("time").fillna(0.5)
     chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
     figures = {
-        "gravest.png": draw_structure(case.structure, gravest(run)),
+        "gravest.png": draw_structure(case.structure, _gravest(run, tilt)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
-        "joints.png": draw_joint_histories(run, chosen),
+        "joints.png": draw_joints(run, chosen),
     }
     files = [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
-        from archfem.view.films.scenes import animate  # loads pyvista, which is slow
+        from archfem.view.films.scenes import film  # loads pyvista, which is slow
 
-        files.append(animate(dead.model, run, folder / "hinges.mp4"))
+        files.append(film(dead.model, run, folder / "hinges.mp4"))
     return files
 
 
-def gravest(run: History) -> xr.Dataset:
-    """Joints at the instant of the first mechanism, or of the largest eccentricity."""
+def _gravest(run: History, tilt: xr.DataArray) -> xr.Dataset:
+    """Return the joints at the first mechanism, or at the largest tilt (time, joint) [-]."""
     if run.mechanism is not None:
         return run.joints.sel(time=run.mechanism.time, method="nearest")
-    worst = abs(judged(run.joints)["eccentricity"]).max("joint")
-    return run.joints.isel(time=int(worst.argmax("time")))
+    return run.joints.isel(time=int(tilt.max("joint").argmax("time")))
 
 
 def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
     """Draw the spectra of a suite beside its target."""
-    return [save(suite_spectra(suite, target), folder / "spectra.png")]
+    return [save(draw_suite(suite, target), folder / "spectra.png")]
 
 
 def write_motion(motion: Motion, folder: Path) -> list[Path]:
     """Draw a motion as it is applied, with its integrals."""
-    return [save(accelerogram(motion), folder / "motion.png")]
+    return [save(draw_motion(motion), folder / "motion.png")]
 
 
 def write_envelopes(runs: Mapping[str, History], dead: Equilibrium, folder: Path) -> list[Path]:
@@ -112,8 +112,8 @@ def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
         motions: with names of their own, which the files bear.
         folder: for the files.
     """
-    files = [save(accelerogram(motion), folder / f"{motion.name}.png") for motion in motions]
-    return [*files, save(spectra(motions), folder / "spectra.png")]
+    files = [save(draw_motion(motion), folder / f"{motion.name}.png") for motion in motions]
+    return [*files, save(draw_spectra(motions), folder / "spectra.png")]
 
 
 def named_apart(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:

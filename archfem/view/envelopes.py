@@ -1,5 +1,6 @@
 """Eccentricity of the joints, part by part: its envelope over runs, or its value at one instant."""
 
+from collections import Counter
 from collections.abc import Collection, Mapping
 from typing import Any, cast
 
@@ -11,8 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, envelope, roles_of
-from archfem.masonry.roles import judged_parts
+from archfem.joints.criteria import Criteria, envelope, judged, roles_of
 from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
 from archfem.view.style import HINGE as RED
 
@@ -48,6 +48,9 @@ def draw_envelope(
         dotted: names of the runs that are drawn dotted and not filled.
         axes: where to draw, for a single ring or pier; by default a new figure.
 
+    Returns:
+        The page, with a panel for each ring and pier; that of `axes` where given.
+
     Raises:
         InvalidInput: there is no run, or too many to tell apart; axes were given for several
             parts.
@@ -81,6 +84,9 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     Args:
         states: what to call each state, and its joints at one instant, for example dead load.
         dotted: names of the states that are drawn dotted.
+
+    Returns:
+        The page, with a panel for each ring and pier.
 
     Raises:
         InvalidInput: there is no state, or too many to tell apart, or one has several instants.
@@ -148,11 +154,10 @@ def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axe
     sizes: dict[str, int] = {}
     roles: dict[str, str] = {}
     for joints in drawn.values():
-        names = joints["part"].values.astype(str)
-        own = roles_of(joints)
-        roles |= own
-        for part in judged_parts(own):
-            sizes[part] = max(sizes.get(part, 0), int(np.sum(names == part)))
+        own = judged(joints)
+        roles |= roles_of(own)
+        for part, size in Counter(own["part"].values.astype(str).tolist()).items():
+            sizes[part] = max(sizes.get(part, 0), size)
     parts = sorted(sizes, key=lambda part: roles[part] != "ring")
     if axes is None:
         shown = _page({part: sizes[part] for part in parts})

@@ -41,6 +41,9 @@ def draw_free_body(
         block: its number or name.
         cells: of a model with a mesh, for the weight as meshed.
 
+    Returns:
+        The page: the block, the polygon, and below them what each force is.
+
     Raises:
         InvalidInput: the block is fixed, or has too many joints to draw.
         InvalidStructure: there is no such block.

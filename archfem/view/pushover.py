@@ -34,6 +34,9 @@ def draw_pushover(
         reach: of the displacement axis [m]; by default where the curves have become flat.
         axes: where to draw; by default a new figure.
 
+    Returns:
+        The page; that of `axes` where given.
+
     Raises:
         InvalidInput: there is no pushover, or too many to tell apart.
     """

@@ -55,6 +55,9 @@ def draw_structure(
         criteria: what makes a joint fail; by default those by which the joints were judged already.
         axes: where to draw; by default a new figure.
 
+    Returns:
+        The page; that of `axes` where given.
+
     Raises:
         InvalidInput: `joints` has several instants, or those of another structure.
     """
@@ -76,6 +79,9 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
 
     Args:
         states: what to call each, the structure, and its joints at one instant or None.
+
+    Returns:
+        The page, with a panel for each structure.
     """
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
     figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
@@ -107,7 +113,12 @@ def _title(structure: Structure, joints: xr.Dataset | None) -> str:
 
 
 def draw_blocks(axes: Axes, structure: Structure) -> None:
-    """Draw blocks where they are, supports darker, soil paler."""
+    """Draw blocks where they are, supports darker, soil paler.
+
+    Args:
+        axes: to draw into.
+        structure: whose blocks they are.
+    """
     soil = yielding_blocks(structure)
     faces = [
         SUPPORT if block.fixed else SOIL if number in soil else STONE
@@ -120,7 +131,12 @@ def draw_blocks(axes: Axes, structure: Structure) -> None:
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
-    """Draw the thrust lines."""
+    """Draw the thrust lines.
+
+    Args:
+        axes: to draw into.
+        marks: of one instant.
+    """
     halo = withStroke(linewidth=3.4, foreground="white")
     line: dict[str, Any] = {"color": THRUST, "lw": 1.7, "zorder": 5, "path_effects": [halo]}
     axes.plot(*_broken(marks.links).T, label="thrust line", gid="links", **line)

@@ -20,6 +20,9 @@ def draw_study(
         factors: by name of the case and definition of a mechanism, the least that fails under each
             pair (pairs,) [-]; infinite where none does.
         reduction: R, drawn as a line at 1 / R beside that of the whole motions.
+
+    Returns:
+        The page.
     """
     names, definitions = list(factors), list(next(iter(factors.values())))
     figure = Figure(figsize=(0.75 * WIDE, 1.1 + 0.42 * len(names)), layout="constrained")

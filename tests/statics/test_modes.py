@@ -27,7 +27,8 @@ from archfem.masonry.shapes import circular_arch, column
 from archfem.statics import eigen
 from archfem.statics.equilibrium import Equilibrium, dead_load, equilibrium, self_weight
 from archfem.statics.modes import modes
-from archfem.view.modes import FRAMES, REACH, animate_modes, draw_modes
+from archfem.view.films.modes import FRAMES, film_modes
+from archfem.view.modes import REACH, draw_modes
 
 GRAVITY = 9.81
 DENSITY = 2000.0
@@ -390,11 +391,11 @@ def test_film_of_shapes(tmp_path):
     import imageio.v2 as imageio
 
     model = build(column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
-    path = animate_modes(modes(model, 2), tmp_path / "film.gif", [1])
+    path = film_modes(modes(model, 2), tmp_path / "film.gif", [1])
     frames = imageio.mimread(path)
     assert len(frames) == FRAMES
     moved = [np.mean(frames[0] != frame) for frame in frames]
     assert moved[FRAMES // 4] > 0.005  # at the end of its swing
     assert moved[FRAMES // 2] < 0.2 * moved[FRAMES // 4]  # back at rest
     with pytest.raises(InvalidInput, match=r"film\.avi has suffix"):
-        animate_modes(modes(model, 2), tmp_path / "film.avi")
+        film_modes(modes(model, 2), tmp_path / "film.avi")

@@ -15,8 +15,8 @@ from archfem.masonry.actions import Settlement
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import dead_load
 from archfem.view.films.colours import COLOURS, scale_for, shade
-from archfem.view.films.scenes import animate, picture
-from archfem.view.films.stage import Setting, Stage
+from archfem.view.films.scenes import film, picture
+from archfem.view.films.stage import Setup, Stage
 from archfem.view.marks import SWING, joint_ends, support_shift
 from archfem.view.style import HINGE, MOVED
 
@@ -57,7 +57,7 @@ def reds(image):
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
     path = tmp_path / "new" / f"film{suffix}"
-    assert animate(model, run, path, fps=10, seconds=0.3, size=SIZE) == path
+    assert film(model, run, path, fps=10, seconds=0.3, size=SIZE) == path
     frames = [frame[..., :3] for frame in imageio.mimread(path)]
     assert [frame.shape for frame in frames] == [(SIZE[1], SIZE[0], 3)] * 3
     assert all(frame.std() > 20.0 for frame in frames)
@@ -74,10 +74,10 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
     ],
 )
 def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps):
-    path = animate(model, run, tmp_path / "film.mp4", size=(480, 320), **asked)
-    with imageio.get_reader(path) as film:
-        assert film.count_frames() == frames
-        assert film.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
+    path = film(model, run, tmp_path / "film.mp4", size=(480, 320), **asked)
+    with imageio.get_reader(path) as read:
+        assert read.count_frames() == frames
+        assert read.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
 
 
 def test_a_support_that_moved_is_drawn_where_it_is(model):
@@ -86,11 +86,11 @@ def test_a_support_that_moved_is_drawn_where_it_is(model):
     for block in (0, 18):
         moved = moved.settled(Settlement(block, (-0.05, 0.0, 0.0)))
     dead = dead_load(moved)
-    settings = [
-        Setting.of(state.model, state.q[None], "displacement", 1.0)
+    setups = [
+        Setup.of(state.model, state.q[None], "displacement", 1.0)
         for state in (dead_load(model), dead)
     ]
-    np.testing.assert_allclose(settings[1].low, settings[0].low - [0.05, 0.0], atol=1e-4)
+    np.testing.assert_allclose(setups[1].low, setups[0].low - [0.05, 0.0], atol=1e-4)
     ends = (joint_ends(moved) @ dead.q).reshape(-1, 2, 2) + support_shift(moved)
     np.testing.assert_allclose(ends[..., 0], -0.05, atol=5e-4)  # the dead load moves by 0.3 mm
 
@@ -102,7 +102,7 @@ def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
     resultants[[0, 6, 12, 17], 2] = 0.5e4 * 0.55 * np.array([-1.0, 1.0, -1.0, 1.0])
     joints = joint_dataset(model.structure, resultants).assign_coords(time=0.2)
     found = verified_mechanism(model.structure, joints)
-    path = animate(model, run, tmp_path / "film.gif", fps=20, size=SIZE, mechanism=found)
+    path = film(model, run, tmp_path / "film.gif", fps=20, size=SIZE, mechanism=found)
     green = [
         int((np.abs(frame[40:-170, :-130, :3].astype(int) - GREEN).max(axis=-1) < 40).sum())
         for frame in imageio.mimread(path)
@@ -143,11 +143,11 @@ def test_the_opening_under_the_ring_is_empty(model):
 
 def test_the_automatic_magnification_shows_the_displacement(ring, model, run):
     fields = run.dataset["q"].values
-    setting = Setting.of(model, fields, "displacement", None)
+    setup = Setup.of(model, fields, "displacement", None)
     largest = max(np.abs(model.cells.displacement(q)).max() for q in fields)
-    shown = setting.magnification * largest / ring.size
+    shown = setup.magnification * largest / ring.size
     assert 0.6 * SWING < shown < 1.6 * SWING
-    assert Setting.of(model, 0.0 * fields, "displacement", None).magnification == 1.0
+    assert Setup.of(model, 0.0 * fields, "displacement", None).magnification == 1.0
 
 
 def test_colours_are_millimetres_and_megapascals(coarse):
@@ -182,7 +182,7 @@ def test_a_killed_film_leaves_the_old_one(model, run, tmp_path, monkeypatch):
     path.write_bytes(b"old")
     monkeypatch.setattr(Stage, "photograph", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        animate(model, run, path, size=SIZE)
+        film(model, run, path, size=SIZE)
     assert [each.name for each in tmp_path.iterdir()] == ["film.mp4"]
     assert path.read_bytes() == b"old"
 
@@ -201,20 +201,20 @@ def test_a_killed_film_leaves_the_old_one(model, run, tmp_path, monkeypatch):
 )
 def test_impossible_options_are_refused(model, run, tmp_path, options, said):
     with pytest.raises(InvalidInput, match=said):
-        animate(model, run, tmp_path / "film.mp4", **options)
+        film(model, run, tmp_path / "film.mp4", **options)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_unknown_suffixes_are_refused(model, run, tmp_path):
     with pytest.raises(InvalidInput, match=r"suffix '\.mov': use one of \('\.mp4', '\.gif'\)"):
-        animate(model, run, tmp_path / "film.mov")
+        film(model, run, tmp_path / "film.mov")
 
 
 def test_runs_without_fields_or_of_another_model_are_refused(model, coarse, run, tmp_path):
     bare = History(run.dataset.drop_vars("q"))
     with pytest.raises(InvalidInput, match=r"record them with .*fields_every=10"):
-        animate(model, bare, tmp_path / "film.mp4")
+        film(model, bare, tmp_path / "film.mp4")
     with pytest.raises(InvalidInput, match=rf"51 coordinates, and the model has {coarse.size}"):
-        animate(coarse, run, tmp_path / "film.mp4")
+        film(coarse, run, tmp_path / "film.mp4")
     with pytest.raises(InvalidInput, match=r"3 coordinates, and the model has 51"):
         picture(model, np.zeros(3))

@@ -13,7 +13,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import joint_dataset, thrust_line
 from archfem.view.envelopes import draw_eccentricity, draw_envelope
-from archfem.view.joints import draw_joint_histories
+from archfem.view.joints import draw_joints
 from archfem.view.marks import joint_ends, joint_marks
 from archfem.view.structure import draw_structure
 from archfem.view.style import save
@@ -88,7 +88,7 @@ def test_hinges_are_drawn_by_the_criteria_given_or_carried(ring, joints, run):
     ):
         assert len(drawn(figure, "hinges").get_xydata()) == 2
         assert drawn(figure, "slips") is None
-    axes = draw_joint_histories(run.judged_by(sharp), [0]).axes
+    axes = draw_joints(run.judged_by(sharp), [0]).axes
     heights = {float(line.get_ydata()[0]) for each in axes for line in each.lines[:8]}
     assert {0.47, 2.0} <= heights
     assert not {0.46, 0.6} & heights
@@ -270,13 +270,15 @@ def test_too_few_or_many_runs_are_refused(run, count):
 
 
 def test_joint_histories_show_the_recorded_values_and_limits(run):
-    figure = draw_joint_histories(run, [6, 3])
+    figure = draw_joints(run, [6, 9])
     panels = np.array(figure.axes).reshape(3, 2)
     assert all(units(axes) for axes in figure.axes)
-    for row, number in zip(panels[1:], (6, 3), strict=True):
+    for row, number in zip(panels[1:], (6, 9), strict=True):
         for axes, name in zip(row, ("eccentricity", "friction"), strict=True):
             shown = axes.lines[-1].get_ydata()
-            assert shown == pytest.approx(run.joints[name].sel(joint=number).values)
+            own = run.joints.sel(joint=number)
+            sense = np.sign(own["V"].values) if name == "friction" else 1.0
+            assert shown == pytest.approx(sense * own[name].values)
         assert f"joint {number}" in row[0].get_ylabel()
         assert row[1].lines[0].get_ydata()[0] == pytest.approx(0.6)
     ground = {line.get_label(): line.get_ydata() for line in panels[0, 0].lines}
@@ -289,7 +291,7 @@ def test_long_names_of_joints_are_broken_into_lines(bridge):
     run.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
     names = [joint.name for joint in bridge.joints]
     long = "main arch, voussoir 12 to backfill"
-    axes = draw_joint_histories(run, [names.index(long)]).axes[2]
+    axes = draw_joints(run, [names.index(long)]).axes[2]
     lines = axes.get_ylabel().splitlines()[:-1]
     assert " ".join(lines) == long
     assert max(map(len, lines)) <= 20
@@ -298,7 +300,7 @@ def test_long_names_of_joints_are_broken_into_lines(bridge):
 @pytest.mark.parametrize(("numbers", "said"), [([0, 18], r"\[18\]"), ([], "none")])
 def test_joints_that_do_not_exist_are_refused(run, numbers, said):
     with pytest.raises(InvalidInput, match=rf"joints {said} cannot be drawn: .* 0 to 17"):
-        draw_joint_histories(run, numbers)
+        draw_joints(run, numbers)
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
