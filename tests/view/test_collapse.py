@@ -1,18 +1,10 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
 import numpy as np
-import pytest
 import xarray as xr
 
-from archfem.limit.collapse import collapse_factor
-from archfem.masonry.actions import BodyForce, PointLoad
-from archfem.masonry.shapes import circular_arch
+import archfem as af
 from archfem.view.collapse import draw_capacity, draw_collapse
-
-
-@pytest.fixture(scope="module")
-def ring():
-    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 
 
 def lines_of(axes):
@@ -20,7 +12,7 @@ def lines_of(axes):
 
 
 def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
-    found = collapse_factor(ring, live=BodyForce(1.0))
+    found = af.collapse_factor(ring, live=af.BodyForce(1.0))
     figure = draw_collapse(ring, found)
     axes = figure.axes[0]
     lines = lines_of(axes)
@@ -34,7 +26,7 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
 
 
 def test_a_load_that_never_overturns_shows_no_mechanism(ring):
-    found = collapse_factor(ring, live=[PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
+    found = af.collapse_factor(ring, live=[af.PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
     axes = draw_collapse(ring, found).axes[0]
     assert set(lines_of(axes)) == {"thrust line"}
     assert len(axes.collections) == 1
@@ -42,8 +34,8 @@ def test_a_load_that_never_overturns_shows_no_mechanism(ring):
 
 
 def test_an_arch_that_falls_has_no_thrust_line():
-    thin = circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
-    axes = draw_collapse(thin, collapse_factor(thin, live=BodyForce(1.0))).axes[0]
+    thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
+    axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
     assert set(lines_of(axes)) == {"hinge"}
 
 

@@ -1,6 +1,7 @@
 """Films, written in one stroke."""
 
 from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ def write_film(path: Path, shots: Iterable[Image], fps: float) -> Path:
     Returns:
         The film's path.
     """
-    with in_one_stroke(path) as draft, _writer(draft, fps) as film:
+    with in_one_stroke(path) as draft, closing(_writer(draft, fps)) as film:
         for shot in shots:
             film.append_data(shot)
     return path
