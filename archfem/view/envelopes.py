@@ -13,8 +13,19 @@ from matplotlib.ticker import MaxNLocator
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, envelope, judged, roles_of
-from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
-from archfem.view.style import HINGE as RED
+from archfem.view.style import (
+    COLUMN,
+    EDGE,
+    FAINT,
+    HINGE,
+    INK,
+    LINES,
+    NORMAL,
+    SMALL,
+    WIDE,
+    dress,
+    legend,
+)
 
 ROW, ROOM = 80, 6
 """Joints that fit side by side in a wide picture, and those for which a panel has room at least."""
@@ -136,9 +147,9 @@ def draw_faces(axes: Axes, hinge: float) -> None:
         hinge: |e| from which it does [-].
     """
     for side in (-1.0, 1.0):
-        axes.axhspan(side * hinge, side * 0.5, color=RED, alpha=0.12, lw=0)
+        axes.axhspan(side * hinge, side * 0.5, color=HINGE, alpha=0.12, lw=0)
         axes.axhline(side * 0.5, color=EDGE, lw=1.2)
-        axes.axhline(side * hinge, color=RED, lw=0.7, ls="--")
+        axes.axhline(side * hinge, color=HINGE, lw=0.7, ls="--")
     axes.axhline(0.0, color=FAINT, lw=0.5)
 
 

@@ -14,8 +14,9 @@ from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
 from archfem.models.model import Model
 
-ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
-ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])
+ARROW = np.array(
+    [[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09], [-0.5, 0.09]]
+)
 """Outline of an arrow of length 1 along x (7, 2)."""
 
 SWING = 0.06

@@ -30,7 +30,7 @@ SHADES = LinearSegmentedColormap.from_list(
 )
 """From none to the largest compression; warm, so that the thrust line stands out."""
 
-APART = 0.21
+PITCH = 0.21
 """Distance between two crosses on paper, and length of the longest arms [inch]."""
 
 SEEN = 0.08
@@ -159,7 +159,7 @@ def _cut(corners: Array) -> tuple[Array, Numbers]:
 
 def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
-    spacing = APART * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
+    spacing = PITCH * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
     groups = [
         np.flatnonzero(cells.owner == number)[group]

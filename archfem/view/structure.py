@@ -18,6 +18,7 @@ from archfem.masonry.structure import Structure
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     EDGE,
+    HINGE,
     INK,
     NORMAL,
     SLIP,
@@ -30,9 +31,8 @@ from archfem.view.style import (
     dress,
     legend,
 )
-from archfem.view.style import HINGE as RED
 
-SNUG = 0.78
+STACKED = 0.78
 """Height of a picture among others, relative to one by itself."""
 
 
@@ -84,7 +84,7 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
         The page, with a panel for each structure.
     """
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
-    figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
+    figure = Figure(figsize=(wide, STACKED * high * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
@@ -147,7 +147,7 @@ def _marks(axes: Axes, marks: Marks) -> None:
     """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
     draw_thrust(axes, marks)
     if len(marks.hinges):
-        disc: dict[str, Any] = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
+        disc: dict[str, Any] = {"mfc": HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
     if len(marks.slips):
         arrows = PolyCollection(

@@ -15,11 +15,11 @@ from matplotlib.text import Text
 from archfem.dynamics.history import History
 from archfem.joints.criteria import judged
 from archfem.view.films.colours import Scale
-from archfem.view.films.stage import Setup
+from archfem.view.films.setup import Setup
 from archfem.view.films.writer import Image
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
-WIDE, COARSE = 12.8, 60.0
+BROAD, COARSE = 12.8, 60.0
 """Width of a page [inch], and the least of its dots per inch: a smaller page is narrower."""
 
 HEAD, SIDE, FOOT, STRIP, EDGE_ROOM = 0.55, 1.25, 0.45, 1.75, 0.25
@@ -37,7 +37,7 @@ class Page:
     """
 
     def __init__(self, setup: Setup, size: tuple[int, int], run: History | None = None) -> None:
-        dense = max(COARSE, size[0] / WIDE)
+        dense = max(COARSE, size[0] / BROAD)
         self._figure = Figure(figsize=(size[0] / dense, size[1] / dense), dpi=dense)
         self._canvas = FigureCanvasAgg(self._figure)
         self._inches = np.array(size) / dense

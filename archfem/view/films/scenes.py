@@ -17,7 +17,8 @@ from archfem.limit.verified import VerifiedMechanism
 from archfem.models.model import Model
 from archfem.view.films.colours import check_colour
 from archfem.view.films.page import Page
-from archfem.view.films.stage import Setup, Stage
+from archfem.view.films.setup import Setup
+from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
 

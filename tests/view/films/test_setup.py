@@ -3,7 +3,7 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.films.stage import SWING, Setup
+from archfem.view.films.setup import SWING, Setup
 
 
 def test_a_support_that_moved_is_drawn_where_it_is(model):
