@@ -16,12 +16,9 @@
 
 # %%
 # %matplotlib inline
-import numpy as np
 import pandas as pd
 
 import archfem as af
-from archfem.statics.equilibrium import self_weight
-from archfem.view.structure import draw_structure
 
 # %% [markdown]
 # ## The structure
@@ -31,7 +28,7 @@ from archfem.view.structure import draw_structure
 
 # %%
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
-draw_structure(ring)
+af.view.draw_structure(ring)
 
 # %% [markdown]
 # ## The equation
@@ -63,7 +60,7 @@ table = dead.joints[["N", "V", "eccentricity", "friction"]].to_dataframe()
 table[["name", "N", "V", "eccentricity", "friction"]].round(3)
 
 # %%
-draw_structure(ring, dead.joints)
+af.view.draw_structure(ring, dead.joints)
 
 # %% [markdown]
 # The thrust line stays inside the stone all the way: the arch stands. It rises toward the extrados
@@ -114,11 +111,10 @@ found.rename_axis("cells").round(4)
 
 # %%
 springings = [0, len(ring.joints) - 1]
-tangents = np.array([joint.tangent for joint in ring.joints])
 force = dead.joints["N"].values[:, None] * ring.normals
-force -= dead.joints["V"].values[:, None] * tangents
+force -= dead.joints["V"].values[:, None] * ring.tangents
 carried = force[springings[0]] - force[springings[1]]
-weight = -self_weight(model).reshape(-1, 2).sum(axis=0)[1]
+weight = -af.statics.self_weight(model).reshape(-1, 2).sum(axis=0)[1]
 pd.Series(
     {"ring": ring.weight, "model": weight, "carried": carried[1], "across": carried[0]},
     name="force [N]",

@@ -19,12 +19,7 @@
 import numpy as np
 import xarray as xr
 
-from archfem.limit.collapse import collapse_factor
-from archfem.limit.thickness import minimum_thickness
-from archfem.masonry.actions import BodyForce, Settlement
-from archfem.masonry.shapes import circular_arch
-from archfem.view.collapse import capacity_figure, collapse_figure
-from archfem.view.structure import draw_structure
+import archfem as af
 
 # %% [markdown]
 # ## The structure
@@ -35,10 +30,10 @@ from archfem.view.structure import draw_structure
 
 # %%
 def semicircle(thickness):
-    return circular_arch(radius=1.0, thickness=thickness, embrace=180.0, voussoirs=50)
+    return af.circular_arch(radius=1.0, thickness=thickness, embrace=180.0, voussoirs=50)
 
 
-draw_structure(semicircle(0.15))
+af.view.draw_structure(semicircle(0.15))
 
 # %% [markdown]
 # ## The equation
@@ -55,7 +50,7 @@ draw_structure(semicircle(0.15))
 # a bracket of thicknesses finds the last one that has.
 
 # %%
-least = minimum_thickness(semicircle, friction=None)
+least = af.minimum_thickness(semicircle, friction=None)
 f"a semicircle stands down to t/R = {least:.4f}"
 
 # %% [markdown]
@@ -68,8 +63,8 @@ f"a semicircle stands down to t/R = {least:.4f}"
 
 # %%
 thinnest = semicircle(least)
-spread = collapse_factor(thinnest, live=Settlement("left abutment", (-0.01, 0.0, 0.0)))
-collapse_figure(thinnest, spread)
+spread = af.collapse_factor(thinnest, live=af.Settlement("left abutment", (-0.01, 0.0, 0.0)))
+af.view.draw_collapse(thinnest, spread)
 
 # %% [markdown]
 # Two per cent thinner, there is no line of thrust, and the limit analysis shows how it falls: the
@@ -77,8 +72,8 @@ collapse_figure(thinnest, spread)
 
 # %%
 too_thin = semicircle(0.98 * least)
-fall = collapse_factor(too_thin, live=BodyForce(1.0))
-collapse_figure(too_thin, fall)
+fall = af.collapse_factor(too_thin, live=af.BodyForce(1.0))
+af.view.draw_collapse(too_thin, fall)
 
 # %% [markdown]
 # ## Check against theory
@@ -100,12 +95,12 @@ f"t/R = {least:.5f}, {least / 0.1075 - 1.0:+.2%} off; hinges at {np.round(angles
 # %%
 def least_of(embrace):
     ring = {"radius": 1.0, "embrace": embrace, "voussoirs": 20}
-    return minimum_thickness(lambda t: circular_arch(thickness=t, **ring), tolerance=1e-3)
+    return af.minimum_thickness(lambda t: af.circular_arch(thickness=t, **ring), tolerance=1e-3)
 
 
 def capacity_of(embrace, ratio):
-    ring = circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=20)
-    return collapse_factor(ring, live=BodyForce(1.0), friction=None).factor
+    ring = af.circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=20)
+    return af.collapse_factor(ring, live=af.BodyForce(1.0), friction=None).factor
 
 
 KNOWN = {
@@ -125,17 +120,17 @@ capacity = xr.DataArray(
     {"embrace": embraces, "ratio": ratios},
     ("embrace", "ratio"),
 )
-capacity_figure(capacity, {embrace: least_of(embrace) for embrace in embraces}, KNOWN)
+af.view.draw_capacity(capacity, {embrace: least_of(embrace) for embrace in embraces}, KNOWN)
 
 # %% [markdown]
 # ## What to try next
 #
 # - Seven voussoirs instead of 50: the ring may be 10 % thinner. Why does an arch with fewer joints
 #   need less?
-# - `contact=Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the
+# - `contact=af.Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the
 #   springings slide before the arch is as thin as it could be.
-# - `strength=1 * MPa` in `minimum_thickness`, and a radius of 20 m: when does the strength of stone
-#   begin to matter?
+# - `strength=1 * af.units.MPa` in `minimum_thickness`, and a radius of 20 m: when does the strength
+#   of stone begin to matter?
 # - `chords=1` cuts the stones with straight faces. Which way does the least thickness go?
 
 # %%

@@ -21,10 +21,6 @@ import numpy as np
 import pandas as pd
 
 import archfem as af
-from archfem.statics.pushover import Stop
-from archfem.view.collapse import collapse_figure
-from archfem.view.pushover import draw_pushover
-from archfem.view.structure import draw_structure
 
 # %% [markdown]
 # ## The structure
@@ -43,7 +39,7 @@ def pair(x):
     return [af.PointLoad(x=side * x, force=(0.0, -1e3)) for side in (-1.0, 1.0)]
 
 
-figure = draw_structure(ring)
+figure = af.view.draw_structure(ring)
 arrow = {"arrowstyle": "-|>", "color": "black", "lw": 1.5}
 for load in pair(0.26):
     figure.axes[0].annotate("", (load.x, 3.22), (load.x, 3.75), arrowprops=arrow)
@@ -78,10 +74,10 @@ push = af.pushover(model, pair(0.26), control="displacement")
 f"limit analysis {limit.factor:.2f} kN each; pushover {push.factor:.2f}: {push.outcome}"
 
 # %%
-draw_pushover({"five springs a joint": push}, limits={"limit analysis": limit.factor})
+af.view.draw_pushover({"five springs a joint": push}, limits={"limit analysis": limit.factor})
 
 # %%
-collapse_figure(ring, limit)
+af.view.draw_collapse(ring, limit)
 
 # %% [markdown]
 # Crown, haunches and springings turn; each of the three comes as a pair, since ring and loads are
@@ -138,8 +134,8 @@ pd.Series(first(af.pushover(row, pair(0.57)), 0.499), name="share of the ultimat
 
 # %%
 unlimited = af.collapse_factor(ring, live=pair(1.40))
-heavy = af.pushover(model, pair(1.40), stop=Stop(displacement=0.02))
-draw_structure(ring, heavy.joints.isel(step=-1))
+heavy = af.pushover(model, pair(1.40), stop=af.statics.Stop(displacement=0.02))
+af.view.draw_structure(ring, heavy.joints.isel(step=-1))
 
 # %%
 f"{unlimited.outcome.sentence}; at {heavy.factor:.0f} kN each, {len(heavy.hinges)} joints hinge"
@@ -150,7 +146,7 @@ f"{unlimited.outcome.sentence}; at {heavy.factor:.0f} kN each, {len(heavy.hinges
 
 # %%
 single = af.collapse_factor(ring, live=af.PointLoad(x=1.40, force=(0.0, -1e3)))
-collapse_figure(ring, single)
+af.view.draw_collapse(ring, single)
 
 # %% [markdown]
 # ## Check

@@ -24,9 +24,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.pushover import draw_pushover
-from archfem.view.structure import draw_structure
-from archfem.view.style import LINES, dress
 
 # %% [markdown]
 # ## The structure
@@ -38,7 +35,7 @@ SHAPE = {"radius": 2.95, "embrace": 159.0, "voussoirs": 17}
 ring = af.circular_arch(thickness=0.55, **SHAPE)
 pair = [af.PointLoad(x=x, force=(0.0, -1e3)) for x in (-0.26, 0.26)]
 limit = af.collapse_factor(ring, live=pair, friction=None)
-draw_structure(ring)
+af.view.draw_structure(ring)
 
 # %% [markdown]
 # ## The equation
@@ -80,7 +77,7 @@ def push(structure, springs, rule="nodal"):
 rings = {gap: with_gap(1e-3 * gap) for gap in (0, 1, 3)}
 pushed = {(n, gap): push(rings[gap], n) for n in (5, 8) for gap in rings}
 curves = {f"{n} springs, {gap} mm": found for (n, gap), found in pushed.items()}
-draw_pushover(curves, limits={"limit analysis, no gap": limit.factor})
+af.view.draw_pushover(curves, limits={"limit analysis, no gap": limit.factor})
 
 
 # %%
@@ -118,16 +115,17 @@ def soft(one):
 
 figure = Figure(figsize=(6.4, 3.2), layout="constrained")
 left, right = figure.subplots(1, 2)
-dress(left, "springs, or ends of facets [-]", "missing of the limit load [%]")
-dress(right, "springs, or ends of facets [-]", "error in the displacement at half of it [%]")
-for (rule, pushes), colour in zip(found.items(), LINES, strict=False):
+left.set_ylabel("missing of the limit load [%]")
+right.set_ylabel("error in the displacement at half of it [%]")
+for rule, pushes in found.items():
     missing = [100.0 * (1.0 - one.factor / limit.factor) for one in pushes]
     off = [100.0 * abs(soft(one) / soft(found["exact"][0]) - 1.0) for one in pushes]
-    left.plot(numbers, missing, "o-", color=colour, label=rule, ms=4)
-    right.plot(numbers, off, "o-", color=colour, label=rule, ms=4)
+    left.plot(numbers, missing, "o-", label=rule, ms=4)
+    right.plot(numbers, off, "o-", label=rule, ms=4)
 for axes in (left, right):
     axes.set_xscale("log", base=2)
     axes.set_xticks(numbers, numbers)
+    axes.set_xlabel("springs, or ends of facets [-]")
 right.set_yscale("log", nonpositive="mask")  # exact facets are the reference
 left.legend(frameon=False, fontsize=8)
 figure

@@ -19,8 +19,6 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.accuracy import draw_accuracy
-from archfem.view.envelopes import draw_envelope
 
 # %% [markdown]
 # ## One formula for every rung
@@ -52,7 +50,7 @@ runs = {
     "all nodes, five springs": af.time_history(springs, motion, damping=damping),
     "rigid stones, exact joints": af.time_history(stones, motion, damping=damping),
 }
-draw_envelope(runs, dead=af.dead_load(stones).joints)
+af.view.draw_envelope(runs, dead=af.dead_load(stones).joints)
 
 # %% [markdown]
 # ## All of it in one picture
@@ -63,7 +61,7 @@ draw_envelope(runs, dead=af.dead_load(stones).joints)
 # %%
 found = af.accuracy(ring, motion, damping=damping, cells=((4, 4),), steps=(0.005, 0.0025))
 print(found.table())
-draw_accuracy(found)
+af.view.draw_accuracy(found)
 
 # %% [markdown]
 # ## Let it choose

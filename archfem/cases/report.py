@@ -22,12 +22,13 @@ from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
 from archfem.statics.strength import use_table
 from archfem.view.accuracy import draw_accuracy
-from archfem.view.collapse import collapse_figure
+from archfem.view.collapse import draw_collapse
 from archfem.view.envelopes import draw_envelope
+from archfem.view.films.modes import film_modes
 from archfem.view.freebody import draw_free_body
-from archfem.view.joints import draw_joint_histories
-from archfem.view.modes import animate_modes, draw_modes
-from archfem.view.motions import accelerogram, spectra, suite_spectra
+from archfem.view.joints import draw_joints
+from archfem.view.modes import draw_modes
+from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_structure
 from archfem.view.studies import draw_study
@@ -49,7 +50,7 @@ def write_limit(case: Case, found: Collapse, folder: Path) -> list[Path]:
         The files.
     """
     words = collapse_words(case.structure, found)
-    figure = collapse_figure(case.structure, found)
+    figure = draw_collapse(case.structure, found)
     return [_write(words, folder / "limit.txt"), save(figure, folder / "collapse.png")]
 
 
@@ -88,19 +89,20 @@ def write_run(done: Run, rest: Rest, folder: Path) -> list[Path]:
         The files, the table of joints last.
     """
     case, run, dead = done.case, done.history, rest.dead
-    worst = abs(judged(run.joints)["eccentricity"]).max("time").fillna(0.5)
+    tilt = abs(judged(run.joints)["eccentricity"])
+    worst = tilt.max("time").fillna(0.5)
     chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
     figures = {
-        "gravest.png": draw_structure(case.structure, gravest(run)),
+        "gravest.png": draw_structure(case.structure, _gravest(run, tilt)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
-        "joints.png": draw_joint_histories(run, chosen),
+        "joints.png": draw_joints(run, chosen),
     }
     files = write_motion(done.motion, folder) if case.suite is not None else []
     files += [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
-        from archfem.view.films.scenes import animate  # loads pyvista, which is slow
+        from archfem.view.films.scenes import film  # loads pyvista, which is slow
 
-        files.append(animate(dead.model, run, folder / "hinges.mp4"))
+        files.append(film(dead.model, run, folder / "hinges.mp4"))
     return [*files, _write(run_words(case.structure, run, dead.joints), folder / SUMMARY)]
 
 
@@ -115,16 +117,11 @@ def is_written(done: Run) -> bool:
     return summary.stat().st_mtime_ns >= done.path.stat().st_mtime_ns
 
 
-def gravest(run: History) -> xr.Dataset:
-    """Return the joints at the instant of the first mechanism, or of the largest eccentricity.
-
-    Args:
-        run: what happened.
-    """
+def _gravest(run: History, tilt: xr.DataArray) -> xr.Dataset:
+    """Return the joints at the first mechanism, or at the largest tilt (time, joint) [-]."""
     if run.mechanism is not None:
         return run.joints.sel(time=run.mechanism.time, method="nearest")
-    worst = abs(judged(run.joints)["eccentricity"]).max("joint")
-    return run.joints.isel(time=int(worst.argmax("time")))
+    return run.joints.isel(time=int(tilt.max("joint").argmax("time")))
 
 
 def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
@@ -138,7 +135,7 @@ def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> li
     Returns:
         The files.
     """
-    return [save(suite_spectra(suite, target), folder / "spectra.png")]
+    return [save(draw_suite(suite, target), folder / "spectra.png")]
 
 
 def write_motion(motion: Motion, folder: Path) -> list[Path]:
@@ -151,7 +148,7 @@ def write_motion(motion: Motion, folder: Path) -> list[Path]:
     Returns:
         The files.
     """
-    return [save(accelerogram(motion), folder / "motion.png")]
+    return [save(draw_motion(motion), folder / "motion.png")]
 
 
 def write_pairs(runs: Mapping[str, History], rest: Rest, folder: Path) -> list[Path]:
@@ -190,7 +187,7 @@ def write_modes(found: Modes, damping: str, folder: Path) -> list[Path]:
     return [
         _write(f"{found.table()}\n\n{damping}", folder / "modes.txt"),
         save(draw_modes(found), folder / "modes.png"),
-        animate_modes(found, folder / "modes.gif", first),
+        film_modes(found, folder / "modes.gif", first),
     ]
 
 
@@ -238,8 +235,8 @@ def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:
     Returns:
         The files.
     """
-    files = [save(accelerogram(motion), folder / f"{motion.name}.png") for motion in motions]
-    return [*files, save(spectra(motions), folder / "spectra.png")]
+    files = [save(draw_motion(motion), folder / f"{motion.name}.png") for motion in motions]
+    return [*files, save(draw_spectra(motions), folder / "spectra.png")]
 
 
 def named_apart(motions: Sequence[Motion], names: Sequence[str]) -> list[Motion]:

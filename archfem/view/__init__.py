@@ -6,14 +6,14 @@
     joints     joints over time
     envelopes  eccentricity part by part
     stress     a map of principal compression
-    modes      vibration shapes, drawn and filmed
+    modes      vibration shapes
     freebody   a block cut free and its closing polygon
     collapse   mechanism and thrust line of limit analysis; capacity of rings
     pushover   what is resisted over displacement
     motions    accelerograms with their integrals, and spectra
     accuracy   speed against error
     studies    factors at first mechanism, case by case
-    films      films of hinge formation: all that knows pyvista
+    films      films and stills: all that knows pyvista and imageio
 
 It imports from all rooms but `cases`. Start reading at `structure`, with `style` beside it.
 """

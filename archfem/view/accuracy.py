@@ -20,6 +20,9 @@ def draw_accuracy(found: Accuracy) -> Figure:
 
     Args:
         found: settings tried.
+
+    Returns:
+        The page.
     """
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     axes = figure.add_subplot()

@@ -14,7 +14,6 @@ from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
-from archfem.view.films.colours import LIGHT_TO_DARK
 from archfem.view.marks import displaced, swung
 from archfem.view.structure import draw_structure
 from archfem.view.style import (
@@ -22,6 +21,7 @@ from archfem.view.style import (
     EDGE,
     HINGE,
     INK,
+    LIGHT_TO_DARK,
     MOVED,
     NORMAL,
     SLIP,
@@ -38,12 +38,15 @@ NEVER = 1e3
 """Height of the map where no acceleration overturns a ring [g]."""
 
 
-def collapse_figure(structure: Structure, found: Collapse) -> Figure:
+def draw_collapse(structure: Structure, found: Collapse) -> Figure:
     """Draw the thrust line in the structure as it stands, over the mechanism that it becomes.
 
     Args:
         structure: as it stands.
         found: what limit analysis found for it.
+
+    Returns:
+        The page; what was found is its title.
     """
     figure = draw_structure(structure)
     axes = figure.axes[0]
@@ -58,7 +61,7 @@ def collapse_figure(structure: Structure, found: Collapse) -> Figure:
     return figure
 
 
-def capacity_figure(
+def draw_capacity(
     capacity: xr.DataArray,
     thinnest: Mapping[float, float],
     known: Mapping[tuple[float, float], float],
@@ -71,6 +74,9 @@ def capacity_figure(
         thinnest: least t/R under self-weight over embrace [degrees], the edge of the map.
         known: accelerations over (embrace [degrees], t/R) that are known from elsewhere [g]; zero
             at the least t/R.
+
+    Returns:
+        The page, with a bar of colours beside the map.
     """
     figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
     axes = figure.add_subplot()

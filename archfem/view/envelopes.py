@@ -1,5 +1,6 @@
 """Eccentricity of the joints, part by part: its envelope over runs, or its value at one instant."""
 
+from collections import Counter
 from collections.abc import Collection, Mapping
 from typing import Any, cast
 
@@ -11,10 +12,20 @@ from matplotlib.ticker import MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, envelope, roles_of
-from archfem.masonry.roles import judged_parts
-from archfem.view.style import COLUMN, EDGE, FAINT, INK, LINES, NORMAL, SMALL, WIDE, dress, legend
-from archfem.view.style import HINGE as RED
+from archfem.joints.criteria import Criteria, envelope, judged, roles_of
+from archfem.view.style import (
+    COLUMN,
+    EDGE,
+    FAINT,
+    HINGE,
+    INK,
+    LINES,
+    NORMAL,
+    SMALL,
+    WIDE,
+    dress,
+    legend,
+)
 
 ROW, ROOM = 80, 6
 """Joints that fit side by side in a wide picture, and those for which a panel has room at least."""
@@ -47,6 +58,9 @@ def draw_envelope(
         dead: joints under dead load, drawn dotted.
         dotted: names of the runs that are drawn dotted and not filled.
         axes: where to draw, for a single ring or pier; by default a new figure.
+
+    Returns:
+        The page, with a panel for each ring and pier; that of `axes` where given.
 
     Raises:
         InvalidInput: there is no run, or too many to tell apart; axes were given for several
@@ -81,6 +95,9 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     Args:
         states: what to call each state, and its joints at one instant, for example dead load.
         dotted: names of the states that are drawn dotted.
+
+    Returns:
+        The page, with a panel for each ring and pier.
 
     Raises:
         InvalidInput: there is no state, or too many to tell apart, or one has several instants.
@@ -130,9 +147,9 @@ def draw_faces(axes: Axes, hinge: float) -> None:
         hinge: |e| from which it does [-].
     """
     for side in (-1.0, 1.0):
-        axes.axhspan(side * hinge, side * 0.5, color=RED, alpha=0.12, lw=0)
+        axes.axhspan(side * hinge, side * 0.5, color=HINGE, alpha=0.12, lw=0)
         axes.axhline(side * 0.5, color=EDGE, lw=1.2)
-        axes.axhline(side * hinge, color=RED, lw=0.7, ls="--")
+        axes.axhline(side * hinge, color=HINGE, lw=0.7, ls="--")
     axes.axhline(0.0, color=FAINT, lw=0.5)
 
 
@@ -148,11 +165,10 @@ def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axe
     sizes: dict[str, int] = {}
     roles: dict[str, str] = {}
     for joints in drawn.values():
-        names = joints["part"].values.astype(str)
-        own = roles_of(joints)
-        roles |= own
-        for part in judged_parts(own):
-            sizes[part] = max(sizes.get(part, 0), int(np.sum(names == part)))
+        own = judged(joints)
+        roles |= roles_of(own)
+        for part, size in Counter(own["part"].values.astype(str).tolist()).items():
+            sizes[part] = max(sizes.get(part, 0), size)
     parts = sorted(sizes, key=lambda part: roles[part] != "ring")
     if axes is None:
         shown = _page({part: sizes[part] for part in parts})

@@ -18,7 +18,7 @@ from archfem.view.style import EDGE, FAINT, GHOST, INK, LINES, NORMAL, SMALL, ST
 MOST = 12
 """Joints of a block whose forces can still be told apart."""
 
-REACH = 0.75
+LONGEST = 0.75
 """Length of the largest force beside the block, relative to the block."""
 
 WIDTH, PANEL, LINE = 9.6, 5.0, 0.18
@@ -40,6 +40,9 @@ def draw_free_body(
         joints: as made by `joint_dataset`, at one instant.
         block: its number or name.
         cells: of a model with a mesh, for the weight as meshed.
+
+    Returns:
+        The page: the block, the polygon, and below them what each force is.
 
     Raises:
         InvalidInput: the block is fixed, or has too many joints to draw.
@@ -90,7 +93,7 @@ def _block(axes: Axes, structure: Structure, body: FreeBody, colours: list[str])
         axes.add_patch(Polygon(drawn, facecolor="none", edgecolor=GHOST, lw=0.8, zorder=1))
     axes.add_patch(Polygon(outline, facecolor=STONE, edgecolor=EDGE, lw=1.2, zorder=2))
     size = float(np.ptp(outline, axis=0).max())
-    length = REACH * size / body.sizes.max()
+    length = LONGEST * size / body.sizes.max()
     heads = body.points.copy()
     heads[-1] += length * body.forces[-1]
     tails = heads - length * body.forces

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
-from typing import cast
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,30 +13,34 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.view.envelopes import draw_faces
 from archfem.view.style import COLUMN, INK, LINES, NORMAL, SLIP, SMALL, WIDE, dress
-from archfem.view.style import HINGE as RED
 
 LETTERS = 20
 """That fit beside a panel."""
 
-LOOSE = 2.0
-"""Mobilised friction at which its axis ends, relative to the largest coefficient: a joint about
-to open has any value."""
+LOOSE = 1.5
+"""Mobilised friction at which its axis ends, relative to the coefficient: a joint about to open
+has any value."""
 
 
-def draw_joint_histories(run: History, joints: Sequence[int]) -> Figure:
+def draw_joints(run: History, joints: Sequence[int]) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
-    Lines are interrupted while a joint is open; limits are by the run's criteria.
+    Friction has the sense of the shear force. Lines are interrupted while a joint is open; limits
+    are by the run's criteria.
 
     Args:
         run: what happened.
         joints: numbers of the joints.
 
+    Returns:
+        The page: the ground's motion, and a row for each joint.
+
     Raises:
         InvalidInput: there is no such joint.
     """
-    _check_numbers(run, joints)
-    rows = 1 + len(joints)
+    recorded, rows = run.joints, 1 + len(joints)
+    _check_numbers(recorded, joints)
+    criteria = Criteria.of(recorded)
     figure = Figure(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
     panels = figure.subplots(rows, 2, sharex=True)
     for axes in panels[0]:
@@ -45,11 +49,11 @@ def draw_joint_histories(run: History, joints: Sequence[int]) -> Figure:
         above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96)}
         panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, **above)
     for (left, right), number in zip(panels[1:], joints, strict=True):
-        own = run.joints.sel(joint=number)
+        own = recorded.sel(joint=number)
         name = "\n".join(wrap(str(own["name"].values), LETTERS))
         dress(left, "", f"{name}\nM / (N h) [-]")
-        _eccentricity(left, own)
-        _mobilised(right, own)
+        _eccentricity(left, own, criteria)
+        _friction(right, own, criteria)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
     figure.align_ylabels(panels)
@@ -59,12 +63,15 @@ def draw_joint_histories(run: History, joints: Sequence[int]) -> Figure:
 def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     """Draw mobilised friction and eccentricity of one joint over time, a column for each run.
 
-    Red lines are the limits by the run's criteria: the coefficient of friction, and |e| of a hinge.
-    Lines are interrupted while the joint is open.
+    Friction has the sense of the shear force. Lines are interrupted while the joint is open; dashed
+    ones are the limits by the run's criteria: the coefficient of friction, and |e| of a hinge.
 
     Args:
         runs: what to call each run, and the run.
         joint: its name, or its number.
+
+    Returns:
+        The page, with a column for each run.
 
     Raises:
         InvalidInput: a run has no such joint.
@@ -73,9 +80,10 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
-        _signed(cast(Axes, column[0]), own)
+        criteria = Criteria.of(own)
+        _friction(column[0], own, criteria)
         dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
-        _eccentricity(cast(Axes, column[1]), own)
+        _eccentricity(column[1], own, criteria)
         column[0].set_title(f"{label}: {own['name'].values!s}", fontsize=NORMAL, color=INK)
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
@@ -83,27 +91,11 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     return figure
 
 
-def _signed(axes: Axes, joint: xr.Dataset) -> None:
-    """Draw the mobilised friction with its sense, between its limits."""
-    dress(axes, "", "V / N [-]")
-    limit = _coefficient(joint)
-    for side in (-1.0, 1.0):
-        axes.axhline(side * limit, color=RED, lw=0.8, ls="--")
-    axes.plot(
-        joint["time"], joint["V"] / joint["N"].where(joint["N"] > 0.0), color=LINES[0], lw=0.6
-    )
-    axes.set_ylim(-1.5 * limit, 1.5 * limit)
-    axes.annotate(
-        f"μ = {limit:g}", (1.0, limit), xycoords=("axes fraction", "data"), fontsize=SMALL,
-        ha="right", va="bottom", color=RED,
-    )  # fmt: skip
-
-
-def _check_numbers(run: History, joints: Sequence[int]) -> None:
+def _check_numbers(joints: xr.Dataset, numbers: Sequence[int]) -> None:
     """There must be such joints."""
-    known = run.joints["joint"].values
-    unknown = [number for number in joints if number not in known]
-    if unknown or not len(joints):
+    known = joints["joint"].values
+    unknown = [number for number in numbers if number not in known]
+    if unknown or not len(numbers):
         raise InvalidInput(
             f"joints {unknown or 'none'} cannot be drawn: give numbers from 0 to {len(known) - 1}"
         )
@@ -112,30 +104,30 @@ def _check_numbers(run: History, joints: Sequence[int]) -> None:
 def _ground(axes: Axes, run: History) -> None:
     """Draw the acceleration of the ground."""
     dress(axes, "", "ground [m/s²]")
-    ground = run.dataset["ground"].values
-    axes.plot(run.time, ground[:, 0], color=INK, lw=0.6, label="horizontal")
+    time, ground = run.time, run.dataset["ground"].values
+    axes.plot(time, ground[:, 0], color=INK, lw=0.6, label="horizontal")
     if ground[:, 1].any():
-        axes.plot(run.time, ground[:, 1], color=LINES[4], lw=0.5, alpha=0.9, label="vertical")
-    axes.set_xlim(run.time[0], run.time[-1])
+        axes.plot(time, ground[:, 1], color=LINES[4], lw=0.5, alpha=0.9, label="vertical")
+    axes.set_xlim(time[0], time[-1])
 
 
-def _coefficient(joint: xr.Dataset) -> float:
-    """Coefficient of friction by which a joint was judged [-]."""
-    return float(Criteria.of(joint).coefficients(joint["friction_limit"].values))
-
-
-def _eccentricity(axes: Axes, joint: xr.Dataset) -> None:
+def _eccentricity(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
     """Draw where the thrust crosses a joint, against its faces."""
-    draw_faces(axes, Criteria.of(joint).hinge)
+    draw_faces(axes, criteria.hinge)
     axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
 
-def _mobilised(axes: Axes, joint: xr.Dataset) -> None:
-    """Draw mobilised friction against its limit."""
-    dress(axes, "", "|V| / N [-]")
-    limit = _coefficient(joint)
-    axes.axhspan(limit, LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
-    axes.axhline(limit, color=SLIP, lw=0.9, ls="--")
-    axes.plot(joint["time"], joint["friction"], color=LINES[0], lw=0.6)
-    axes.set_ylim(0.0, LOOSE * limit)
+def _friction(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
+    """Draw mobilised friction with the sense of the shear force, between its limits."""
+    dress(axes, "", "V / N [-]")
+    limit = float(criteria.coefficients(joint["friction_limit"].values))
+    for side in (1.0, -1.0):
+        axes.axhspan(side * limit, side * LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
+        axes.axhline(side * limit, color=SLIP, lw=0.9, ls="--")
+    axes.plot(joint["time"], np.sign(joint["V"]) * joint["friction"], color=LINES[0], lw=0.6)
+    axes.set_ylim(-LOOSE * limit, LOOSE * limit)
+    axes.annotate(
+        f"μ = {limit:g}", (1.0, limit), (-3, 1), xycoords=("axes fraction", "data"),
+        textcoords="offset points", fontsize=SMALL, ha="right", va="bottom", color=SLIP,
+    )  # fmt: skip

@@ -14,8 +14,9 @@ from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
 from archfem.models.model import Model
 
-ARROW = np.array([[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09]])
-ARROW = np.concatenate([ARROW, [[-0.5, 0.09]]])
+ARROW = np.array(
+    [[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09], [-0.5, 0.09]]
+)
 """Outline of an arrow of length 1 along x (7, 2)."""
 
 SWING = 0.06
@@ -61,6 +62,9 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
         joints: as made by `joint_dataset`, at one instant, with their flags.
         shift: displacements, as drawn, of both ends of each joint, intrados first
             (n_joints, 2, 2) [m]; by default none.
+
+    Returns:
+        The marks, moved by `shift`.
     """
     shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
     ends = structure.ends + shift
@@ -104,9 +108,15 @@ def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Arr
 
 
 def joint_ends(model: Model) -> sparse.csr_matrix:
-    """Displacements of both ends of each joint, intrados first, from coordinates (4 n_joints, n).
+    """Return what gives displacements of both ends of each joint from coordinates.
 
-    Each is the mean of the two blocks' displacements there.
+    Each is the mean of the two blocks' displacements there, without what moving supports add.
+
+    Args:
+        model: whose joints they are.
+
+    Returns:
+        A matrix (4 n_joints, n): x and y of the intrados, then of the extrados, joint by joint.
     """
     still = sparse.csr_matrix((2, model.size))
     blocks = model.structure.blocks
@@ -122,7 +132,14 @@ def joint_ends(model: Model) -> sparse.csr_matrix:
 
 
 def support_shift(model: Model) -> Array:
-    """What moving supports add to the displacements of `joint_ends` (n_joints, 2, 2) [m]."""
+    """Return what moving supports add to the displacements of `joint_ends`.
+
+    Args:
+        model: with the motions of its supports.
+
+    Returns:
+        Displacements (n_joints, 2, 2) [m]: by joint, end (intrados first) and axis.
+    """
     structure = model.structure
     shift = np.zeros((len(structure.joints), 2, 2))
     for number, joint in enumerate(structure.joints):
@@ -133,7 +150,12 @@ def support_shift(model: Model) -> Array:
 
 
 def support_outlines(model: Model, magnification: float) -> list[Array]:
-    """Outlines of the fixed blocks, where they have moved, each (k, 2) [m]."""
+    """Return the outlines of the fixed blocks, where they have moved, each (k, 2) [m].
+
+    Args:
+        model: with the motions of its supports.
+        magnification: of those motions [-].
+    """
     return [
         block.drawn() + magnification * motion_of(block.drawn(), block.centroid) @ motion
         for block, motion in zip(model.structure.blocks, model.supports, strict=True)
@@ -142,12 +164,25 @@ def support_outlines(model: Model, magnification: float) -> list[Array]:
 
 
 def swung(structure: Structure, motion: Array) -> Array:
-    """A motion of all blocks, as large as it is drawn (n_blocks, 3) [m, m, rad]."""
+    """Return a motion of all blocks, scaled so that the farthest point moves by `SWING`.
+
+    Args:
+        structure: whose blocks move.
+        motion: of any size (n_blocks, 3) [m, m, rad].
+
+    Returns:
+        The same motion, as large as it is drawn (n_blocks, 3) [m, m, rad].
+    """
     return motion * SWING * structure.size / RigidBlocks(structure).reach(motion)
 
 
 def displaced(structure: Structure, motion: Array) -> list[Array]:
-    """Outlines of the blocks that move, where a motion (n_blocks, 3) takes them [m]."""
+    """Return the outlines of those blocks that move, each (k, 2) [m], where a motion takes them.
+
+    Args:
+        structure: whose blocks move.
+        motion: about their centroids (n_blocks, 3) [m, m, rad].
+    """
     outlines = []
     for block, own in zip(structure.blocks, motion, strict=True):
         by = motion_of(block.drawn(), block.centroid) @ own

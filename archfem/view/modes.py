@@ -1,11 +1,9 @@
-"""Pictures and films of vibration shapes."""
+"""Pictures of vibration shapes."""
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
@@ -14,7 +12,6 @@ from archfem.errors import InvalidInput
 from archfem.masonry.softness import yielding_blocks
 from archfem.models.cells import Cells
 from archfem.statics.modes import Modes
-from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import support_outlines
 from archfem.view.style import (
     COLUMN,
@@ -36,12 +33,6 @@ REACH = 0.04
 HIGHEST, HEADED = 3.0, 0.3
 """Largest height of a panel; height of its title and of the gap below it [inch]."""
 
-FRAMES, FPS = 32, 20.0
-"""Pictures of one swing, and how many of them a second shows."""
-
-DENSITY = 100.0
-"""Of a film [dots per inch]."""
-
 
 def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
     """Draw vibration shapes, magnified, over the outline at rest; soil is paler than stone.
@@ -50,49 +41,28 @@ def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
         modes: as found by `modes`.
         numbers: which of them, counted from 1; by default all.
 
+    Returns:
+        The page, with a panel for each shape.
+
     Raises:
         InvalidInput: a number is not among them.
     """
-    figure, panels = _page(modes, numbers)
+    figure, panels = mode_panels(modes, numbers)
     for panel in panels:
         panel.swing(1.0)
     return figure
 
 
-def animate_modes(
-    modes: Modes, path: str | Path, numbers: Sequence[int] | None = None, *, swings: int = 1
-) -> Path:
-    """Film vibration shapes, each panel swinging once in the same time, whatever its period.
+def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, list["Panel"]]:
+    """Return a page of two columns, and its panels, one for each shape, not yet moved.
 
     Args:
         modes: as found by `modes`.
-        path: the film, .mp4 or .gif, which repeats itself; folders are made.
-        numbers: which of them, counted from 1; by default all.
-        swings: how often they swing.
+        numbers: which of them, counted from 1; None for all.
 
     Raises:
-        InvalidInput: a number is not among them, or the suffix is not that of a film.
+        InvalidInput: a number is not among them.
     """
-    target = film_path(path)
-    figure, panels = _page(modes, numbers)
-    return write_film(target, _shots(figure, panels, swings), FPS)
-
-
-def _shots(figure: Figure, panels: list["_Panel"], swings: int) -> Iterator[Image]:
-    figure.set_dpi(DENSITY)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    figure.set_layout_engine("none")  # nothing on the page will move but the blocks
-    for turn in np.tile(np.arange(FRAMES) / FRAMES, swings):
-        for panel in panels:
-            panel.swing(float(np.sin(2.0 * np.pi * turn)))
-        canvas.draw()
-        page = np.asarray(canvas.buffer_rgba())
-        yield page[: page.shape[0] // 2 * 2, : page.shape[1] // 2 * 2, :3].copy()
-
-
-def _page(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, list["_Panel"]]:
-    """Two columns of panels, one for each mode."""
     count = len(modes.frequencies)
     chosen = list(range(1, count + 1) if numbers is None else numbers)
     if not chosen or not set(chosen) <= set(range(1, count + 1)):
@@ -109,7 +79,7 @@ def _page(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, list["_P
     panels = []
     for axes, number in zip(places, chosen, strict=False):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        panels.append(_Panel(axes, modes, number))
+        panels.append(Panel(axes, modes, number))
     return figure, panels
 
 
@@ -121,7 +91,7 @@ def _view(modes: Modes) -> tuple[Array, Array]:
     return points.min(axis=0) - room, points.max(axis=0) + room
 
 
-class _Panel:
+class Panel:
     """One mode on its axes."""
 
     def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
@@ -149,7 +119,11 @@ class _Panel:
         axes.set_title(_title(modes, number), fontsize=SMALL, color=INK)
 
     def swing(self, phase: float) -> None:
-        """Move to a phase, from -1 to 1."""
+        """Move the blocks.
+
+        Args:
+            phase: of the swing, -1 to 1 at its ends and 0 at rest.
+        """
         places = self._places + phase * self._moves
         self._blocks.set_verts([places[loop] for loop in self._loops])
 

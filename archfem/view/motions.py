@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import COMPONENTS, Motion
@@ -18,8 +19,15 @@ PERIODS = np.geomspace(0.02, 3.0, 150)
 """Periods at which spectra are drawn [s]."""
 
 
-def accelerogram(motion: Motion) -> Figure:
-    """Draw acceleration, velocity and displacement, a column for each component of the motion."""
+def draw_motion(motion: Motion) -> Figure:
+    """Draw acceleration, velocity and displacement over time, with their peaks.
+
+    Args:
+        motion: with one component or several.
+
+    Returns:
+        The page, with a column for each component.
+    """
     names = motion.components
     figure = Figure(figsize=(COLUMN * (0.4 + 0.6 * len(names)), 5.5), layout="constrained")
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
@@ -38,10 +46,17 @@ def accelerogram(motion: Motion) -> Figure:
     return figure
 
 
-def spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
+def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
     """Draw the response spectra of motions, a panel for each component there is.
 
     The only component of a motion is drawn with the horizontals, whatever its direction.
+
+    Args:
+        motions: at least one.
+        damping: of the oscillators, as a fraction of critical [-].
+
+    Returns:
+        The page, with a panel for each component.
 
     Raises:
         InvalidInput: there is no motion.
@@ -62,7 +77,7 @@ def spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
     return figure
 
 
-def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
+def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     """Draw the spectra of a suite, their mean, and the target they were matched to.
 
     Spectra include the suite's scale but not its reduction factor, as the target does.
@@ -70,6 +85,9 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     Args:
         suite: motions; verticals are drawn where all have one.
         target: design spectrum, drawn beside them over the periods at which it is defined.
+
+    Returns:
+        The page, with a panel for the horizontals and one for the verticals, if any.
     """
     names = ["horizontal"]
     if all(pair.vertical is not None for pair in suite.pairs):
@@ -90,7 +108,7 @@ def suite_spectra(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     return figure
 
 
-def _defined(aim: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def _defined(aim: Callable[[Array], Array]) -> Array:
     """Return those of the periods at which a target is defined, and its values (2, n)."""
     known = []
     for period in PERIODS:
@@ -120,7 +138,7 @@ def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
-def _trace(axis: Axes, times: np.ndarray, values: np.ndarray) -> None:
+def _trace(axis: Axes, times: Array, values: Array) -> None:
     """Draw a time history and mark its peak."""
     axis.plot(times, values, LINES[0], lw=0.7)
     top = int(np.argmax(np.abs(values)))

@@ -34,6 +34,9 @@ def draw_pushover(
         reach: of the displacement axis [m]; by default where the curves have become flat.
         axes: where to draw; by default a new figure.
 
+    Returns:
+        The page; that of `axes` where given.
+
     Raises:
         InvalidInput: there is no pushover, or too many to tell apart.
     """
@@ -51,19 +54,24 @@ def draw_pushover(
     axes.plot([], [], "o", color=HINGE, ms=6.0, mec="white", label="joint hinges")
     falls = any(push.factor < float(push.curve["factor"][0]) for push in pushes.values())
     for name, value in (limits or {}).items():
-        axes.axhline(value, color=INK, ls="--", lw=1.0, zorder=1)
-        axes.annotate(
-            f"{name}: {value:.4g}",
-            (0.0 if falls else 1.0, value),
-            xycoords=("axes fraction", "data"),
-            xytext=(4 if falls else -4, 3),
-            textcoords="offset points",
-            fontsize=SMALL,
-            ha="left" if falls else "right",
-        )
+        _limit(axes, f"{name}: {value:.4g}", value, at_left=falls)
     axes.set_xlim(0.0, reach / mm)
     legend(axes)
     return cast(Figure, axes.figure)
+
+
+def _limit(axes: Axes, words: str, value: float, *, at_left: bool) -> None:
+    """Draw a known limit, named where no curve runs."""
+    axes.axhline(value, color=INK, ls="--", lw=1.0, zorder=1)
+    axes.annotate(
+        words,
+        (0.0 if at_left else 1.0, value),
+        xycoords=("axes fraction", "data"),
+        xytext=(4 if at_left else -4, 3),
+        textcoords="offset points",
+        fontsize=SMALL,
+        ha="left" if at_left else "right",
+    )
 
 
 def _flat(push: Pushover) -> float:

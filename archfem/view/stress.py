@@ -21,17 +21,16 @@ from archfem.models.cells import Cells
 from archfem.models.model import Model
 from archfem.statics.stress import at_corners, cell_stress, principal_values
 from archfem.units import MPa, kPa
-from archfem.view.films.colours import BEYOND
 from archfem.view.marks import joint_marks
 from archfem.view.structure import draw_blocks, draw_thrust
-from archfem.view.style import EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
+from archfem.view.style import BEYOND, EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
 
 SHADES = LinearSegmentedColormap.from_list(
     "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
 )
 """From none to the largest compression; warm, so that the thrust line stands out."""
 
-APART = 0.21
+PITCH = 0.21
 """Distance between two crosses on paper, and length of the longest arms [inch]."""
 
 SEEN = 0.08
@@ -62,6 +61,9 @@ def draw_stress(
         q: coordinates (n,).
         parts: whose blocks are shaded, for example ["backfill"]; by default all but soil.
         axes: where to draw; by default a new figure.
+
+    Returns:
+        The page, with a bar of colours; that of `axes` where given.
 
     Raises:
         InvalidInput: the blocks are rigid, or there is no such part.
@@ -135,11 +137,12 @@ def _inside(corners: Array) -> Array:
     """Values on a grid in each cell from those at its four corners (cells, 4, …)."""
     s, t = np.meshgrid(*(np.linspace(0.0, 1.0, PIECES + 1),) * 2)
     share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]).reshape(4, -1)
-    return np.einsum("kp,ck...->cp...", share, corners)
+    inside: Array = np.einsum("kp,ck...->cp...", share, corners)
+    return inside
 
 
 def _cut(corners: Array) -> tuple[Array, Numbers]:
-    """Points on a grid in each cell (cells, p, 2), and triangles between them (m, 3).
+    """Return points on a grid in each cell (cells, p, 2), and triangles between them (m, 3).
 
     Colours of a triangle run straight between those of its corners, past the ones between on the
     scale: over a whole cell of a coarse mesh that would be seen.
@@ -156,7 +159,7 @@ def _cut(corners: Array) -> tuple[Array, Numbers]:
 
 def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
-    spacing = APART * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
+    spacing = PITCH * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
     groups = [
         np.flatnonzero(cells.owner == number)[group]

@@ -18,6 +18,7 @@ from archfem.masonry.structure import Structure
 from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     EDGE,
+    HINGE,
     INK,
     NORMAL,
     SLIP,
@@ -30,9 +31,8 @@ from archfem.view.style import (
     dress,
     legend,
 )
-from archfem.view.style import HINGE as RED
 
-SNUG = 0.78
+STACKED = 0.78
 """Height of a picture among others, relative to one by itself."""
 
 
@@ -55,6 +55,9 @@ def draw_structure(
         criteria: what makes a joint fail; by default those by which the joints were judged already.
         axes: where to draw; by default a new figure.
 
+    Returns:
+        The page; that of `axes` where given.
+
     Raises:
         InvalidInput: `joints` has several instants, or those of another structure.
     """
@@ -76,9 +79,12 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
 
     Args:
         states: what to call each, the structure, and its joints at one instant or None.
+
+    Returns:
+        The page, with a panel for each structure.
     """
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
-    figure = Figure(figsize=(wide, SNUG * high * len(states)), layout="constrained")
+    figure = Figure(figsize=(wide, STACKED * high * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
@@ -107,7 +113,12 @@ def _title(structure: Structure, joints: xr.Dataset | None) -> str:
 
 
 def draw_blocks(axes: Axes, structure: Structure) -> None:
-    """Draw blocks where they are, supports darker, soil paler."""
+    """Draw blocks where they are, supports darker, soil paler.
+
+    Args:
+        axes: to draw into.
+        structure: whose blocks they are.
+    """
     soil = yielding_blocks(structure)
     faces = [
         SUPPORT if block.fixed else SOIL if number in soil else STONE
@@ -120,7 +131,12 @@ def draw_blocks(axes: Axes, structure: Structure) -> None:
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
-    """Draw the thrust lines."""
+    """Draw the thrust lines.
+
+    Args:
+        axes: to draw into.
+        marks: of one instant.
+    """
     halo = withStroke(linewidth=3.4, foreground="white")
     line: dict[str, Any] = {"color": THRUST, "lw": 1.7, "zorder": 5, "path_effects": [halo]}
     axes.plot(*_broken(marks.links).T, label="thrust line", gid="links", **line)
@@ -131,7 +147,7 @@ def _marks(axes: Axes, marks: Marks) -> None:
     """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
     draw_thrust(axes, marks)
     if len(marks.hinges):
-        disc: dict[str, Any] = {"mfc": RED, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
+        disc: dict[str, Any] = {"mfc": HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
     if len(marks.slips):
         arrows = PolyCollection(

@@ -5,6 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from archfem.errors import InvalidInput
@@ -18,6 +19,15 @@ THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
 MOVED = "#009e73"
 LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 """Colours of lines that share axes; they stay apart for all common kinds of colour blindness."""
+
+LIGHT_TO_DARK = LinearSegmentedColormap.from_list(
+    "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
+)
+"""From none to much."""
+
+BEYOND = 0.5
+"""Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
+take all of it."""
 
 SMALL, NORMAL = 8.0, 9.5
 """Sizes of type [points]: ticks, legends and labels; titles."""
@@ -48,7 +58,11 @@ def dress(axes: Axes, x: str = "", y: str = "") -> None:
 
 
 def legend(axes: Axes) -> None:
-    """Explain what is labelled: below axes that have a page to themselves, else among the lines."""
+    """Explain what is labelled: below axes that have a page to themselves, else among the lines.
+
+    Args:
+        axes: with labelled lines.
+    """
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
         page.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
@@ -57,7 +71,11 @@ def legend(axes: Axes) -> None:
 
 
 def canvas(structure: Structure) -> Figure:
-    """An empty page that fits a structure."""
+    """Return an empty page that fits a structure, long ones on a wide page.
+
+    Args:
+        structure: to be drawn on it, true to scale.
+    """
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
     room = COLUMN if wide < LONG * high else WIDE
@@ -72,6 +90,9 @@ def save(figure: Figure, path: str | Path) -> Path:
     Args:
         figure: what to write.
         path: the file; folders are made.
+
+    Returns:
+        The file's path.
 
     Raises:
         InvalidInput: the suffix is not one of a picture.

@@ -21,7 +21,7 @@ from archfem.motion.design_spectra import Tbec2018
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.motions import suite_spectra
+from archfem.view.motions import draw_suite
 from archfem.view.style import COLUMN, LINES, NORMAL, SMALL, dress, save
 
 TARGET = Tbec2018(ss=1.140, s1=0.315, site="ZD")
@@ -86,7 +86,7 @@ def main(folder, pictures):
         rms, least, most = mean_apart(suite, component)
         print(f"mean of {component} against target: rms {rms:.2%}, {least:+.1%} to {most:+.1%}")
     print(f"wrote {save(drawn(suite), pictures / 'accelerograms.png')}")
-    print(f"wrote {save(suite_spectra(suite, TARGET), pictures / 'spectra.png')}")
+    print(f"wrote {save(draw_suite(suite, TARGET), pictures / 'spectra.png')}")
 
 
 if __name__ == "__main__":

@@ -22,3 +22,13 @@ def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, tmp_path
     later = files[-1].stat().st_mtime_ns + 1
     os.utime(run.path, ns=(later, later))
     assert not results.is_written(run)
+
+
+def test_a_case_may_ask_for_a_free_body(tmp_path):
+    ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
+    tables = {"structure": {**ring, "voussoirs": 9}, "output": {"free_body": "voussoir 3"}}
+    for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):
+        rest = af.cases.Rest.of(af.Case.of({**tables, "model": cells}))
+        files = [path.name for path in results.write_dead(rest, tmp_path)]
+        assert files == ["dead.png", *(f"dead_stress.{kind}" for kind in more), "free_body.png"]
+    assert (tmp_path / "dead_stress.txt").read_text().splitlines()[1].startswith("arch ")

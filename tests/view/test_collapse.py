@@ -1,18 +1,10 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
 import numpy as np
-import pytest
 import xarray as xr
 
-from archfem.limit.collapse import collapse_factor
-from archfem.masonry.actions import BodyForce, PointLoad
-from archfem.masonry.shapes import circular_arch
-from archfem.view.collapse import capacity_figure, collapse_figure
-
-
-@pytest.fixture(scope="module")
-def ring():
-    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+import archfem as af
+from archfem.view.collapse import draw_capacity, draw_collapse
 
 
 def lines_of(axes):
@@ -20,8 +12,8 @@ def lines_of(axes):
 
 
 def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
-    found = collapse_factor(ring, live=BodyForce(1.0))
-    figure = collapse_figure(ring, found)
+    found = af.collapse_factor(ring, live=af.BodyForce(1.0))
+    figure = draw_collapse(ring, found)
     axes = figure.axes[0]
     lines = lines_of(axes)
     assert len(lines["thrust line"]) == 18
@@ -34,16 +26,16 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
 
 
 def test_a_load_that_never_overturns_shows_no_mechanism(ring):
-    found = collapse_factor(ring, live=[PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
-    axes = collapse_figure(ring, found).axes[0]
+    found = af.collapse_factor(ring, live=[af.PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
+    axes = draw_collapse(ring, found).axes[0]
     assert set(lines_of(axes)) == {"thrust line"}
     assert len(axes.collections) == 1
     assert "never overturns" in axes.get_title()
 
 
 def test_an_arch_that_falls_has_no_thrust_line():
-    thin = circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
-    axes = collapse_figure(thin, collapse_factor(thin, live=BodyForce(1.0))).axes[0]
+    thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
+    axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
     assert set(lines_of(axes)) == {"hinge"}
 
 
@@ -54,7 +46,7 @@ def test_map_of_capacity_carries_known_values(tmp_path):
         ("embrace", "ratio"),
     )
     known = {(180.0, 0.1075): 0.0, (120.0, 0.02285): 0.0, (120.0, 0.1): 0.58, (120.0, 0.2): 1.264}
-    figure = capacity_figure(capacity, {120.0: 0.023, 150.0: 0.054, 180.0: 0.107}, known)
+    figure = draw_capacity(capacity, {120.0: 0.023, 150.0: 0.054, 180.0: 0.107}, known)
     axes = figure.axes[0]
     assert {text.get_text() for text in axes.texts} >= {"0.1075", "0.02285", "0.58", "1.264"}
     assert axes.get_ylim() == (0.0, 0.25)

@@ -1,45 +1,58 @@
-"""Pictures of structures side by side."""
+"""Joints over time: what was recorded, and its limits."""
 
 import numpy as np
 import pytest
+from pictures import history
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.schemes import Rayleigh
-from archfem.dynamics.time_history import time_history
-from archfem.errors import InvalidInput
-from archfem.masonry.shapes import circular_arch
-from archfem.motion.motion import Motion
-from archfem.view.joints import draw_joint
-from archfem.view.structure import draw_instants
+import archfem as af
+from archfem.view.joints import draw_joint, draw_joints
 
 
-@pytest.fixture(scope="module")
-def runs():
-    """A thick and a thin ring under one motion."""
-    motion = Motion.synthetic(duration=2.0, pga=3.0, seed=1)
-    rings = {
-        name: circular_arch(radius=2.95, thickness=t, embrace=159.0, voussoirs=9)
-        for name, t in {"thick": 0.6, "thin": 0.5}.items()
-    }
-    return {
-        name: time_history(
-            build(ring, fidelity="rigid"), motion, damping=Rayleigh(0.05, (8.0, 16.0))
-        )
-        for name, ring in rings.items()
-    }
+def units(axes):
+    """Whether every label of axes has a unit."""
+    return all("[" in label for label in (axes.get_xlabel(), axes.get_ylabel()) if label)
 
 
-def test_structures_one_below_the_other(runs):
-    states = {name: (run.structure, run.joints.isel(time=-1)) for name, run in runs.items()}
-    figure = draw_instants({**states, "bare": (states["thin"][0], None)})
-    assert [axes.get_title() for axes in figure.axes] == [
-        "thick, t = 2.000 s",
-        "thin, t = 2.000 s",
-        "bare",
-    ]
-    lines = [[line.get_gid() for line in axes.lines] for axes in figure.axes]
-    assert "thrust" in lines[0]
-    assert "thrust" not in lines[2]
+def test_joint_histories_show_the_recorded_values_and_limits(run):
+    figure = draw_joints(run, [6, 9])
+    panels = np.array(figure.axes).reshape(3, 2)
+    assert all(units(axes) for axes in figure.axes)
+    for row, number in zip(panels[1:], (6, 9), strict=True):
+        for axes, name in zip(row, ("eccentricity", "friction"), strict=True):
+            shown = axes.lines[-1].get_ydata()
+            own = run.joints.sel(joint=number)
+            sense = np.sign(own["V"].values) if name == "friction" else 1.0
+            assert shown == pytest.approx(sense * own[name].values)
+        assert f"joint {number}" in row[0].get_ylabel()
+        assert row[1].lines[0].get_ydata()[0] == pytest.approx(0.6)
+    ground = {line.get_label(): line.get_ydata() for line in panels[0, 0].lines}
+    assert ground["horizontal"] == pytest.approx(run.dataset["ground"].values[:, 0])
+    assert ground["vertical"] == pytest.approx(run.dataset["ground"].values[:, 1])
+
+
+def test_long_names_of_joints_are_broken_into_lines(bridge):
+    run = history(bridge, 0.3)
+    run.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
+    names = [joint.name for joint in bridge.joints]
+    long = "main arch, voussoir 12 to backfill"
+    axes = draw_joints(run, [names.index(long)]).axes[2]
+    lines = axes.get_ylabel().splitlines()[:-1]
+    assert " ".join(lines) == long
+    assert max(map(len, lines)) <= 20
+
+
+@pytest.mark.parametrize(("numbers", "said"), [([0, 18], r"\[18\]"), ([], "none")])
+def test_joints_that_do_not_exist_are_refused(run, numbers, said):
+    with pytest.raises(af.InvalidInput, match=rf"joints {said} cannot be drawn: .* 0 to 17"):
+        draw_joints(run, numbers)
+
+
+def test_limits_are_those_of_the_criteria_carried(run):
+    sharp = af.Criteria(hinge=0.47, friction=2.0)
+    axes = draw_joints(run.judged_by(sharp), [0]).axes
+    heights = {float(line.get_ydata()[0]) for each in axes for line in each.lines[:8]}
+    assert {0.47, 2.0} <= heights
+    assert not {0.46, 0.6} & heights
 
 
 def test_one_joint_of_several_runs(runs):
@@ -52,5 +65,5 @@ def test_one_joint_of_several_runs(runs):
         assert np.nanmax(np.abs(drawn)) == pytest.approx(float(own["friction"].max()))
         assert below.lines[-1].get_ydata() == pytest.approx(own["eccentricity"].values, nan_ok=True)
     assert upper[0].get_ylim() == upper[1].get_ylim()
-    with pytest.raises(InvalidInput, match="joint 44"):
+    with pytest.raises(af.InvalidInput, match="joint 44"):
         draw_joint(runs, "joint 44")

@@ -3,24 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.colors import Colormap
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.models.cells import Cells
 from archfem.units import MPa, mm
-from archfem.view.style import STONE
+from archfem.view.style import BEYOND, LIGHT_TO_DARK
 
 COLOURS = ("displacement", "stress")
 """What blocks can be coloured by."""
-
-BEYOND = 0.5
-"""Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
-take all of it."""
-
-LIGHT_TO_DARK = LinearSegmentedColormap.from_list(
-    "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
-)
 
 
 @dataclass(frozen=True)
@@ -47,6 +39,10 @@ class Scale:
 def check_colour(cells: Cells, colour: str) -> None:
     """Refuse what blocks cannot be coloured by.
 
+    Args:
+        cells: of the model, which know of stress or do not.
+        colour: asked for.
+
     Raises:
         InvalidInput: the colour is not known, or rigid blocks are to show stress.
     """
@@ -67,12 +63,17 @@ def shade(cells: Cells, q: Array, colour: str) -> Array:
         q: coordinates (n,).
         colour: "displacement", the length of it at every point [mm], or "stress", the least
             principal one of every cell, compression negative [MPa].
+
+    Returns:
+        A value for each point (n_points,), or for each cell (n_cells,).
     """
     if colour == "displacement":
-        return np.linalg.norm(cells.displacement(q), axis=1) / mm
+        lengths: Array = np.linalg.norm(cells.displacement(q), axis=1)
+        return lengths / mm
     assert cells.stress is not None, "checked by check_colour"
     across, up, shear = (cells.stress @ q).reshape(-1, 3).T / MPa
-    return 0.5 * (across + up) - np.hypot(0.5 * (across - up), shear)
+    least: Array = 0.5 * (across + up) - np.hypot(0.5 * (across - up), shear)
+    return least
 
 
 def scale_for(cells: Cells, fields: Array, colour: str) -> Scale:
@@ -82,6 +83,9 @@ def scale_for(cells: Cells, fields: Array, colour: str) -> Scale:
         cells: of the model.
         fields: coordinates (frames, n).
         colour: one of `COLOURS`.
+
+    Returns:
+        From 0 to the largest displacement, or from nearly the least stress to 0.
     """
     found = np.array([shade(cells, q, colour) for q in fields])
     if colour == "displacement":

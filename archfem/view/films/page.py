@@ -15,11 +15,11 @@ from matplotlib.text import Text
 from archfem.dynamics.history import History
 from archfem.joints.criteria import judged
 from archfem.view.films.colours import Scale
-from archfem.view.films.stage import Setting
+from archfem.view.films.setup import Setup
 from archfem.view.films.writer import Image
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
-WIDE, COARSE = 12.8, 60.0
+BROAD, COARSE = 12.8, 60.0
 """Width of a page [inch], and the least of its dots per inch: a smaller page is narrower."""
 
 HEAD, SIDE, FOOT, STRIP, EDGE_ROOM = 0.55, 1.25, 0.45, 1.75, 0.25
@@ -36,8 +36,8 @@ class Page:
         room: width and height of the photograph [pixels].
     """
 
-    def __init__(self, setting: Setting, size: tuple[int, int], run: History | None = None) -> None:
-        dense = max(COARSE, size[0] / WIDE)
+    def __init__(self, setup: Setup, size: tuple[int, int], run: History | None = None) -> None:
+        dense = max(COARSE, size[0] / BROAD)
         self._figure = Figure(figsize=(size[0] / dense, size[1] / dense), dpi=dense)
         self._canvas = FigureCanvasAgg(self._figure)
         self._inches = np.array(size) / dense
@@ -48,7 +48,7 @@ class Page:
             size[1] - top - round(below * dense),
         )
         self._window = (slice(top, top + self.room[1]), slice(left, left + self.room[0]))
-        self._still(setting, run, below)
+        self._still(setup, run, below)
         self._said = self._write(0.985, "", ha="right", animated=True)
         self._cursor = self._strip(run) if run else None
         self._canvas.draw()
@@ -60,6 +60,9 @@ class Page:
         Args:
             photograph: of the structure, as large as `room`.
             joints: at that instant.
+
+        Returns:
+            The page (height, width, 3), red, green and blue from 0 to 255.
         """
         self._canvas.restore_region(self._background)
         self._said.set_text(_sentence(joints))
@@ -72,15 +75,15 @@ class Page:
         page[self._window] = photograph
         return page
 
-    def _still(self, setting: Setting, run: History | None, below: float) -> None:
+    def _still(self, setup: Setup, run: History | None, below: float) -> None:
         """Draw title, colour bar and legend."""
-        name = run.dataset.attrs["title"] if run else setting.model.structure.name
+        name = run.dataset.attrs["title"] if run else setup.model.structure.name
         self._write(0.02, name[:1].upper() + name[1:], ha="left")
-        self._colour_bar(setting.scale, below)
-        by = f"displacements × {setting.magnification:g}"
+        self._colour_bar(setup.scale, below)
+        by = f"displacements × {setup.magnification:g}"
         middle = (below - 0.5 * FOOT) / self._inches[1]
         self._figure.legend(
-            handles=_symbols(run is not None, bool(setting.outlines)), loc="center left", ncols=6,
+            handles=_symbols(run is not None, bool(setup.outlines)), loc="center left", ncols=6,
             frameon=False, fontsize=TYPE, bbox_to_anchor=(0.01, middle), columnspacing=1.4,
             handletextpad=0.5,
         )  # fmt: skip

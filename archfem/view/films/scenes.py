@@ -1,12 +1,11 @@
 """Films and stills of a structure that moves: how hinges form."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import sparse
 from tqdm import tqdm
 
 from archfem.arrays import Array
@@ -18,7 +17,8 @@ from archfem.limit.verified import VerifiedMechanism
 from archfem.models.model import Model
 from archfem.view.films.colours import check_colour
 from archfem.view.films.page import Page
-from archfem.view.films.stage import Setting, Stage
+from archfem.view.films.setup import Setup
+from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
 
@@ -26,7 +26,7 @@ SMALLEST = (480, 320)
 """Least width and height of a picture [pixels]: type would not fit into less."""
 
 
-def animate(  # noqa: PLR0913  (what is filmed, and how)
+def film(  # noqa: PLR0913  (what is filmed, and how)
     model: Model,
     run: History,
     path: str | Path,
@@ -57,6 +57,9 @@ def animate(  # noqa: PLR0913  (what is filmed, and how)
         mechanism: as found by `first_verified_mechanism`: from its instant on, the outlines of the
             blocks that it moves are drawn where it takes them.
 
+    Returns:
+        The film's path.
+
     Raises:
         InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
     """
@@ -64,8 +67,8 @@ def animate(  # noqa: PLR0913  (what is filmed, and how)
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
     frames, fps = _frames(run.dataset["frame_time"].values, fps, seconds)
-    setting = Setting.of(model, run.dataset["q"].values[frames], colour, magnification)
-    return write_film(target, _shots(_with(setting, mechanism), run, frames, size), fps)
+    setup = Setup.of(model, run.dataset["q"].values[frames], colour, magnification)
+    return write_film(target, _shots(_with(setup, mechanism), run, frames, size), fps)
 
 
 def picture(
@@ -95,47 +98,52 @@ def picture(
     """
     _check_picture(model, colour, magnification, size)
     _check_size(model, len(q))
-    setting = Setting.of(model, q[None], colour, magnification)
+    setup = Setup.of(model, q[None], colour, magnification)
     joints = joint_dataset(model.structure, model.resultants(q), criteria=criteria)
-    shift = _shift(setting, joint_ends(model), q)
-    page = Page(setting, size)
-    with Stage(setting, page.room) as stage:
+    shift = _carrier(setup)(q)
+    page = Page(setup, size)
+    with Stage(setup, page.room) as stage:
         marks = joint_marks(model.structure, joints, shift=shift)
         return page.compose(stage.photograph(q, marks, np.zeros((0, 2))), joints)
 
 
-def _with(setting: Setting, mechanism: VerifiedMechanism | None) -> Setting:
+def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
     """Let a mechanism be seen from its instant on."""
     if mechanism is None or not mechanism.moved.blocks:
-        return setting
-    structure = setting.model.structure
+        return setup
+    structure = setup.model.structure
     outlines = displaced(structure, swung(structure, mechanism.motion))
-    return setting.with_outlines(outlines, mechanism.moved.time or 0.0)
+    return setup.with_outlines(outlines, mechanism.moved.time or 0.0)
 
 
-def _shots(setting: Setting, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
+def _shots(setup: Setup, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
     """Every frame of a film, one after another; on a terminal a bar shows progress."""
-    structure, carriers = setting.model.structure, joint_ends(setting.model)
+    structure, carried = setup.model.structure, _carrier(setup)
     times = run.dataset["frame_time"].values[frames]
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
     been = _been(run.joints, structure.judged)
-    page = Page(setting, size, run)
+    page = Page(setup, size, run)
     shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
     bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
-    with Stage(setting, page.room) as stage:
+    with Stage(setup, page.room) as stage:
         for time, step, q in bar:
             joints = run.joints.isel(time=int(step))
-            shift = _shift(setting, carriers, q)
+            shift = carried(q)
             marks = joint_marks(structure, joints, shift=shift)
             past = (structure.ends + shift)[been[step]]
-            moving = setting.outlines if time >= setting.since else ()
+            moving = setup.outlines if time >= setup.since else ()
             yield page.compose(stage.photograph(q, marks, past, moving), joints)
 
 
-def _shift(setting: Setting, carriers: sparse.csr_matrix, q: Array) -> Array:
-    """Displacements of the joints' ends, as drawn (n_joints, 2, 2) [m]."""
-    moved = (carriers @ q).reshape(-1, 2, 2) + support_shift(setting.model)
-    return setting.magnification * moved
+def _carrier(setup: Setup) -> Callable[[Array], Array]:
+    """Return what gives the joints' ends displacements, as drawn (n_joints, 2, 2) [m]."""
+    ends, supports = joint_ends(setup.model), support_shift(setup.model)
+
+    def carried(q: Array) -> Array:
+        moved: Array = (ends @ q).reshape(-1, 2, 2) + supports
+        return setup.magnification * moved
+
+    return carried
 
 
 def _been(joints: xr.Dataset, judged: NDArray[np.bool_]) -> NDArray[np.bool_]:

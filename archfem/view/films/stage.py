@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import TracebackType
 from typing import Self
@@ -15,10 +14,10 @@ from numpy.typing import NDArray
 from archfem.arrays import Array
 from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
-from archfem.models.model import Model
-from archfem.view.films.colours import Scale, scale_for, shade
+from archfem.view.films.colours import shade
+from archfem.view.films.setup import Setup
 from archfem.view.films.writer import Image
-from archfem.view.marks import SWING, Marks, support_outlines
+from archfem.view.marks import Marks, support_outlines
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
 Numbers = NDArray[np.intp]
@@ -32,71 +31,11 @@ SNUG = 0.3
 FULL = 1100.0
 """Width of a photograph at which lines are as wide as given [pixels]."""
 
-MARGIN = 0.02
-"""Room around the structure, relative to its size."""
-
 TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 
 REST, EDGES, MOTION, PAST, HALO, LINE, ARROWS, RIMS, HINGES = -1, *range(1, 9)
 """Layers of a picture, from the blocks upwards."""
-
-
-@dataclass(frozen=True, eq=False)
-class Setting:
-    """What stays the same over a whole film.
-
-    Attributes:
-        model: what is filmed.
-        magnification: of its displacements [-].
-        scale: from a number to a colour.
-        low: lower left corner of what is seen (2,) [m].
-        high: upper right corner of what is seen (2,) [m].
-        outlines: of blocks as a mechanism moves them, each (k, 2) [m].
-        since: when they are first shown [s].
-    """
-
-    model: Model
-    magnification: float
-    scale: Scale
-    low: Array
-    high: Array
-    outlines: tuple[Array, ...] = ()
-    since: float = 0.0
-
-    @classmethod
-    def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
-        """Choose a scale, a magnification where none is given, and a view that fits all frames.
-
-        Args:
-            model: what is filmed.
-            fields: coordinates (frames, n).
-            colour: one of `COLOURS`.
-            magnification: of displacements, or None.
-        """
-        cells, structure = model.cells, model.structure
-        moves = np.array([cells.displacement(q) for q in fields])
-        by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
-        still = support_outlines(model, by)
-        moved = cells.places + by * moves
-        points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
-        room = MARGIN * structure.size
-        scale = scale_for(cells, fields, colour)
-        return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
-
-    def with_outlines(self, outlines: list[Array], since: float) -> Self:
-        """The same with outlines, each (k, 2) [m], to be shown from a time on [s]."""
-        points = np.concatenate([[self.low, self.high], *outlines])
-        low, high = points.min(axis=0), points.max(axis=0)
-        return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
-
-
-def _magnification(displacement: float) -> float:
-    """One of 1, 2, 5, 10, … that brings a relative displacement nearest to `SWING`."""
-    if displacement * 1.5 >= SWING or displacement == 0.0:
-        return 1.0
-    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
-    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])
 
 
 class Stage:
@@ -105,25 +44,25 @@ class Stage:
     Use it as a context: leaving it frees what VTK holds.
     """
 
-    def __init__(self, setting: Setting, size: tuple[int, int]) -> None:
+    def __init__(self, setup: Setup, size: tuple[int, int]) -> None:
         _go_headless()
-        self._setting = setting
-        cells = setting.model.cells
+        self._setup = setup
+        cells = setup.model.cells
         self._pen = max(0.6, size[0] / FULL)
-        self._height = 1e-3 * setting.model.structure.size
-        self._disc = _disc(setting.model.structure)
+        self._height = 1e-3 * setup.model.structure.size
+        self._disc = _disc(setup.model.structure)
         self._blocks = _surface(cells)
         self._edges = cells.rims
         self._outlines = _lines(self._flat(cells.places, EDGES), self._edges)
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
         self._plotter.background_color = pv.Color("white")
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
-        self._paint(np.zeros(setting.model.size))
+        self._paint(np.zeros(setup.model.size))
         self._plotter.add_mesh(
             self._blocks,
             scalars="shade",
-            cmap=setting.scale.shades,
-            clim=(setting.scale.low, setting.scale.high),
+            cmap=setup.scale.shades,
+            clim=(setup.scale.low, setup.scale.high),
             lighting=False,
             show_scalar_bar=False,
         )
@@ -153,9 +92,12 @@ class Stage:
             marks: of the joints, as moved.
             past: where hinges have been, as moved (n, 2) [m].
             outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+
+        Returns:
+            Red, green and blue from 0 to 255 (height, width, 3).
         """
-        setting, cells = self._setting, self._setting.model.cells
-        places = cells.places + setting.magnification * cells.displacement(q)
+        setup, cells = self._setup, self._setup.model.cells
+        places = cells.places + setup.magnification * cells.displacement(q)
         self._blocks.points = self._flat(places, 0)
         self._outlines.points = self._flat(places, EDGES)
         self._paint(q)
@@ -175,12 +117,12 @@ class Stage:
 
     def _build(self) -> None:
         """Put everything on the stage, marks still empty."""
-        for outline in support_outlines(self._setting.model, self._setting.magnification):
+        for outline in support_outlines(self._setup.model, self._setup.magnification):
             self._add(self._polygons(outline[None], 0), SUPPORT)
             around = np.arange(len(outline))
             edges = np.column_stack([around, np.roll(around, -1)])
             self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
-        rest = _lines(self._flat(self._setting.model.cells.places, REST), self._edges)
+        rest = _lines(self._flat(self._setup.model.cells.places, REST), self._edges)
         self._add(rest, GHOST)
         self._add(self._outlines, EDGE, 1.5)
         self._meshes = {
@@ -196,8 +138,8 @@ class Stage:
 
     def _paint(self, q: Array) -> None:
         """Give the blocks the values by which they are coloured."""
-        scale = self._setting.scale
-        shades = shade(self._setting.model.cells, q, scale.colour)
+        scale = self._setup.scale
+        shades = shade(self._setup.model.cells, q, scale.colour)
         if scale.colour == "stress":
             self._blocks.cell_data["shade"] = shades[self._blocks.cell_data["cell"]]
         else:
@@ -216,11 +158,11 @@ class Stage:
 
     def _aim(self, size: tuple[int, int]) -> None:
         """Look at all of the view, from the front, without perspective."""
-        low, high = self._setting.low, self._setting.high
+        low, high = self._setup.low, self._setup.high
         middle, extent = 0.5 * (low + high), high - low
         camera = self._plotter.camera
         camera.focal_point = (*middle, 0.0)
-        camera.position = (*middle, 2.0 * self._setting.model.structure.size)
+        camera.position = (*middle, 2.0 * self._setup.model.structure.size)
         camera.up = (0.0, 1.0, 0.0)
         camera.parallel_projection = True
         camera.parallel_scale = 0.5 * max(extent[1], extent[0] * size[1] / size[0])
@@ -237,7 +179,8 @@ class Stage:
         count, corners = outlines.shape[:2]
         numbers = np.arange(count * corners).reshape(count, corners)
         faces = np.insert(numbers, 0, corners, axis=1).ravel()
-        return pv.PolyData(self._flat(outlines.reshape(-1, 2), layer), faces=faces).triangulate()
+        points = self._flat(outlines.reshape(-1, 2), layer)
+        return _triangles(pv.PolyData(points, faces=faces))
 
     def _loops(self, outlines: Sequence[Array]) -> pv.PolyData:
         """Closed lines, each (k, 2) [m]."""
@@ -273,7 +216,13 @@ def _surface(cells: Cells) -> pv.PolyData:
     places = np.column_stack([cells.places, np.zeros(len(cells.places))])
     surface = pv.PolyData(places, faces=listed)
     surface.cell_data["cell"] = np.arange(len(cells.polygons))
-    return surface.triangulate()
+    return _triangles(surface)
+
+
+def _triangles(surface: pv.PolyData) -> pv.PolyData:
+    """Cut polygons, which may be concave, into triangles."""
+    cut: pv.PolyData = surface.triangulate()
+    return cut
 
 
 def _lines(points: Array, pairs: Numbers) -> pv.PolyData:

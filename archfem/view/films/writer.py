@@ -1,6 +1,7 @@
 """Films, written in one stroke."""
 
 from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +24,21 @@ def write_film(path: Path, shots: Iterable[Image], fps: float) -> Path:
         path: the film, as checked by `film_path`; folders are made.
         shots: pictures (height, width, 3), of even numbers of pixels.
         fps: pictures a second.
+
+    Returns:
+        The film's path.
     """
-    with in_one_stroke(path) as draft, _writer(draft, fps) as film:
+    with in_one_stroke(path) as draft, closing(_writer(draft, fps)) as film:
         for shot in shots:
             film.append_data(shot)
     return path
 
 
 def film_path(path: str | Path) -> Path:
-    """The file, if its suffix is one of a film.
+    """Return the file, if its suffix is one of a film.
+
+    Args:
+        path: as given by a user.
 
     Raises:
         InvalidInput: it is not.

@@ -1,0 +1,79 @@
+"""What stays the same over a film: whose it is, how much is magnified, and what is seen."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.models.model import Model
+from archfem.view.films.colours import Scale, scale_for
+from archfem.view.marks import SWING, support_outlines
+
+MARGIN = 0.02
+"""Room around the structure, relative to its size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What stays the same over a whole film.
+
+    Attributes:
+        model: what is filmed.
+        magnification: of its displacements [-].
+        scale: from a number to a colour.
+        low: lower left corner of what is seen (2,) [m].
+        high: upper right corner of what is seen (2,) [m].
+        outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+        since: when they are first shown [s].
+    """
+
+    model: Model
+    magnification: float
+    scale: Scale
+    low: Array
+    high: Array
+    outlines: tuple[Array, ...] = ()
+    since: float = 0.0
+
+    @classmethod
+    def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
+        """Choose a scale, a magnification where none is given, and a view that fits all frames.
+
+        Args:
+            model: what is filmed.
+            fields: coordinates (frames, n).
+            colour: one of `COLOURS`.
+            magnification: of displacements, or None.
+
+        Returns:
+            What stays the same over these frames, as yet without a mechanism.
+        """
+        cells, structure = model.cells, model.structure
+        moves = np.array([cells.displacement(q) for q in fields])
+        by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
+        still = support_outlines(model, by)
+        moved = cells.places + by * moves
+        points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
+        room = MARGIN * structure.size
+        scale = scale_for(cells, fields, colour)
+        return cls(model, by, scale, points.min(axis=0) - room, points.max(axis=0) + room)
+
+    def with_outlines(self, outlines: list[Array], since: float) -> Self:
+        """Return the same with outlines of blocks, and room for them.
+
+        Args:
+            outlines: as a mechanism moves them, each (k, 2) [m].
+            since: when they are first shown [s].
+        """
+        points = np.concatenate([[self.low, self.high], *outlines])
+        low, high = points.min(axis=0), points.max(axis=0)
+        return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
+
+
+def _magnification(displacement: float) -> float:
+    """One of 1, 2, 5, 10, … that brings a relative displacement nearest to `SWING`."""
+    if displacement * 1.5 >= SWING or displacement == 0.0:
+        return 1.0
+    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])

@@ -1,0 +1,147 @@
+"""Films and stills: as many frames as asked, of the right size, that show what moves."""
+
+import subprocess
+import sys
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.films.scenes import film, picture
+from archfem.view.style import HINGE, MOVED
+
+SIZE = (640, 400)  # small: rendering takes the time
+RED = np.array([int(HINGE[k : k + 2], 16) for k in (1, 3, 5)])
+GREEN = np.array([int(MOVED[k : k + 2], 16) for k in (1, 3, 5)])
+
+
+def reds(image):
+    """Pixels as red as a hinge, below the header and above the legend."""
+    inside = image[40:-170, :-130].astype(int)
+    return int((np.abs(inside - RED).max(axis=-1) < 12).sum())
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
+    path = tmp_path / "new" / f"film{suffix}"
+    assert film(model, run, path, fps=10, seconds=0.3, size=SIZE) == path
+    frames = [frame[..., :3] for frame in imageio.mimread(path)]
+    assert [frame.shape for frame in frames] == [(SIZE[1], SIZE[0], 3)] * 3
+    assert all(frame.std() > 20.0 for frame in frames)
+    assert np.abs(frames[0].astype(float) - frames[2]).max() > 100.0
+    assert [each.name for each in path.parent.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("asked", "frames", "fps"),
+    [
+        ({}, 6, 20.0),  # as long as the run
+        ({"seconds": 3.0}, 13, 13 / 3.0),  # no more frames than fields
+        ({"seconds": 0.2, "fps": 50.0}, 10, 50.0),
+    ],
+)
+def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps):
+    path = film(model, run, tmp_path / "film.mp4", size=(480, 320), **asked)
+    with imageio.get_reader(path) as read:
+        assert read.count_frames() == frames
+        assert read.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
+
+
+def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
+    """Four hinges that alternate, as if found at 0.2 s: green lines in the later frames alone."""
+    resultants = np.zeros((18, 3))
+    resultants[:, 0] = 1e4
+    resultants[[0, 6, 12, 17], 2] = 0.5e4 * 0.55 * np.array([-1.0, 1.0, -1.0, 1.0])
+    joints = af.joints.joint_dataset(model.structure, resultants).assign_coords(time=0.2)
+    found = af.verified_mechanism(model.structure, joints)
+    path = film(model, run, tmp_path / "film.gif", fps=20, size=SIZE, mechanism=found)
+    green = [
+        int((np.abs(frame[40:-170, :-130, :3].astype(int) - GREEN).max(axis=-1) < 40).sum())
+        for frame in imageio.mimread(path)
+    ]
+    assert max(green[:4]) == 0
+    assert min(green[4:]) > 500
+
+
+def test_hinges_are_red_where_there_are_some(model, run):
+    """At rest no pixel is red; with hinges, about as many discs' worth as the criteria count."""
+    fields, times = run.dataset["q"].values, run.dataset["frame_time"].values
+    count = (run.joints["hinge"] != 0).sum("joint").sel(time=times, method="nearest").values
+    last = int(np.argmax(count))
+    assert count[last] >= 4
+    assert reds(picture(model, fields[0], size=SIZE)) == 0
+    one = reds(picture(model, fields[int(np.flatnonzero(count == 1)[0])], size=SIZE))
+    many = reds(picture(model, fields[last], size=SIZE))
+    assert one > 20
+    assert 0.5 * count[last] * one < many < 1.5 * count[last] * one
+
+
+def test_magnified_blocks_move_and_supports_do_not(model, run):
+    q = run.dataset["q"].values[-1]
+    small, large = (picture(model, q, magnification=by, size=SIZE) for by in (1.0, 20.0))
+    assert np.abs(small.astype(float) - large).max() > 100.0
+    rest = picture(model, 0.0 * q, size=SIZE)
+    assert rest.std() > 20.0
+
+
+def test_the_opening_under_the_ring_is_empty(model):
+    """Rigid voussoirs are concave polygons: they must not be filled across their hollow."""
+    image = picture(model, np.zeros(model.size), size=SIZE)
+    middle = image[:, (SIZE[0] - 125) // 2]
+    stone = np.flatnonzero((middle[40:-40] < 250).any(axis=1))
+    assert len(stone) > 20
+    assert np.ptp(stone) < 0.25 * SIZE[1]
+
+
+def test_stress_is_seen_in_elastic_blocks(coarse):
+    dead = af.dead_load(coarse)
+    colours = ("displacement", "stress")
+    seen = [picture(coarse, dead.q, colour=colour, size=SIZE) for colour in colours]
+    assert np.abs(seen[0].astype(float) - seen[1]).max() > 100.0
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"colour": "stress"}, r"rigid blocks have no stress: .*fidelity='full'"),
+        ({"colour": "mood"}, r"colour 'mood' is not known: use one of \('displacement', 'stress'"),
+        ({"magnification": -2.0}, r"magnification -2 is not above 0"),
+        ({"size": (641, 400)}, r"size \(641, 400\): give an even width and height"),
+        ({"size": (64, 40)}, r"at least \(480, 320\) pixels"),
+        ({"fps": 0.0}, r"fps 0 is not between"),
+        ({"seconds": -1.0}, r"seconds -1 is not between"),
+    ],
+)
+def test_impossible_options_are_refused(model, run, tmp_path, options, said):
+    with pytest.raises(af.InvalidInput, match=said):
+        film(model, run, tmp_path / "film.mp4", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_suffixes_are_refused(model, run, tmp_path):
+    with pytest.raises(af.InvalidInput, match=r"suffix '\.mov': use one of \('\.mp4', '\.gif'\)"):
+        film(model, run, tmp_path / "film.mov")
+
+
+def test_runs_without_fields_or_of_another_model_are_refused(model, coarse, run, tmp_path):
+    bare = af.History(run.dataset.drop_vars("q"))
+    with pytest.raises(af.InvalidInput, match=r"record them with .*fields_every=10"):
+        film(model, bare, tmp_path / "film.mp4")
+    with pytest.raises(af.InvalidInput, match=rf"51 coordinates, and the model has {coarse.size}"):
+        film(coarse, run, tmp_path / "film.mp4")
+    with pytest.raises(af.InvalidInput, match=r"3 coordinates, and the model has 51"):
+        picture(model, np.zeros(3))
+
+
+def test_pictures_on_paper_load_nothing_that_films_need():
+    script = """
+import sys
+import archfem as af
+for name in af.view.__all__:
+    if not name.startswith(("film", "picture")):
+        getattr(af.view, name)
+print(*({"pyvista", "imageio", "vtk"} & set(sys.modules)))
+"""
+    ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert ran.stdout.split() == []

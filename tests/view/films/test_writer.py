@@ -1,0 +1,35 @@
+"""Films are written in one stroke."""
+
+from time import sleep
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.films.writer import film_path, write_film
+
+
+def cut_short(count):
+    """Some pictures, then Ctrl-C."""
+    yield from np.zeros((count, 320, 480, 3), dtype=np.uint8)
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_a_killed_film_leaves_the_old_one(tmp_path, count, suffix):
+    """Also once the encoder has ended, which may begin its file late."""
+    path = tmp_path / f"film{suffix}"
+    path.write_bytes(b"old")
+    with pytest.raises(KeyboardInterrupt):
+        write_film(path, cut_short(count), fps=10.0)
+    sleep(0.2)
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_bytes() == b"old"
+
+
+def test_a_film_has_one_of_two_suffixes(tmp_path):
+    for name in ("film.mp4", "film.gif"):
+        assert film_path(tmp_path / name) == tmp_path / name
+    with pytest.raises(af.InvalidInput, match=r"suffix '\.avi': use one of \('\.mp4', '\.gif'\)"):
+        film_path(tmp_path / "film.avi")

@@ -1,0 +1,88 @@
+"""Eccentricity part by part: its range over runs, and its value at one instant."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from pictures import APART, WEIGHT, history
+
+import archfem as af
+from archfem.view.envelopes import draw_eccentricity, draw_envelope
+
+
+def test_envelope_shows_extremes_faces_and_dead_load(run):
+    axes = draw_envelope({"quake": run}, dead=run.joints.isel(time=0)).axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    highest = lines["quake"].get_ydata()
+    assert highest[[6, 0, 3]] == pytest.approx([0.48, 0.0, 0.0])
+    assert lines["dead load"].get_linestyle() == ":"
+    assert {-0.5, -0.46, 0.46, 0.5} <= {float(line.get_ydata()[0]) for line in axes.lines[:5]}
+    assert all("[" in label for label in (axes.get_xlabel(), axes.get_ylabel()))
+    crosses = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    assert crosses[0].get_xdata().tolist() == APART
+
+
+def test_envelopes_of_runs_have_their_own_colours(run):
+    figure = draw_envelope({"one": run, "other": run})
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["one", "other", "came apart"]
+    lines = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
+    assert lines["one"] != lines["other"]
+
+
+def test_each_ring_and_pier_has_a_panel_of_its_own(bridge):
+    figure = draw_envelope({"quake": history(bridge, 0.3)})
+    assert [axes.get_title() for axes in figure.axes] == [
+        "north arch", "main arch", "south arch", "north pier", "south pier",
+    ]  # fmt: skip
+    for axes in figure.axes:
+        count = sum(joint.part == axes.get_title() for joint in bridge.joints)
+        (highest,) = [line for line in axes.lines if line.get_label() == "quake"]
+        assert highest.get_xdata().tolist() == list(range(count))
+        assert highest.get_ydata() == pytest.approx(np.full(count, 0.3))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["quake"]
+
+
+def test_two_bridges_are_told_apart_by_dots(bridge, ring):
+    """Parts of one name share a panel, whatever the number of their joints."""
+    runs = {"before": history(bridge, 0.4), "after": history(bridge, 0.1)}
+    for axes in draw_envelope(runs, dotted=["before"]).axes:
+        lines = {line.get_label(): line.get_linestyle() for line in axes.lines}
+        assert (lines["before"], lines["after"]) == (":", "-")
+    states = {name: run.joints.isel(time=0) for name, run in runs.items()}
+    for axes in draw_eccentricity(states, dotted=["before"]).axes:
+        lines = {line.get_label(): line for line in axes.lines}
+        assert lines["before"].get_linestyle() == ":"
+        assert lines["before"].get_ydata() == pytest.approx(0.4)
+        assert lines["after"].get_ydata() == pytest.approx(0.1)
+
+
+def test_many_parts_go_on_several_rows(ring):
+    """Of ten rings of 18 joints four fit side by side; all panels share one scale."""
+    parts = [f"arch {number}" for number in range(1, 11)]
+    one = draw_envelope({"quake": history(ring, 0.2)}).axes[0]
+    assert one.get_title() == ""
+    dataset = af.joints.joint_dataset(ring, np.tile([WEIGHT, 0.0, 0.0], (18, 1)))
+    many = xr.concat(
+        [dataset.assign_coords(part=("joint", [part] * 18)) for part in parts], "joint"
+    )
+    axes = draw_eccentricity({"dead load": many}).axes
+    rows = [each.get_subplotspec().get_topmost_subplotspec().rowspan.start for each in axes]
+    assert rows == [0] * 4 + [1] * 4 + [2] * 2
+    assert {each.get_ylim() for each in axes} == {(-0.56, 0.56)}
+
+
+def test_several_parts_do_not_go_into_one_pair_of_axes(bridge):
+    with pytest.raises(af.InvalidInput, match=r"\['north arch', .* do not fit one pair of axes"):
+        draw_envelope({"quake": history(bridge, 0.3)}, axes=Figure().add_subplot())
+
+
+def test_eccentricity_over_time_is_refused(run):
+    with pytest.raises(af.InvalidInput, match=r"\['quake'\] have several instants: give one"):
+        draw_eccentricity({"quake": run.joints})
+
+
+@pytest.mark.parametrize("count", [0, 7])
+def test_too_few_or_many_runs_are_refused(run, count):
+    with pytest.raises(af.InvalidInput, match=rf"{count} runs in one picture: give 1 to 6"):
+        draw_envelope({str(k): run for k in range(count)})

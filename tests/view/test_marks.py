@@ -1,0 +1,73 @@
+"""Marks of joints: where they are, and that they go with the blocks."""
+
+import numpy as np
+import pytest
+from pictures import SLIDING, WEIGHT, resultants
+
+import archfem as af
+from archfem.view.marks import joint_ends, joint_marks, support_shift
+
+
+def test_arrows_say_which_way_a_joint_slips(ring, joints):
+    """V > 0: the higher block, on the side of the normal, moves toward the extrados."""
+    arrows = joint_marks(ring, joints).slips.reshape(-1, 2, 7, 2)
+    for number, pair in zip(SLIDING, arrows, strict=True):
+        joint, normal = ring.joints[number], ring.normals[number]
+        tip, tail = pair[0, 3], pair[0, [0, 6]].mean(axis=0)
+        assert (pair[0].mean(axis=0) - joint.middle) @ normal > 0.0
+        assert np.sign((tip - tail) @ joint.tangent) == np.sign(SLIDING[number])
+        assert pair.mean(axis=(0, 1)) == pytest.approx(joint.middle)
+
+
+def test_only_joints_of_rings_and_piers_are_marked(bridge):
+    """All joints hinge, or slide, or are open: those of soil and sidewalls show nothing."""
+    judged = np.array([joint.role != "other" for joint in bridge.joints])
+    assert 0 < judged.sum() < len(judged)
+    depth = np.array([joint.depth for joint in bridge.joints])
+    rows = np.zeros((len(depth), 3))
+    rows[:, 0], rows[:, 1], rows[:, 2] = WEIGHT, WEIGHT, 0.48 * WEIGHT * depth
+    marks = joint_marks(bridge, af.joints.joint_dataset(bridge, rows))
+    assert marks.hinges == pytest.approx(
+        np.array([joint.extrados for joint, own in zip(bridge.joints, judged, strict=True) if own])
+    )
+    assert len(marks.slips) == 2 * judged.sum()
+    assert np.isfinite(marks.thrust[:, 0]).tolist() == judged.tolist()
+    apart = af.joints.joint_dataset(bridge, 0.0 * rows)
+    assert len(joint_marks(bridge, apart).gaps) == judged.sum()
+
+
+def test_a_thrust_line_runs_through_each_ring_and_pier(bridge):
+    """One link a voussoir and a course between beds; none through soil or skewbacks."""
+    rows = np.tile([WEIGHT, 0.0, 0.0], (len(bridge.joints), 1))
+    links = joint_marks(bridge, af.joints.joint_dataset(bridge, rows)).links
+    assert len(links) == 14 + 17 + 15 + 2 * 4
+    assert np.linalg.norm(links[:, 1] - links[:, 0], axis=1).max() < 0.7  # a stone is that long
+
+
+def test_marks_follow_the_blocks(ring):
+    """A rigid body displacement of all blocks carries every mark along."""
+    still = af.joints.joint_dataset(ring, resultants(ring))
+    shift = np.tile([0.3, -0.2], (len(ring.joints), 2, 1))
+    rest, moved = joint_marks(ring, still), joint_marks(ring, still, shift=shift)
+    for name in ("thrust", "links", "hinges", "slips", "gaps"):
+        expected = getattr(rest, name) + np.array([0.3, -0.2])
+        assert getattr(moved, name) == pytest.approx(expected, nan_ok=True)
+
+
+def test_ends_of_joints_move_as_the_mean_of_their_blocks(ring):
+    """Translated free blocks: an inner joint goes all the way, a springing half of it."""
+    model = af.build(ring, fidelity="rigid")
+    q = np.tile([0.01, 0.02, 0.0], len(ring.free))
+    moved = (joint_ends(model) @ q).reshape(-1, 2, 2)
+    assert moved[1:-1] == pytest.approx(np.broadcast_to([0.01, 0.02], (16, 2, 2)))
+    assert moved[[0, -1]] == pytest.approx(np.broadcast_to([0.005, 0.01], (2, 2, 2)))
+
+
+def test_joints_go_with_supports_that_have_moved(ring):
+    """All of the ring 5 cm to the left, supports too: so are the joints' ends."""
+    moved = af.build(ring, fidelity="rigid")
+    for block in (0, 18):
+        moved = moved.settled(af.Settlement(block, (-0.05, 0.0, 0.0)))
+    dead = af.dead_load(moved)
+    ends = (joint_ends(moved) @ dead.q).reshape(-1, 2, 2) + support_shift(moved)
+    np.testing.assert_allclose(ends[..., 0], -0.05, atol=5e-4)  # the dead load moves by 0.3 mm

@@ -1,0 +1,32 @@
+"""A study in one picture: medians, ranges, and what was not reached."""
+
+import numpy as np
+import pytest
+
+from archfem.view.studies import draw_study
+
+FOUND = {
+    "weak": {"four joints": np.array([0.3, 0.5, 0.9]), "moves": np.array([0.8, 1.2, np.inf])},
+    "strong": {"four joints": np.array([0.6, 0.7, 2.0]), "moves": np.full(3, np.inf)},
+}
+
+
+def lines(axes, marker):
+    """Points drawn with a marker, by height."""
+    found = [line.get_xydata() for line in axes.lines if line.get_marker() == marker]
+    return np.concatenate(found)
+
+
+def test_medians_are_marks_and_what_was_not_reached_is_an_arrow():
+    axes = draw_study(FOUND, reduction=3.0).axes[0]
+    assert sorted(lines(axes, "o")[:, 0]) == pytest.approx([0.5, 0.7, 1.2])
+    ((place, row),) = lines(axes, ">")
+    assert place == pytest.approx(1.3 * 2.0)
+    assert round(row) == 1
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["weak", "strong"]
+
+
+def test_the_level_of_the_reduced_motions_is_named_where_it_is_another():
+    for reduction, named in ((1.0, {"whole": 1.0}), (4.0, {"whole": 1.0, "R = 4": 0.25})):
+        axes = draw_study(FOUND, reduction).axes[0]
+        assert {text.get_text(): text.xy[0] for text in axes.texts} == named
