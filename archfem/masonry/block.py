@@ -11,6 +11,7 @@ from archfem.masonry.geometry import area_of_polygon, area_of_sector, side_of_li
 from archfem.masonry.materials import Material
 
 Point = tuple[float, float]
+"""A place in the plane: x and y [m]."""
 
 
 @dataclass(frozen=True)

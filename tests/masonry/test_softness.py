@@ -1,5 +1,7 @@
 """How soft blocks are: closed forms of one block, and soil told from stone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,18 @@ def test_a_shear_wave_crosses_a_block_twice(stack):
 def test_soil_is_soft_and_yields_and_stone_is_neither(viaduct):
     soil = viaduct.block_number("backfill")
     assert soft_blocks(viaduct) == yielding_blocks(viaduct) == (soil,)
+
+
+def test_bodies_yield_by_their_roles_whatever_they_are_called(viaduct):
+    blocks, joints = (
+        tuple(replace(each, part=f"Teil {len(each.part)}") for each in members)
+        for members in (viaduct.blocks, viaduct.joints)
+    )
+    other = [each.part for each in blocks if each.role == "other"]
+    assert not {each.part for each in blocks if each.role != "other"} & set(other)
+    assert yielding_blocks(replace(viaduct, blocks=blocks, joints=joints)) == (
+        viaduct.block_number("backfill"),
+    )
 
 
 def test_a_ring_never_yields_however_soft():
