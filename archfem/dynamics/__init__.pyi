@@ -1,7 +1,7 @@
 from .damping import effective_damping as effective_damping
 from .events import CountedMechanism as CountedMechanism
-from .events import EveryMechanism as EveryMechanism
 from .events import Event as Event
+from .events import EveryMechanism as EveryMechanism
 from .events import MovingMechanism as MovingMechanism
 from .history import Ending as Ending
 from .history import History as History
