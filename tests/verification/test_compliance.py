@@ -10,6 +10,7 @@ from archfem.dynamics.ladder import build
 from archfem.dynamics.schemes import HHT, Rayleigh
 from archfem.dynamics.stepping.banded import Banded
 from archfem.dynamics.stepping.choice import SHORTEST, chosen, stepper_for
+from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.exact import Exact
 from archfem.dynamics.stepping.joint_law import Law
@@ -17,7 +18,7 @@ from archfem.dynamics.stepping.loop import advance
 from archfem.dynamics.stepping.modal import Modal
 from archfem.dynamics.stepping.newmark import follow, numbers_of
 from archfem.dynamics.stepping.open_points import release
-from archfem.dynamics.stepping.panels import Plan, backward, factorised, forward
+from archfem.dynamics.stepping.panels import backward, factorised, forward
 from archfem.dynamics.stepping.sparse import Sparse
 from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.time_history import time_history
@@ -155,7 +156,7 @@ def laplacian(side):
 @pytest.mark.parametrize("side", [2, 7, 30])
 def test_factor_solves(side):
     matrix = laplacian(side)
-    plan = Plan.of(matrix)
+    plan = Elimination.of(matrix)
     factor = factorised(matrix[plan.order][:, plan.order], plan)
     right = np.random.default_rng(1).standard_normal(matrix.shape[0])
     everywhere, room = np.ones(len(factor.parent), dtype=bool), np.empty(len(right))
@@ -179,14 +180,14 @@ def test_factor_solves(side):
 def test_factor_keeps_sparse():
     """A grid of 900 fills in to a tenth of the dense factor at most."""
     matrix = laplacian(30)
-    plan = Plan.of(matrix)
+    plan = Elimination.of(matrix)
     factor = factorised(matrix[plan.order][:, plan.order], plan)
     assert len(factor.panels) < 0.1 * matrix.shape[0] ** 2 / 2.0
 
 
 def test_matrix_that_is_not_definite_is_refused():
     matrix = laplacian(4)
-    plan = Plan.of(matrix)
+    plan = Elimination.of(matrix)
     matrix = matrix - 3.0 * sparse.identity(matrix.shape[0], format="csr")
     with pytest.raises(np.linalg.LinAlgError):
         factorised(matrix[plan.order][:, plan.order], plan)

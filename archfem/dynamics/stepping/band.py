@@ -6,7 +6,15 @@ import numpy as np
 
 @numba.njit(cache=True)
 def factorise(band, factor):  # type: ignore
-    """Factorise a band (n, width); false if it is not positive definite."""
+    """Factorise a band.
+
+    Args:
+        band: lower band of a symmetric matrix, rows from the diagonal leftwards (n, width).
+        factor: filled in the same form (n, width).
+
+    Returns:
+        Whether the matrix is positive definite; where it is not, the factor is half done.
+    """
     size, width = band.shape
     for i in range(size):
         for d in range(min(width - 1, i), -1, -1):
@@ -25,7 +33,12 @@ def factorise(band, factor):  # type: ignore
 
 @numba.njit(cache=True)
 def substitute(factor, vector):  # type: ignore
-    """Solve with the factor, in place."""
+    """Solve with the factor, in place.
+
+    Args:
+        factor: as made by `factorise` (n, width).
+        vector: right side, then solution (n,).
+    """
     size, width = factor.shape
     for i in range(size):
         total = vector[i]

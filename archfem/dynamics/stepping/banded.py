@@ -76,13 +76,21 @@ class Banded(Reordered):
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """The strategy where the blocks follow one another closely enough."""
+        """Return the strategy, or None where the bandwidth is too large.
+
+        Args:
+            equation: of motion.
+        """
         order, width = narrow(equation.model.mass)
         fits = equation.joints is not None and width <= WIDEST
         return cls(equation, order, width) if fits else None
 
     def system(self, dt: float) -> BandedSystem:
-        """All that steps of this length need."""
+        """Return all that steps of this length need.
+
+        Args:
+            dt: time step [s].
+        """
         equation, joints, order = self._equation, self._equation.joints, self.order
         assert joints is not None
         linear = reordered(equation, order, dt)
@@ -107,7 +115,11 @@ class Banded(Reordered):
 
 
 def narrow(matrix: sparse.csr_matrix) -> tuple[NDArray[Any], int]:
-    """An order that brings couplings near the diagonal (n,), and the bandwidth."""
+    """Return an order that brings couplings near the diagonal (n,), and the bandwidth.
+
+    Args:
+        matrix: symmetric (n, n).
+    """
     found = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     natural = np.arange(matrix.shape[0])
     best = min((found, natural), key=lambda each: _bandwidth(matrix, each))
@@ -121,7 +133,12 @@ def _bandwidth(matrix: sparse.csr_matrix, order: NDArray[Any]) -> int:
 
 
 def banded(matrix: sparse.csr_matrix, width: int) -> Array:
-    """Lower band of a symmetric matrix, rows from the diagonal leftwards (n, width + 1)."""
+    """Return the lower band of a matrix, rows from the diagonal leftwards (n, width + 1).
+
+    Args:
+        matrix: symmetric (n, n).
+        width: bandwidth; entries beyond it are left out.
+    """
     entries = matrix.tocoo()
     left = entries.row - entries.col
     lower = (left >= 0) & (left <= width)

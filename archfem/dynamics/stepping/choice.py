@@ -62,7 +62,7 @@ def stepper_for(
     dt: float,
     newton: Newton | None = None,
 ) -> Stepper:
-    """The stepper of a run.
+    """Return the stepper of a run.
 
     Args:
         method: "snes", "contact", "chain", "compliance", or "auto": of the last three the fastest,
@@ -101,7 +101,7 @@ def chosen(
     dt: float,
     strategies: Sequence[type[Strategy]] = STRATEGIES,
 ) -> Strategy | None:
-    """The strategy that takes a run fastest, or None where none applies.
+    """Return the strategy that takes a run fastest, or None where none applies.
 
     What was found by timing is remembered for a model, its damping, scheme and time step.
 
@@ -158,7 +158,7 @@ def _shaken(stepper: Stepper, start: State, dt: float, times: Array) -> State:
 
 
 def _clocked(stepper: Stepper, state: State, dt: float, times: Array) -> float:
-    """Processor time of a step of a batch [s]; infinite where one does not settle.
+    """Return the processor time of a step of a batch [s]; infinite where one does not settle.
 
     To begin takes as long as some steps, and is done once a batch.
     """

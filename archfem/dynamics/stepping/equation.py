@@ -90,12 +90,20 @@ class Equation:
         return Meter(self.model, self.weight, self.viscous, self.lag)
 
     def numbers(self, dt: float) -> Numbers:
-        """Numbers of a time step [s]."""
+        """Return the numbers of a time step.
+
+        Args:
+            dt: its length [s].
+        """
         scheme = (self.scheme.beta, self.scheme.gamma, self.scheme.alpha)
         return numbers_of(dt, scheme, self.lag, self.drag)
 
     def load(self, time: float) -> Array:
-        """Forces of gravity and of the ground (n,)."""
+        """Return the generalised forces of gravity and of the ground (n,).
+
+        Args:
+            time: since the motion began [s].
+        """
         return np.asarray(self.weight - self.model.body @ self.motion.at(time)[0])
 
     def ground(self, times: Array, dt: float) -> Array:
@@ -114,11 +122,20 @@ class Equation:
         return np.stack([written, 0.5 * (ends[:-1] + ends[1:])])
 
     def at_rest(self, q: Array, time: float = 0.0) -> State:
-        """The state of a structure at rest as the ground begins to move."""
+        """Return the state of a structure at rest, with the acceleration that its forces give.
+
+        Args:
+            q: coordinates (n,).
+            time: since the motion began [s].
+        """
         return self.released(State(time, q, np.zeros_like(q), np.zeros_like(q)))
 
     def released(self, state: State) -> State:
-        """The same state with the acceleration that its forces give."""
+        """Return the same state with the acceleration that its forces give.
+
+        Args:
+            state: whose acceleration does not matter.
+        """
         forces = (
             self.load(state.time)
             - self.viscous @ state.velocity
@@ -127,10 +144,18 @@ class Equation:
         return replace(state, acceleration=splu(self.model.mass.tocsc()).solve(forces))
 
     def contact(self, state: State) -> Array:
-        """What the joint law sees, u + β v (n,)."""
+        """Return what the joint law sees, u + β v (n,).
+
+        Args:
+            state: of the structure.
+        """
         return state.q + self.lag * state.velocity
 
     def energy(self, state: State) -> Array:
-        """Kinetic and potential energy of a state, and two zeros (4,) [J]."""
+        """Return kinetic and potential energy of a state, and two zeros (4,) [J].
+
+        Args:
+            state: of the structure.
+        """
         now = (state.q, state.velocity)
         return self.meter.step(now, now, np.zeros(2))

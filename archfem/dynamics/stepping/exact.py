@@ -61,7 +61,16 @@ class Exact:
             yield step
 
     def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
-        """Yield the same steps with their resultants, in batches of one."""
+        """Yield the same steps with their resultants, in batches of one.
+
+        Args:
+            start: state from which to go.
+            dt: time between the yielded states [s].
+            end: time of the last one [s].
+
+        Raises:
+            DidNotConverge: a step failed even when halved; `last` is the state before it.
+        """
         for step in self.steps(start, dt, end):
             yield Batch(
                 np.array([step.state.time]),
@@ -73,7 +82,14 @@ class Exact:
             )
 
     def attempt(self, state: State, dt: float) -> tuple[State, int]:
-        """Try a step in one; the state after it, and how many iterations that took.
+        """Try a step in one.
+
+        Args:
+            state: from which it goes.
+            dt: its length [s].
+
+        Returns:
+            The state after it, and how many iterations that took.
 
         Raises:
             DidNotConverge: there was no equilibrium to be found.

@@ -34,7 +34,11 @@ class Law(NamedTuple):
 
 
 def law_of(joints: JointOperator) -> Law:
-    """The law of some joints, compiled."""
+    """Return the law of some joints as the compiled loops take it.
+
+    Args:
+        joints: whose law is elastic without tension.
+    """
     points = joints.points
     stiffness = points.weight * points.normal_stiffness
     facets = isinstance(joints.law, Facets)
@@ -45,7 +49,12 @@ def law_of(joints: JointOperator) -> Law:
 
 @numba.njit(cache=True)
 def open_part(a, b):  # type: ignore
-    """Where a facet of unit length with end gaps a and b is open."""
+    """Return where a facet of unit length is open, from one place to another [-].
+
+    Args:
+        a: gap at its first end [m].
+        b: gap at its second end [m]; one of both is positive.
+    """
     if a > 0.0:
         return 0.0, (1.0 if b > 0.0 else a / (a - b))
     return (a / (a - b) if b > 0.0 else 1.0), 1.0
@@ -53,7 +62,12 @@ def open_part(a, b):  # type: ignore
 
 @numba.njit(cache=True)
 def integrals(low, high):  # type: ignore
-    """∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2)."""
+    """Return ∫ φ_i φ_j of the two linear functions, for (1, 1), (1, 2) and (2, 2) [-].
+
+    Args:
+        low: where the integral begins, on a facet of unit length [-].
+        high: where it ends [-].
+    """
     length, near, far = high - low, 1.0 - low, 1.0 - high  # no small difference of large numbers
     first = length * (near**2 + near * far + far**2) / 3.0
     second = length * (high**2 + high * low + low**2) / 3.0
@@ -62,7 +76,14 @@ def integrals(low, high):  # type: ignore
 
 @numba.njit(cache=True)
 def pull(gap, other, stiffness, facets):  # type: ignore
-    """λ at a point: the tension that the closed stiffness would hold where the joint is open."""
+    """Return λ at a point: what its closed stiffness would hold where the joint is open [N].
+
+    Args:
+        gap: at the point [m].
+        other: at the other end of its facet [m]; not read where facets are not exact.
+        stiffness: of the point, that of the whole facet where facets are exact [N/m].
+        facets: whether facets are exact.
+    """
     if not facets:
         return stiffness * max(gap, 0.0)
     if gap <= 0.0 and other <= 0.0:
@@ -74,7 +95,13 @@ def pull(gap, other, stiffness, facets):  # type: ignore
 
 @numba.njit(cache=True)
 def pulls(gap, law, force):  # type: ignore
-    """λ at all points."""
+    """Find λ at all points.
+
+    Args:
+        gap: at the points (p,) [m].
+        law: `Law`.
+        force: λ, filled (p,) [N].
+    """
     facets, stiffness, _, _ = law
     for row in range(len(gap)):
         force[row] = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
@@ -82,7 +109,14 @@ def pulls(gap, law, force):  # type: ignore
 
 @numba.njit(cache=True)
 def closed_stiffness(gap, law, stiffness):  # type: ignore
-    """Stiffness of the closed part of the joint at each row: its own, and with its partner."""
+    """Find the stiffness of the closed part of the joint at each point.
+
+    Args:
+        gap: at the points (p,) [m].
+        law: `Law`.
+        stiffness: of each point with itself and, where facets are exact, with the other end of its
+            facet; filled (p, 2) [N/m].
+    """
     whole = law.stiffness
     if not law.facets:
         for row in range(len(gap)):
@@ -101,7 +135,14 @@ def closed_stiffness(gap, law, stiffness):  # type: ignore
 
 @numba.njit(cache=True)
 def joint_resultants(result, gap, shear, law):  # type: ignore
-    """N, V, M of every joint from the gaps at its points."""
+    """Find N, V, M of every joint from the gaps at its points.
+
+    Args:
+        result: filled (n_joints, 3) [N, N, N m].
+        gap: that the law sees (p,) [m].
+        shear: V of every joint (n_joints,) [N].
+        law: `Law`.
+    """
     facets, stiffness, arm, joint = law
     result[:] = 0.0
     result[:, 1] = shear

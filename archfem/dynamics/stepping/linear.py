@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from numba.core import types
 from numba.extending import overload
+from numpy.typing import NDArray
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.equation import Equation
@@ -76,8 +77,14 @@ class Kept(NamedTuple):
     right: Array
 
 
-def reordered(equation: Equation, order: Array, dt: float) -> Linear:
-    """The matrices of an equation of motion by rows, its coordinates in another order."""
+def reordered(equation: Equation, order: NDArray[Any], dt: float) -> Linear:
+    """Return the matrices of an equation of motion by rows, its coordinates in another order.
+
+    Args:
+        equation: of motion, with joints on supports that have not moved.
+        order: numbers of the coordinates, the first one first (n,).
+        dt: time step [s].
+    """
     model, joints = equation.model, equation.joints
     assert joints is not None
     square = [model.mass, model.closed(), equation.rest]
@@ -92,8 +99,14 @@ def reordered(equation: Equation, order: Array, dt: float) -> Linear:
 def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:
     """Solve a step: from its right side to the contact, in place; leaves the gaps there and λ.
 
-    To be overloaded for the type of a system. Gaps, those a step earlier and λ come as they were
-    at the start of the step.
+    To be overloaded for the type of a system.
+
+    Args:
+        system: of a strategy, with a field `linear`.
+        vector: right side, then w (n,).
+        gap: openings that the law sees, at the start of the step, then at w (p,) [m].
+        before: those a step earlier (p,) [m], for the strategy to keep.
+        force: λ at the start of the step, then at w (p,) [N].
 
     Returns:
         Passes over the joints; -1 if they do not settle.
@@ -102,7 +115,11 @@ def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:
 
 
 def is_linear(system: types.Type) -> bool:
-    """Whether this is the type of a system of a linear strategy."""
+    """Return whether this is the type of a system of a linear strategy.
+
+    Args:
+        system: as numba types it.
+    """
     return isinstance(system, types.NamedTuple) and "linear" in system.fields
 
 

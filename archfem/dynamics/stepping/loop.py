@@ -16,12 +16,24 @@ ITERATIONS = 40
 
 
 def begin(system: Any, state: Any) -> Any:
-    """What is carried from step to step, of the state from which the first one goes."""
+    """Return what is carried from step to step; to be overloaded.
+
+    Args:
+        system: of a strategy.
+        state: from which the first step goes, in the strategy's terms (3, n).
+    """
     raise NotImplementedError
 
 
 def settle(system: Any, kept: Any, step: Any, states: Any, ground: Any) -> Any:
-    """Find the state at the end of a step, and fill `states[1]`.
+    """Find the state at the end of a step; to be overloaded.
+
+    Args:
+        system: of a strategy.
+        kept: what is carried from step to step, as `begin` gave it.
+        step: number of the step in its batch.
+        states: at its start, and at its end, filled (2, 3, n).
+        ground: acceleration of the ground where the equation is written (2,) [m/s²].
 
     Returns:
         Passes over the joints; -1 if they do not settle.
@@ -32,7 +44,17 @@ def settle(system: Any, kept: Any, step: Any, states: Any, ground: Any) -> Any:
 def measure(
     system: Any, kept: Any, step: Any, states: Any, ground: Any, resultants: Any, energy: Any
 ) -> Any:
-    """Fill the resultants and energies of a step that has settled."""
+    """Find the resultants and energies of a step that has settled; to be overloaded.
+
+    Args:
+        system: of a strategy.
+        kept: what is carried from step to step.
+        step: number of the step in its batch.
+        states: at its start and at its end (2, 3, n).
+        ground: mean acceleration of the ground over the step (2,) [m/s²].
+        resultants: N, V, M, filled (n_joints, 3) [N, N, N m].
+        energy: as by `energy.Meter.step`, filled (4,) [J].
+    """
     raise NotImplementedError
 
 
@@ -57,7 +79,7 @@ forget_stale(Path(__file__).parent)
 
 @numba.njit(cache=True)
 def advance(series, results, ground, system):  # type: ignore
-    """Take steps until the end, or until one does not settle; return how many were taken.
+    """Take steps until the end, or until one does not settle.
 
     Args:
         series: coordinates, their velocity and acceleration at the start in [0]; filled
@@ -67,6 +89,9 @@ def advance(series, results, ground, system):  # type: ignore
         ground: acceleration where the equation is written, and its mean over the step
             (2, steps, 2).
         system: of a strategy.
+
+    Returns:
+        How many steps were taken.
     """
     resultants, passes, energies = results
     kept = begin(system, series[0])

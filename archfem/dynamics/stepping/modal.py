@@ -63,7 +63,11 @@ class Modal:
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """The strategy where the closed structure falls into modes, few enough to keep all."""
+        """Return the strategy, or None where modes are coupled by damping or are too many.
+
+        Args:
+            equation: of motion.
+        """
         proportional = equation.damping is None or equation.damping.joints != "none"
         few = equation.model.size <= LARGEST
         return cls(equation) if equation.joints is not None and proportional and few else None
@@ -86,15 +90,27 @@ class Modal:
         return np.asarray(self._equation.model.mass @ self._modes[1])
 
     def enter(self, vectors: Array) -> Array:
-        """From displacements, velocities, … to modes (3, n)."""
+        """Return a state in modal coordinates (3, n).
+
+        Args:
+            vectors: q, velocity and acceleration (3, n).
+        """
         return np.asarray(vectors @ self._back)
 
     def leave(self, vectors: Array) -> Array:
-        """Back from modes (3, n)."""
+        """Return q, velocity and acceleration (3, n).
+
+        Args:
+            vectors: a state in modal coordinates (3, n).
+        """
         return np.stack([self._modes[1] @ each for each in vectors])
 
     def system(self, dt: float) -> ModalSystem:
-        """All that steps of this length need."""
+        """Return all that steps of this length need.
+
+        Args:
+            dt: time step [s].
+        """
         equation, joints, (squares, shapes) = self._equation, self._equation.joints, self._modes
         assert joints is not None
         numbers, damping = equation.numbers(dt), equation.damping

@@ -46,7 +46,14 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(dt: float, scheme: tuple[float, float, float], lag: float, drag: float) -> Numbers:
-    """Work out the numbers of a time step from the scheme's (β, γ, α)."""
+    """Return the numbers of a time step.
+
+    Args:
+        dt: its length [s].
+        scheme: β, γ and α of Newmark's method or HHT [-].
+        lag: β of damping that follows the joints [s].
+        drag: coefficient of damping by mass [1/s].
+    """
     beta, gamma, alpha = scheme
     share, to_velocity, to_acceleration = 1.0 + alpha, gamma / (beta * dt), 1.0 / (beta * dt**2)
     velocity = np.array([0.0, 1.0 - gamma / beta, dt * (1.0 - 0.5 * gamma / beta)])
@@ -99,7 +106,13 @@ def follow(image, before, after, numbers):  # type: ignore
 
 @numba.njit(cache=True, fastmath={"contract"})
 def add_mixed(result, images, factors):  # type: ignore
-    """Add the images of u, v and a, each times its factor."""
+    """Add the images of u, v and a, each times its factor.
+
+    Args:
+        result: to which they are added (n,).
+        images: of u, v and a (3, n).
+        factors: of them (3,).
+    """
     u, v, a = images[0], images[1], images[2]
     p, q, r = factors[0], factors[1], factors[2]
     for k in range(len(result)):
@@ -108,6 +121,12 @@ def add_mixed(result, images, factors):  # type: ignore
 
 @numba.njit(cache=True)
 def mix(result, images, factors):  # type: ignore
-    """Images of u, v and a, each times its factor."""
+    """Sum up the images of u, v and a, each times its factor.
+
+    Args:
+        result: filled (n,).
+        images: of u, v and a (3, n).
+        factors: of them (3,).
+    """
     result[:] = 0.0
     add_mixed(result, images, factors)

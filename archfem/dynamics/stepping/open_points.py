@@ -43,7 +43,7 @@ as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
 
 @numba.njit(cache=True)
 def release(start, rows, compliance, law, force, enough):  # type: ignore
-    """Find λ where it may differ from zero; return the number of passes, -1 if it does not settle.
+    """Find λ where it may differ from zero.
 
     Args:
         start: z₀ (p,), of which the rows are used.
@@ -52,6 +52,9 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
         law: `Law`.
         force: λ, as a first guess (p,); changed at the rows.
         enough: error of λ that is left [N].
+
+    Returns:
+        Passes; -1 if it does not settle.
     """
     law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
     matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
@@ -76,7 +79,14 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
 
 @numba.njit(cache=True)
 def exact(gap, force, near, law):  # type: ignore
-    """Whether the gaps ask for the λ they were found with; points that open count as near."""
+    """Return whether the gaps ask for the λ they were found with.
+
+    Args:
+        gap: of the whole structure (p,) [m].
+        force: λ (p,) [N].
+        near: points taken for open; those found to open, of a facet both ends, are added (p,).
+        law: `Law`.
+    """
     facets, stiffness, _, _ = law
     largest, off = 0.0, 0.0
     for row in range(len(gap)):
@@ -92,7 +102,14 @@ def exact(gap, force, near, law):  # type: ignore
 
 @numba.njit(cache=True)
 def expected(gap, before, force, facets):  # type: ignore
-    """Points that are open, or will be soon if they go on as they did (p,)."""
+    """Return which points are open, or will be soon if they go on as they did (p,).
+
+    Args:
+        gap: that the law saw at the end of the last step (p,) [m].
+        before: the same a step earlier (p,) [m].
+        force: λ at the end of the last step (p,) [N].
+        facets: whether facets are exact, whose ends then go together.
+    """
     near = np.empty(len(gap), dtype=np.bool_)
     for row in range(len(gap)):
         near[row] = force[row] != 0.0 or gap[row] + AHEAD * (gap[row] - before[row]) > 0.0
@@ -104,7 +121,12 @@ def expected(gap, before, force, facets):  # type: ignore
 
 @numba.njit(cache=True)
 def chosen(vector, rows):  # type: ignore
-    """Entries of a vector."""
+    """Return entries of a vector (rows,).
+
+    Args:
+        vector: of which to take them (n,).
+        rows: their numbers (rows,).
+    """
     result = np.empty(len(rows))
     for i in range(len(rows)):
         result[i] = vector[rows[i]]
@@ -164,7 +186,7 @@ def _times_transposed(roots, vector):  # type: ignore
 
 @numba.njit(cache=True)
 def _solve(free, matrix, roots, force, until):  # type: ignore
-    """Solve for μ with R given by conjugate gradients, from the last λ; the gaps, and λ in place.
+    """Return the gaps, and λ in place: by conjugate gradients for μ, R given, from the last λ.
 
     Ends when the residual is a fraction of the first, or an error of λ small enough.
     """

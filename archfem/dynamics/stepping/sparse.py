@@ -17,11 +17,12 @@ import numpy as np
 from numba.extending import overload
 
 from archfem.arrays import Array
+from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.open_points import SETTLED, exact, expected, release
-from archfem.dynamics.stepping.panels import Factor, Plan, backward, factorised, forward
+from archfem.dynamics.stepping.panels import Factor, backward, factorised, forward
 from archfem.dynamics.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 
@@ -59,13 +60,17 @@ class Sparse(Reordered):
     def __init__(self, equation: Equation) -> None:
         model = equation.model
         parts = (trimmed(each) for each in (model.mass, equation.rest, model.closed()))
-        self._plan = Plan.of(sum(abs(part) for part in parts))
-        super().__init__(self._plan.order)
+        self._elimination = Elimination.of(sum(abs(part) for part in parts))
+        super().__init__(self._elimination.order)
         self._equation = equation
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """The strategy where supports have not moved."""
+        """Return the strategy, or None where supports have moved or more than joints is not linear.
+
+        Args:
+            equation: of motion.
+        """
         return cls(equation) if equation.joints is not None else None
 
     @property
@@ -74,7 +79,11 @@ class Sparse(Reordered):
         return ENTRY * float(self._equation.model.mass.nnz)
 
     def system(self, dt: float) -> SparseSystem:
-        """All that steps of this length need."""
+        """Return all that steps of this length need.
+
+        Args:
+            dt: time step [s].
+        """
         equation, order = self._equation, self.order
         linear = reordered(equation, order, dt)
         numbers = linear.numbers
@@ -86,8 +95,8 @@ class Sparse(Reordered):
         points = len(linear.law.stiffness)
         return SparseSystem(
             linear,
-            factorised(effective[order][:, order], self._plan),
-            self._plan.group_of,
+            factorised(effective[order][:, order], self._elimination),
+            self._elimination.group_of,
             np.empty((points, points)),
             np.zeros(points, dtype=np.bool_),
         )

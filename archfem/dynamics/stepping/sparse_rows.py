@@ -21,12 +21,20 @@ NOTHING = 1e-16
 
 
 def rows_of(matrix: sparse.csr_matrix) -> Rows:
-    """The rows of a sparse matrix as compiled loops take them."""
+    """Return the rows of a sparse matrix as compiled loops take them.
+
+    Args:
+        matrix: by rows (m, n).
+    """
     return matrix.indptr, matrix.indices, matrix.data
 
 
 def trimmed(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-    """A matrix without entries that are nothing but rounding."""
+    """Return a matrix without entries that are nothing but rounding.
+
+    Args:
+        matrix: by rows; left as it is.
+    """
     kept = matrix.tocsr(copy=True)
     kept.data[np.abs(kept.data) <= NOTHING * np.abs(kept.data).max(initial=0.0)] = 0.0
     kept.eliminate_zeros()
@@ -34,23 +42,46 @@ def trimmed(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
 
 
 def times(matrix: Any, vector: Any, result: Any) -> Any:
-    """Product of a matrix and a vector."""
+    """Multiply a matrix by a vector.
+
+    Args:
+        matrix: `Rows` or dense (m, n), or a diagonal (n,).
+        vector: by which to multiply (n,).
+        result: filled (m,).
+    """
     raise NotImplementedError
 
 
 def add_rows(matrix: Any, rows: Any, force: Any, result: Any) -> Any:
-    """Add rows of a matrix, each times its force."""
+    """Add rows of a matrix, each times its force.
+
+    Args:
+        matrix: `Rows` or dense (p, n).
+        rows: numbers of those to add.
+        force: factors of all rows (p,).
+        result: to which they are added (n,).
+    """
     raise NotImplementedError
 
 
 def stored(matrix: Any) -> Any:
-    """How many entries are stored; none of a matrix that is nothing."""
+    """Return how many entries are stored; none of a matrix that is nothing.
+
+    Args:
+        matrix: `Rows`, dense, or a diagonal.
+    """
     raise NotImplementedError
 
 
 @numba.njit(cache=True)
 def row_times(matrix, row, vector):  # type: ignore
-    """One entry of sparse rows times a vector."""
+    """Return one row of a matrix times a vector.
+
+    Args:
+        matrix: `Rows` (m, n).
+        row: its number.
+        vector: by which to multiply (n,).
+    """
     indptr, indices, data = matrix
     total = 0.0
     for entry in range(indptr[row], indptr[row + 1]):

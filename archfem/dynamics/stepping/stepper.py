@@ -77,7 +77,7 @@ class Stepper:
                 state = fallback.state(0)
 
     def taken(self, state: State, dt: float, times: Array) -> Batch:
-        """Take steps by the strategy up to these times, or up to one that does not settle.
+        """Return the steps by the strategy up to these times, or up to one that does not settle.
 
         Args:
             state: from which to go.
@@ -99,7 +99,13 @@ class Stepper:
         )
 
     def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
-        """What the loop takes to go from a state to these times: see `loop.advance`."""
+        """Return what `loop.advance` takes to go from a state to these times.
+
+        Args:
+            state: from which to go.
+            dt: time step [s].
+            times: ends of the steps (steps,) [s].
+        """
         assert self.strategy is not None
         steps, joints = len(times), len(self.equation.model.structure.joints)
         first = self.strategy.enter(np.stack([state.q, state.velocity, state.acceleration]))

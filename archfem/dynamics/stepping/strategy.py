@@ -33,16 +33,32 @@ class Strategy(Protocol):
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """The strategy for an equation of motion, or None where it does not apply."""
+        """Return the strategy for an equation of motion, or None where it does not apply.
+
+        Args:
+            equation: of motion.
+        """
 
     def enter(self, vectors: Array) -> Array:
-        """From q, velocity and acceleration (3, n) to the rows of a state in its own terms."""
+        """Return a state in the strategy's own terms (3, …).
+
+        Args:
+            vectors: q, velocity and acceleration (3, n).
+        """
 
     def leave(self, vectors: Array) -> Array:
-        """Back from those to q, velocity and acceleration (3, n)."""
+        """Return q, velocity and acceleration (3, n).
+
+        Args:
+            vectors: a state in the strategy's own terms (3, …).
+        """
 
     def system(self, dt: float) -> NamedTuple:
-        """All that steps of this length need, for the compiled loop."""
+        """Return all that steps of this length need, for the compiled loop.
+
+        Args:
+            dt: time step [s].
+        """
 
 
 class Reordered:
@@ -57,9 +73,17 @@ class Reordered:
         self._place = np.argsort(order)
 
     def enter(self, vectors: Array) -> Array:
-        """From coordinates to those in order (3, n)."""
+        """Return a state in order (3, n).
+
+        Args:
+            vectors: q, velocity and acceleration (3, n).
+        """
         return vectors[:, self.order]
 
     def leave(self, vectors: Array) -> Array:
-        """Back from those (3, n)."""
+        """Return q, velocity and acceleration (3, n).
+
+        Args:
+            vectors: a state in order (3, n).
+        """
         return vectors[:, self._place]
