@@ -10,6 +10,9 @@ APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# A worker a core, and whoever is done takes over from others.
+SPREAD := -n auto --dist worksteal
+
 .PHONY: help setup demo test test-slow hard bench lint clean
 
 help:  ## list the targets
@@ -32,11 +35,11 @@ setup: .venv/ready  ## install what is needed (system packages, .venv)
 demo: .venv/ready  ## run the shipped ring on a synthetic earthquake: results in out/ring
 	$(PYTHON) -m archfem run meshes/ring.toml --out out/ring
 
-test: .venv/ready  ## the default tests
-	$(PYTHON) -m pytest
+test: .venv/ready  ## the default tests, on all cores
+	$(PYTHON) -m pytest $(SPREAD)
 
 test-slow: .venv/ready  ## the tests that take minutes
-	$(PYTHON) -m pytest -m slow
+	$(PYTHON) -m pytest $(SPREAD) -m slow
 
 hard: .venv/ready  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard

@@ -34,8 +34,8 @@ meshes = Path(af.__file__).parents[1] / "meshes"
 changes = ["model={ fidelity = { backfill = 'full', rest = 'faces' }, quadrature = 'exact' }"]
 if quick:
     changes += ["model.cells=[2, 2]", "suite.matched=false"]
-    changes += [f"suite.pairs.pair-{n}.synthetic.duration=4" for n in range(1, 7)]
-    changes += [f"suite.pairs.pair-{n}.vertical.synthetic.duration=4" for n in range(1, 7)]
+    changes += [f"suite.pairs.pair-{n}.synthetic.duration=2" for n in range(1, 7)]
+    changes += [f"suite.pairs.pair-{n}.vertical.synthetic.duration=2" for n in range(1, 7)]
 cases = {
     "as it stands": af.Case.read(meshes / "prusias.toml", changes),
     "restored": af.Case.read(meshes / "prusias_restored.toml", changes),

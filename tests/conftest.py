@@ -7,24 +7,38 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 
-from archfem.masonry.shapes import circular_arch, column
+import archfem as af
+
+NOTHING_COMPILED = {
+    *("motion", "masonry", "joints", "limit", "models", "statics"),
+    *("test_architecture.py", "test_wrong_arguments.py"),
+}
+"""Tests that step through no time, and so need no compiled function."""
+
+
+def pytest_collection_modifyitems(config, items):
+    """Let one worker of many compile what all need, while others do what needs nothing of it.
+
+    Each begins with a part of the list and later takes over from the end of another's part.
+    """
+    if hasattr(config, "workerinput"):
+        tests = config.rootpath / "tests"
+        items.sort(key=lambda item: item.path.relative_to(tests).parts[0] in NOTHING_COMPILED)
 
 
 @pytest.fixture(scope="session")
 def ring():
     """The validation ring of Demirel and Aldemir (2021), Figure 3."""
-    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+    return af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 
 
 @pytest.fixture(scope="session")
 def ring_model(ring):
     """The ring with all nodes of 4 × 4 cells a voussoir."""
-    from archfem.dynamics.ladder import build
-
-    return build(ring, fidelity="full", cells=(4, 4))
+    return af.build(ring, fidelity="full", cells=(4, 4))
 
 
 @pytest.fixture(scope="session")
 def stack():
     """Two square blocks on a base."""
-    return column(breadth=1.0, heights=[1.0, 1.0])
+    return af.column(breadth=1.0, heights=[1.0, 1.0])
