@@ -25,8 +25,6 @@ import os
 from pathlib import Path
 
 import archfem as af
-from archfem.cases.run import at_rest, damping_of
-from archfem.statics.strength import use_table
 
 quick = "ARCHFEM_QUICK" in os.environ  # coarse, and one short motion: for tests
 meshes = Path(af.__file__).parents[1] / "meshes"
@@ -60,7 +58,7 @@ af.view.draw_instants({name: (case.structure, None) for name, case in cases.item
 # nodes. Weight and support must balance, whatever the mesh.
 
 # %%
-dead = {name: at_rest(case) for name, case in cases.items()}
+dead = {name: af.cases.at_rest(case) for name, case in cases.items()}
 model = dead["as it stands"].model
 print(f"{model.size} coordinates: {model.fidelity}")
 joints = dead["as it stands"].joints
@@ -73,7 +71,7 @@ af.view.draw_eccentricity(
 
 # %%
 use = af.statics.strength_use(model, dead["as it stands"].q)
-print(use_table(use))
+print(af.statics.use_table(use))
 af.view.draw_stress(model, dead["as it stands"].q)
 
 # %% [markdown]
@@ -101,7 +99,7 @@ for name, shapes in found.items():
     print(f"{name}\n{shapes.table()}\n")
 damping = {}
 for name, each in dead.items():
-    damping[name], words = damping_of(cases[name], each)
+    damping[name], words = af.cases.damping_of(cases[name], each)
     print(f"{name}: {words}")
 af.view.draw_modes(found["as it stands"])
 

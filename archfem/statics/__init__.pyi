@@ -11,5 +11,6 @@ from .pushover import Stop as Stop
 from .strength import joint_stress as joint_stress
 from .strength import strength_use as strength_use
 from .strength import strength_use_over as strength_use_over
+from .strength import use_table as use_table
 from .strength import utilisation as utilisation
 from .stress import principal as principal

@@ -66,11 +66,11 @@ def draw_envelope(
         InvalidInput: there is no run, or too many to tell apart; axes were given for several
             parts.
     """
-    shown = _panels({label: run.joints for label, run in runs.items()}, axes)
-    apart = 0
-    for row, ((label, run), colour) in enumerate(zip(runs.items(), LINES, strict=False)):
+    drawn = {label: run.joints for label, run in runs.items()}
+    shown, apart = _panels(drawn, axes), 0
+    for row, ((label, joints), colour) in enumerate(zip(drawn.items(), LINES, strict=False)):
         for part, panel in shown.items():
-            own = _of_part(run.joints, part)
+            own = _of_part(joints, part)
             draw_band(panel, own, label, colour, shade=SHADE * (label not in dotted) / len(runs))
             crosses = np.flatnonzero(own["open"].any("time").values)
             height = np.full(len(crosses), 0.56 + STEP * row)

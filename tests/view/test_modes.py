@@ -1,10 +1,10 @@
-"""Pictures and films of modes."""
+"""Pictures of vibration shapes."""
 
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.modes import FRAMES, REACH, animate_modes, draw_modes
+from archfem.view.modes import REACH, draw_modes
 
 
 def drawn(axes):
@@ -27,17 +27,3 @@ def test_picture_of_shapes(ring_model):
     for numbers in ([], [0], [4]):
         with pytest.raises(af.InvalidInput, match="cannot be drawn: there are 1 to 3"):
             draw_modes(found, numbers)
-
-
-def test_film_of_shapes(tmp_path):
-    import imageio.v2 as imageio
-
-    model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
-    path = animate_modes(af.modes(model, 2), tmp_path / "film.gif", [1])
-    frames = imageio.mimread(path)
-    assert len(frames) == FRAMES
-    moved = [np.mean(frames[0] != frame) for frame in frames]
-    assert moved[FRAMES // 4] > 0.005  # at the end of its swing
-    assert moved[FRAMES // 2] < 0.2 * moved[FRAMES // 4]  # back at rest
-    with pytest.raises(af.InvalidInput, match=r"film\.avi has suffix"):
-        animate_modes(af.modes(model, 2), tmp_path / "film.avi")

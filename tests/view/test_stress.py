@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pictures import drawn
 
 import archfem as af
 from archfem.view.stress import draw_stress
@@ -14,22 +15,16 @@ def dead(ring_model):
     return af.dead_load(ring_model)
 
 
-def named(figure, name):
-    """The one thing of a figure that is called so."""
-    found = figure.findobj(lambda artist: artist.get_gid() == name)
-    return found[0] if found else None
-
-
 def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_model, dead):
     figure = draw_stress(ring_model, dead.q)
-    shown = named(figure, "compression").get_array() * af.units.MPa
+    shown = drawn(figure, "compression").get_array() * af.units.MPa
     assert shown.max() == pytest.approx(
         float(af.statics.strength_use(ring_model, dead.q)["compression"].max())
     )
     assert shown.min() >= 0.0
     bar = figure.axes[0].child_axes[0]
     assert bar.get_ylabel() == "largest compression [MPa]"
-    assert named(figure, "thrust").get_xydata().shape == (18, 2)
+    assert drawn(figure, "thrust").get_xydata().shape == (18, 2)
     crosses = figure.axes[0].findobj(lambda artist: artist.get_label() == "compression")[0]
     directions = np.diff(np.array(crosses.get_segments()), axis=1)[:, 0]
     middles = np.array(crosses.get_segments()).mean(axis=1)

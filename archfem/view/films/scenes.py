@@ -117,11 +117,11 @@ def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
 
 
 def _shots(setup: Setup, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
-    """Every frame of a film, one after another; on a terminal a bar shows progress."""
+    """Yield the frames of a film, one after another; on a terminal a bar shows progress."""
     structure, carried = setup.model.structure, _carrier(setup)
     times = run.dataset["frame_time"].values[frames]
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
-    been = _been(run.joints, structure.judged)
+    been = _been(run.joints)
     page = Page(setup, size, run)
     shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
     bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
@@ -146,8 +146,8 @@ def _carrier(setup: Setup) -> Callable[[Array], Array]:
     return carried
 
 
-def _been(joints: xr.Dataset, judged: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether each end of each judged joint has been a hinge by each step (steps, n_joints, 2)."""
+def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
+    """Return whether ends of judged joints have been hinges by each step (steps, n_joints, 2)."""
     side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
