@@ -22,10 +22,12 @@ def check(given: argparse.Namespace) -> None:
     Args:
         given: `case`, a file, and `changes` to it.
     """
+    from archfem.cases.summary import collapse_words
+
     case = Case.read(given.case, given.changes)
     print(case.title)
     if case.limit is not None:
-        _tell_limit(case, case.limit.of(case.structure))
+        print(collapse_words(case.structure, case.limit.of(case.structure)))
     rest = Rest.of(case)
     _tell_rest(rest)
     if case.suite is not None:
@@ -71,8 +73,9 @@ def accuracy(given: argparse.Namespace) -> None:
         damping=expected_damping(case),
         tolerance=case.tolerance,
     )
-    print(accuracy_words(found))
-    _tell_written(write_accuracy(found, Path(given.out)))
+    text = accuracy_words(found)
+    print(text)
+    _tell_written(write_accuracy(found, text, Path(given.out)))
 
 
 def study(given: argparse.Namespace) -> None:
@@ -91,8 +94,9 @@ def study(given: argparse.Namespace) -> None:
     for name, finding in compared(asked, folder):
         found[name] = finding
         print(f"{name}: {len(finding.runs)} pairs")
-    print(study_table(found))
-    _tell_written(write_study(asked, found, folder))
+    text = study_table(found)
+    print(text)
+    _tell_written(write_study(asked, found, text, folder))
 
 
 def mesh(given: argparse.Namespace) -> None:
@@ -122,9 +126,9 @@ def modes(given: argparse.Namespace) -> None:
     rest = Rest.of(case)
     _tell_rest(rest)
     found = lowest(rest.dead.model, given.count, about=rest.dead)
-    damping = rest.damping[1]
-    print(f"{found.table()}\n\n{damping}")
-    _tell_written(write_modes(found, damping, Path(given.out)))
+    text = f"{found.table()}\n\n{rest.damping[1]}"
+    print(text)
+    _tell_written(write_modes(found, text, Path(given.out)))
 
 
 def run(given: argparse.Namespace) -> None:
@@ -153,12 +157,14 @@ def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
         KeyboardInterrupt: Ctrl-C ended a pair of a suite.
     """
     from archfem.cases.report import write_dead, write_limit, write_suite
+    from archfem.cases.summary import collapse_words
 
     runs: dict[str, History] = {}
     for result in results:
         if isinstance(result, Collapse):
-            _tell_limit(case, result)
-            _tell_written(write_limit(case, result, folder))
+            text = collapse_words(case.structure, result)
+            print(text)
+            _tell_written(write_limit(case, result, text, folder))
         elif isinstance(result, Rest):
             rest = result
             _tell_rest(rest)
@@ -201,8 +207,9 @@ def _tell_run(done: Run, rest: Rest) -> None:
             f"{float(history.time[-1]):.2f} s in {done.seconds:.1f} s; {history.outcome}"
         )
         _tell_written([done.path])
-    print(run_words(done.case.structure, history, rest.dead.joints))
-    _tell_written(write_run(done, rest, done.path.parent))
+    text = run_words(done.case.structure, history, rest.dead.joints)
+    print(text)
+    _tell_written(write_run(done, rest, text, done.path.parent))
 
 
 def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path) -> None:
@@ -215,8 +222,9 @@ def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path
     from archfem.cases.report import write_pairs
     from archfem.cases.summary import pair_table
 
-    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{pair_table(runs)}")
-    _tell_written(write_pairs(runs, rest, folder))
+    text = pair_table(runs)
+    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
+    _tell_written(write_pairs(runs, rest, text, folder))
     if any(run.ended is Ending.INTERRUPTED for run in runs.values()):
         print("run the same command again to go on with the pairs that are left", file=sys.stderr)
         raise KeyboardInterrupt
@@ -226,13 +234,6 @@ def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path
             f"{len(broken)} of {len(runs)} pairs have no equilibrium at some step: "
             f"{', '.join(broken)}; what was computed is kept"
         )
-
-
-def _tell_limit(case: Case, found: Collapse) -> None:
-    """Print what limit analysis found."""
-    from archfem.cases.summary import collapse_words
-
-    print(collapse_words(case.structure, found))
 
 
 def _tell_rest(rest: Rest) -> None:

@@ -7,10 +7,9 @@ from pathlib import Path
 import xarray as xr
 
 from archfem.cases.case import Case
-from archfem.cases.findings import Finding, study_table
+from archfem.cases.findings import Finding
 from archfem.cases.run import Rest, Run
 from archfem.cases.study import Study
-from archfem.cases.summary import accuracy_words, collapse_words, pair_table, run_words
 from archfem.dynamics.history import History
 from archfem.dynamics.tradeoff import Accuracy
 from archfem.files import in_one_stroke
@@ -38,20 +37,20 @@ SUMMARY = "summary.txt"
 """Table of a run; it is written last, and so tells that the other files of the run are there."""
 
 
-def write_limit(case: Case, found: Collapse, folder: Path) -> list[Path]:
+def write_limit(case: Case, found: Collapse, text: str, folder: Path) -> list[Path]:
     """Write what limit analysis found, and draw the mechanism over the structure.
 
     Args:
         case: what was asked.
         found: what limit analysis found.
+        text: the same in words.
         folder: for the files.
 
     Returns:
         The files.
     """
-    words = collapse_words(case.structure, found)
     figure = draw_collapse(case.structure, found)
-    return [_write(words, folder / "limit.txt"), save(figure, folder / "collapse.png")]
+    return [_write(text, folder / "limit.txt"), save(figure, folder / "collapse.png")]
 
 
 def write_dead(rest: Rest, folder: Path) -> list[Path]:
@@ -77,12 +76,13 @@ def write_dead(rest: Rest, folder: Path) -> list[Path]:
     return files
 
 
-def write_run(done: Run, rest: Rest, folder: Path) -> list[Path]:
+def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     """Draw a run: its gravest instant, envelope, two joints over time, and film it where asked.
 
     Args:
         done: a case, which tells title, which joints, and whether to film, and what happened.
         rest: the state before.
+        text: table of the joints.
         folder: for the files.
 
     Returns:
@@ -103,7 +103,7 @@ def write_run(done: Run, rest: Rest, folder: Path) -> list[Path]:
         from archfem.view.films.scenes import film  # loads pyvista, which is slow
 
         files.append(film(dead.model, run, folder / "hinges.mp4"))
-    return [*files, _write(run_words(case.structure, run, dead.joints), folder / SUMMARY)]
+    return [*files, _write(text, folder / SUMMARY)]
 
 
 def is_written(done: Run) -> bool:
@@ -151,12 +151,13 @@ def write_motion(motion: Motion, folder: Path) -> list[Path]:
     return [save(draw_motion(motion), folder / "motion.png")]
 
 
-def write_pairs(runs: Mapping[str, History], rest: Rest, folder: Path) -> list[Path]:
-    """Write one line a run of a suite, and draw the envelopes of all, at most six to a picture.
+def write_pairs(runs: Mapping[str, History], rest: Rest, text: str, folder: Path) -> list[Path]:
+    """Write the table of a suite, and draw the envelopes of its runs, at most six to a picture.
 
     Args:
         runs: what to call each run, and the run.
         rest: the state before.
+        text: table of the runs.
         folder: for the files.
 
     Returns:
@@ -169,15 +170,15 @@ def write_pairs(runs: Mapping[str, History], rest: Rest, folder: Path) -> list[P
         save(draw_envelope(part, dead=rest.dead.joints), folder / name)
         for name, part in zip(names, parts, strict=True)
     ]
-    return [_write(pair_table(runs), folder / "suite.txt"), *files]
+    return [_write(text, folder / "suite.txt"), *files]
 
 
-def write_modes(found: Modes, damping: str, folder: Path) -> list[Path]:
+def write_modes(found: Modes, text: str, folder: Path) -> list[Path]:
     """Write the table of modes, draw their shapes, and film the first two.
 
     Args:
         found: the modes.
-        damping: in words, below the table.
+        text: table of them.
         folder: for the files.
 
     Returns:
@@ -185,40 +186,44 @@ def write_modes(found: Modes, damping: str, folder: Path) -> list[Path]:
     """
     first = range(1, min(len(found.frequencies), 2) + 1)
     return [
-        _write(f"{found.table()}\n\n{damping}", folder / "modes.txt"),
+        _write(text, folder / "modes.txt"),
         save(draw_modes(found), folder / "modes.png"),
         film_modes(found, folder / "modes.gif", first),
     ]
 
 
-def write_accuracy(found: Accuracy, folder: Path) -> list[Path]:
+def write_accuracy(found: Accuracy, text: str, folder: Path) -> list[Path]:
     """Write and draw speed against error.
 
     Args:
         found: as by `archfem.accuracy`.
+        text: table of it.
         folder: for the files.
 
     Returns:
         The files.
     """
     return [
-        _write(accuracy_words(found), folder / "accuracy.txt"),
+        _write(text, folder / "accuracy.txt"),
         save(draw_accuracy(found), folder / "accuracy.png"),
     ]
 
 
-def write_study(study: Study, findings: Mapping[str, Finding], folder: Path) -> list[Path]:
+def write_study(
+    study: Study, findings: Mapping[str, Finding], text: str, folder: Path
+) -> list[Path]:
     """Write the tables of a study, and draw the factors at first mechanism where it asks for them.
 
     Args:
         study: what was compared.
         findings: by name of the case.
+        text: tables of them.
         folder: for the files.
 
     Returns:
         The files.
     """
-    files = [_write(f"{study.title}\n\n{study_table(findings)}", folder / "study.txt")]
+    files = [_write(f"{study.title}\n\n{text}", folder / "study.txt")]
     if study.scales is not None:
         factors = {name: each.factors for name, each in findings.items()}
         files.append(save(draw_study(factors, study.reduction), folder / "study.png"))

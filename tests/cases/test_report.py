@@ -9,15 +9,16 @@ from archfem.cases import report as results
 def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
     rest, _, run = af.cases.carried_out(af.Case.read(small), pairs=["first"])
     runs = {str(number): run.history for number in range(7)}
-    files = results.write_pairs(runs, rest, tmp_path)
+    files = results.write_pairs(runs, rest, "a table", tmp_path)
     assert [path.name for path in files] == ["suite.txt", "envelope.png", "envelope_2.png"]
 
 
 def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, tmp_path):
     rest, _, run = af.cases.carried_out(af.Case.read(small), tmp_path, pairs=["first"])
     assert not results.is_written(run)
-    files = results.write_run(run, rest, run.path.parent)
+    files = results.write_run(run, rest, "a table", run.path.parent)
     assert files[-1].name == "summary.txt"
+    assert files[-1].read_text() == "a table\n"
     assert results.is_written(run)
     later = files[-1].stat().st_mtime_ns + 1
     os.utime(run.path, ns=(later, later))
