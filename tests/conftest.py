@@ -10,7 +10,7 @@ import pytest
 import archfem as af
 
 NOTHING_COMPILED = {
-    *("motion", "masonry", "joints", "limit", "models", "statics"),
+    *("motion", "masonry", "joints", "limit", "models"),
     *("test_architecture.py", "test_wrong_arguments.py"),
 }
 """Tests that step through no time, and so need no compiled function."""
