@@ -168,3 +168,34 @@ ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17
 assert abs(af.dead_load(af.build(ring, fidelity="rigid")).joints["N"].values.min() - 21.6e3) < 500
 """
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+PROMISED = [
+    "archfem.actions.BodyForce",
+    "archfem.analysis.at_rest",
+    "archfem.analysis.damping_of",
+    "archfem.capacity.minimum_thickness",
+    "archfem.criteria.judged",
+    "archfem.events.MovingMechanism",
+    "archfem.freebody.forces_on",
+    "archfem.limit.collapse_factor",
+    "archfem.motion.Motion",
+    "archfem.push.Stop",
+    "archfem.shapes.circular_arch",
+    "archfem.statics.self_weight",
+    "archfem.strength.strength_use",
+    "archfem.strength.use_table",
+    "archfem.view.compare.draw_instants",
+    "archfem.view.envelopes.draw_envelope",
+    "archfem.view.plots.draw_structure",
+    "archfem.view.pushover.draw_pushover",
+    "archfem.view.tradeoff.draw_accuracy",
+]
+"""What scripts were told to import before there were rooms."""
+
+
+@pytest.mark.parametrize("name", PROMISED)
+def test_what_scripts_import_is_still_found(name):
+    module, _, thing = name.rpartition(".")
+    script = f"from {module} import {thing}; assert {thing}.__name__ == {thing!r}"
+    subprocess.run([sys.executable, "-c", script], check=True)

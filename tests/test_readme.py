@@ -1,7 +1,12 @@
 """The README's Python runs as it stands, and prints what it says."""
 
 import re
+from functools import reduce
 from pathlib import Path
+
+import pytest
+
+import archfem as af
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -19,3 +24,8 @@ def test_commands_are_targets_of_the_makefile():
     targets = (Path(__file__).parents[1] / "Makefile").read_text(encoding="utf-8")
     for command in set(re.findall(r"`?make (demo|test[a-z-]*|lint|[a-z]+-[a-z]+)", README)):
         assert re.search(rf"^{command}:", targets, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", README))))
+def test_names_in_the_text_are_there(name):
+    reduce(getattr, name.split("."), af)

@@ -1,4 +1,5 @@
 from .cells import Cells as Cells
 from .discretisation import Discretisation as Discretisation
+from .fem.mesh import read_mesh as read_mesh
 from .model import Model as Model
 from .model import Prediction as Prediction
