@@ -9,11 +9,11 @@ import pytest
 
 import archfem as af
 
-NOTHING_COMPILED = {
-    *("motion", "masonry", "joints", "limit", "models"),
-    *("test_architecture.py", "test_wrong_arguments.py"),
-}
-"""Tests that step through no time, and so need no compiled function."""
+STEPPING = (
+    *("cases", "dynamics", "test_notebooks.py", "test_readme.py", "verification", "validation"),
+    *("view", "statics", "masonry"),
+)
+"""Tests that step through time, and so need compiled functions: the more, the earlier."""
 
 
 def pytest_collection_modifyitems(config, items):
@@ -21,9 +21,14 @@ def pytest_collection_modifyitems(config, items):
 
     Each begins with a part of the list and later takes over from the end of another's part.
     """
+    tests = config.rootpath / "tests"
+
+    def place(item):
+        folder = item.path.relative_to(tests).parts[0]
+        return STEPPING.index(folder) if folder in STEPPING else len(STEPPING)
+
     if hasattr(config, "workerinput"):
-        tests = config.rootpath / "tests"
-        items.sort(key=lambda item: item.path.relative_to(tests).parts[0] in NOTHING_COMPILED)
+        items.sort(key=place)
 
 
 @pytest.fixture(scope="session")

@@ -12,34 +12,26 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.stepping.exact import Exact
-from archfem.errors import DidNotConverge
-from archfem.masonry.actions import BodyForce
-from archfem.masonry.materials import Contact, Material
-from archfem.masonry.shapes import column
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import equilibrium_under, self_weight
+import archfem as af
 
 GRAVITY = 9.81
-STONE = Material(30e9, 0.2, 2000.0 * GRAVITY)
-JOINT = Contact(1e9, 4e8, 0.6)
+STONE = af.Material(30e9, 0.2, 2000.0 * GRAVITY)
+JOINT = af.Contact(1e9, 4e8, 0.6)
 
 
 def block(breadth=0.6, height=2.4, contact=JOINT, material=STONE):
-    return column(breadth=breadth, heights=[height], contact=contact, material=material)
+    return af.column(breadth=breadth, heights=[height], contact=contact, material=material)
 
 
 def test_three_frequencies():
-    model = build(block(), fidelity="rigid")
+    model = af.build(block(), fidelity="rigid")
     squares = eigh(model.tangent(np.zeros(3)).toarray(), model.mass.toarray(), eigvals_only=True)
     assert np.sqrt(squares) / (2.0 * np.pi) == pytest.approx([8.884, 72.644, 91.118], rel=1e-4)
 
 
 def test_frequencies_of_an_elastic_block_approach_the_rigid_ones():
-    hard = Material(3e13 / 10.0, 0.2, 2000.0 * GRAVITY)
-    model = build(block(material=hard), fidelity="full", cells=(4, 8), degree=2)
+    hard = af.Material(3e13 / 10.0, 0.2, 2000.0 * GRAVITY)
+    model = af.build(block(material=hard), fidelity="full", cells=(4, 8), degree=2)
     squares = eigh(
         model.tangent(np.zeros(model.size)).toarray(),
         model.mass.toarray(),
@@ -57,10 +49,10 @@ def test_section_law(e):
     64 facets with 3 Lobatto points: the edge of contact falls inside a facet, where the rule
     errs by less than one part in a thousand.
     """
-    model = build(block(), fidelity="rigid", cells=(64, 1))
+    model = af.build(block(), fidelity="rigid", cells=(64, 1))
     normal, depth = 1e6, 0.6
     load = np.array([0.0, -normal, -e * normal * depth])  # clockwise presses the right edge
-    found = equilibrium_under(model, load)
+    found = af.statics.equilibrium_under(model, load)
     stiffness, width = JOINT.normal_stiffness, 1.0
     if e <= 1.0 / 6.0:
         rotation = 12.0 * e * normal * depth / (stiffness * width * depth**3)
@@ -73,9 +65,9 @@ def test_section_law(e):
 
 def test_moment_approaches_its_limit_only_as_rotation_grows():
     """M = N (h/2 - (1/3) sqrt(2 N / (k_n w θ))) read at the rotation found."""
-    model = build(block(), fidelity="rigid", cells=(256, 1))
+    model = af.build(block(), fidelity="rigid", cells=(256, 1))
     normal = 1e6
-    found = equilibrium_under(model, np.array([0.0, -normal, -0.49 * normal * 0.6]))
+    found = af.statics.equilibrium_under(model, np.array([0.0, -normal, -0.49 * normal * 0.6]))
     rotation = -found.q[2]
     moment = normal * (0.3 - np.sqrt(2.0 * normal / (1e9 * rotation)) / 3.0)
     assert float(found.joints["M"][0]) == pytest.approx(moment, rel=2e-4)
@@ -84,35 +76,37 @@ def test_moment_approaches_its_limit_only_as_rotation_grows():
 @pytest.mark.parametrize("fidelity", ["rigid", "full"])
 def test_uplift_at_a_quarter_of_g(fidelity):
     """b/h = 0.25: just below, the base is hinged but holds; just above, nothing does."""
-    model = build(block(), fidelity=fidelity, cells=(4, 8))
-    weight = self_weight(model)
-    held = equilibrium_under(model, weight + model.load(BodyForce(0.245)))
+    model = af.build(block(), fidelity=fidelity, cells=(4, 8))
+    weight = af.statics.self_weight(model)
+    held = af.statics.equilibrium_under(model, weight + model.load(af.BodyForce(0.245)))
     assert float(held.joints["eccentricity"][0]) == pytest.approx(2.0 * 0.245, rel=1e-6)
     assert int(held.joints["hinge"][0]) == 1
-    with pytest.raises(DidNotConverge, match="no equilibrium beyond"):
-        equilibrium_under(model, weight + model.load(BodyForce(0.255)))
+    with pytest.raises(af.DidNotConverge, match="no equilibrium beyond"):
+        af.statics.equilibrium_under(model, weight + model.load(af.BodyForce(0.255)))
 
 
 def test_sliding_at_the_coefficient_of_friction():
-    model = build(block(breadth=4.0, height=0.5), fidelity="rigid")
+    model = af.build(block(breadth=4.0, height=0.5), fidelity="rigid")
     for factor, slides in ((0.59, False), (0.61, True)):
-        found = equilibrium_under(model, self_weight(model) + model.load(BodyForce(factor)))
+        found = af.statics.equilibrium_under(
+            model, af.statics.self_weight(model) + model.load(af.BodyForce(factor))
+        )
         assert float(found.joints["friction"][0]) == pytest.approx(factor, rel=1e-9)
         assert bool(found.joints["slide"][0]) == slides
 
 
 def test_rocking_period():
     """Quarter period of free rocking from θ₀ = 0.1 α: sqrt(2 I₀ θ₀ / (W b)), 0.737 s in all."""
-    stiff = Contact(1e12, 1e12, 0.6)
-    model = build(block(contact=stiff), fidelity="rigid", cells=(1, 1), quadrature="nodal")
+    stiff = af.Contact(1e12, 1e12, 0.6)
+    model = af.build(block(contact=stiff), fidelity="rigid", cells=(1, 1), quadrature="nodal")
     theta = 0.1 * np.arctan(0.25)
-    still = Motion(np.zeros(2), 0.15)
-    equation = Equation(model, still)
+    still = af.Motion(np.zeros(2), 0.15)
+    equation = af.dynamics.Equation(model, still)
     # Turned by θ₀ clockwise about the lower right corner, 0.3 m right and 1.2 m below its centre.
     start = equation.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
     start = equation.released(replace(start))
     dt = 2e-4
-    states = [step.state for step in Exact(equation).steps(start, dt, 0.25)]
+    states = [step.state for step in af.dynamics.Exact(equation).steps(start, dt, 0.25)]
     angles = np.array([-state.q[2] for state in states])
     landed = np.interp(
         0.0,

@@ -16,16 +16,13 @@ voussoirs, without sliding, is by linear programming of the static theorem.
 import numpy as np
 import pytest
 
-from archfem.limit.collapse import collapse_factor, stands
-from archfem.limit.verified import verified_mechanism
-from archfem.masonry.actions import BodyForce
-from archfem.masonry.shapes import circular_arch
+import archfem as af
 
 HALF_A_DIGIT = 5.1e-4
 
 
 def ring(embrace, ratio, voussoirs=180):
-    return circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=voussoirs)
+    return af.circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=voussoirs)
 
 
 @pytest.mark.parametrize(
@@ -39,29 +36,29 @@ def ring(embrace, ratio, voussoirs=180):
     ],
 )
 def test_ring_of_many_voussoirs(embrace, ratio, factor):
-    found = collapse_factor(ring(embrace, ratio), live=BodyForce(1.0), friction=None)
+    found = af.collapse_factor(ring(embrace, ratio), live=af.BodyForce(1.0), friction=None)
     assert found.factor == pytest.approx(factor, abs=HALF_A_DIGIT)
     assert [side for _, side in found.hinges] == ["intrados", "extrados"] * 2
 
 
 def test_the_thickest_of_them_would_slide_first():
     """The table is of pure rotation; at a friction of 0.6 its springings slide before."""
-    found = collapse_factor(ring(120.0, 0.20), live=BodyForce(1.0))
+    found = af.collapse_factor(ring(120.0, 0.20), live=af.BodyForce(1.0))
     assert set(found.sliding) == {0, 180}
     assert found.factor == pytest.approx(1.185, abs=1e-3)
 
 
 def test_thin_semicircle_does_not_stand_at_all():
     thin = ring(180.0, 0.10)
-    assert not stands(thin)
-    assert collapse_factor(thin, live=BodyForce(1.0)).outcome == "infeasible"
+    assert not af.stands(thin)
+    assert af.collapse_factor(thin, live=af.BodyForce(1.0)).outcome == "infeasible"
 
 
 def test_oppenheim_arch():
-    structure = circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
-    found = collapse_factor(structure, live=BodyForce(1.0))
+    structure = af.circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0))
     assert found.factor == pytest.approx(0.37, abs=0.005)
-    verified = verified_mechanism(structure, found.joints)
+    verified = af.verified_mechanism(structure, found.joints)
     assert (verified.kind, len(verified.moved.joints)) == ("local", 4)
 
 
@@ -70,8 +67,8 @@ def test_rings_lose_all_capacity_at_their_least_thickness():
     """Capacity vanishes along the known line of least thickness, and only there."""
 
     def capacity(embrace, ratio):
-        made = circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=180)
-        return collapse_factor(made, live=BodyForce(1.0), friction=None).factor
+        made = af.circular_arch(radius=1.0, thickness=ratio, embrace=embrace, voussoirs=180)
+        return af.collapse_factor(made, live=af.BodyForce(1.0), friction=None).factor
 
     assert capacity(120.0, 0.0229) == pytest.approx(0.0, abs=2e-3)
     assert capacity(180.0, 0.1076) == pytest.approx(0.0, abs=2e-3)

@@ -36,45 +36,43 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.limit.collapse import collapse_factor, stands
-from archfem.limit.thickness import minimum_thickness
-from archfem.masonry.actions import Settlement
-from archfem.masonry.materials import STONE_TO_STONE
-from archfem.masonry.shapes import circular_arch
+import archfem as af
 
 PRINTED = 6e-5
 """Half of the last digit with which the values for few voussoirs are known, and a little."""
 
 
 def ring(thickness, voussoirs, embrace=180.0, friction=0.6):
-    return circular_arch(
+    return af.circular_arch(
         radius=1.0,
         thickness=thickness,
         embrace=embrace,
         voussoirs=voussoirs,
-        contact=replace(STONE_TO_STONE, friction=friction),
+        contact=replace(af.masonry.STONE_TO_STONE, friction=friction),
     )
 
 
 @pytest.fixture(scope="module")
 def least():
     """Of 66 stones, joints 20 from the crown lie at 54.55°, as near to 54.48° as matters."""
-    return minimum_thickness(lambda t: ring(t, 66), friction=None)
+    return af.minimum_thickness(lambda t: ring(t, 66), friction=None)
 
 
 @pytest.mark.parametrize(
     ("voussoirs", "ratio"), [(7, 0.0962), (11, 0.1049), (17, 0.1056), (27, 0.1068), (50, 0.1075)]
 )
 def test_semicircle_of_few_voussoirs(voussoirs, ratio):
-    found = minimum_thickness(lambda t: ring(t, voussoirs), friction=None)
+    found = af.minimum_thickness(lambda t: ring(t, voussoirs), friction=None)
     assert found == pytest.approx(ratio, abs=PRINTED)
-    assert stands(ring(1.02 * found, voussoirs))
-    assert not stands(ring(0.98 * found, voussoirs))
+    assert af.stands(ring(1.02 * found, voussoirs))
+    assert not af.stands(ring(0.98 * found, voussoirs))
 
 
 def test_semicircle_with_a_joint_where_it_hinges(least):
     assert least == pytest.approx(0.10748, abs=1e-5)
-    spread = collapse_factor(ring(least, 66), live=Settlement(0, (-1.0, 0.0, 0.0)), friction=None)
+    spread = af.collapse_factor(
+        ring(least, 66), live=af.Settlement(0, (-1.0, 0.0, 0.0)), friction=None
+    )
     angles = [90.0 - 180.0 / 66 * joint for joint, _ in spread.hinges]
     assert angles == pytest.approx([54.5, 0.0, -54.5], abs=0.1)
     assert [side for _, side in spread.hinges] == ["intrados", "extrados", "intrados"]
@@ -82,8 +80,8 @@ def test_semicircle_with_a_joint_where_it_hinges(least):
 
 def test_thrust_at_the_least_thickness_by_statics(least):
     """From extrados at the crown to extrados at the springing, H = V (1 - x_c / (R + t/2))."""
-    joints = collapse_factor(
-        ring(least, 66), live=Settlement(0, (-1.0, 0.0, 0.0)), friction=None
+    joints = af.collapse_factor(
+        ring(least, 66), live=af.Settlement(0, (-1.0, 0.0, 0.0)), friction=None
     ).joints
     arm = (1.0 + least**2 / 12.0) / (np.pi / 2.0)
     expected = 1.0 - arm / (1.0 + least / 2.0)
@@ -96,7 +94,7 @@ def test_friction_that_a_semicircle_needs(least):
     low, high = 0.3, 0.6
     while high - low > 1e-4:
         middle = 0.5 * (low + high)
-        holds = stands(ring(thickness, 66, friction=middle))
+        holds = af.stands(ring(thickness, 66, friction=middle))
         low, high = (low, middle) if holds else (middle, high)
     assert high == pytest.approx(0.3953, abs=2e-4)
     assert high == pytest.approx(0.3958, rel=2e-3)
@@ -105,17 +103,17 @@ def test_friction_that_a_semicircle_needs(least):
 
 
 def test_below_that_friction_more_thickness_is_needed():
-    free = minimum_thickness(lambda t: ring(t, 50), friction=None, tolerance=1e-5)
-    assert stands(ring(1.0001 * free, 50, friction=0.40))
-    assert not stands(ring(1.02 * free, 50, friction=0.39))
+    free = af.minimum_thickness(lambda t: ring(t, 50), friction=None, tolerance=1e-5)
+    assert af.stands(ring(1.0001 * free, 50, friction=0.40))
+    assert not af.stands(ring(1.02 * free, 50, friction=0.39))
 
 
 def test_embrace_of_120_degrees():
     """Of 76 stones, joints 25 from the crown lie at 39.47°, as near to 39.5° as matters."""
-    found = minimum_thickness(lambda t: ring(t, 76, embrace=120.0), friction=None)
+    found = af.minimum_thickness(lambda t: ring(t, 76, embrace=120.0), friction=None)
     assert found == pytest.approx(0.02285, abs=1e-5)
-    spread = collapse_factor(
-        ring(found, 76, embrace=120.0), live=Settlement(0, (-1.0, 0.0, 0.0)), friction=None
+    spread = af.collapse_factor(
+        ring(found, 76, embrace=120.0), live=af.Settlement(0, (-1.0, 0.0, 0.0)), friction=None
     )
     assert 60.0 - 120.0 / 76 * spread.hinges[0][0] == pytest.approx(39.5, abs=0.05)
 
@@ -123,11 +121,11 @@ def test_embrace_of_120_degrees():
 @pytest.mark.parametrize(("voussoirs", "ratio"), [(7, 0.0957), (17, 0.10546)])
 def test_stones_cut_along_chords_need_less(voussoirs, ratio):
     """Chords take weight from the flanks of long stones: 0.6 % less at 7 stones, 0.1 % at 17."""
-    found = minimum_thickness(
-        lambda t: circular_arch(
+    found = af.minimum_thickness(
+        lambda t: af.circular_arch(
             radius=1.0, thickness=t, embrace=180.0, voussoirs=voussoirs, chords=1
         ),
         friction=None,
     )
     assert found == pytest.approx(ratio, abs=1e-5)
-    assert found < minimum_thickness(lambda t: ring(t, voussoirs), friction=None)
+    assert found < af.minimum_thickness(lambda t: ring(t, voussoirs), friction=None)

@@ -5,36 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.dynamics.damping import effective_damping
-from archfem.dynamics.ladder import Setting, build, choose, finest
+import archfem as af
+from archfem.dynamics.ladder import Setting, choose, finest
 from archfem.dynamics.probe import largest_difference, peaks, strongest, usual_damping
-from archfem.dynamics.schemes import Rayleigh
-from archfem.dynamics.time_history import time_history
-from archfem.dynamics.tradeoff import accuracy
-from archfem.errors import InvalidInput
-from archfem.joints.quadrature import Quadrature
-from archfem.masonry.materials import BACKFILL, Contact
-from archfem.masonry.shapes import Arch, Backfill, bridge, circular_arch, column
 from archfem.models.build import build as plain
-from archfem.models.discretisation import Discretisation
 from archfem.models.rigid import rigid
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
 
-STIFF = Contact(1.48e10, 0.3e10)
+STIFF = af.Contact(1.48e10, 0.3e10)
 SCENES = {
-    "ring": (circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17), 1.7),
-    "semicircle": (circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15), 0.6),
+    "ring": (af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17), 1.7),
+    "semicircle": (af.circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15), 0.6),
     "stiff joints": (
-        circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, contact=STIFF),
+        af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, contact=STIFF),
         1.7,
     ),
-    "column": (column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
+    "column": (af.column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
 }
 
 
 def damping_of(structure):
-    return usual_damping(rigid(structure, rule=Quadrature("exact")))
+    return usual_damping(rigid(structure, rule=af.joints.Quadrature("exact")))
 
 
 @pytest.fixture(
@@ -49,9 +39,9 @@ def damping_of(structure):
 def scene(request):
     """A structure, its motion and damping, and the peaks of a finer model over all of it."""
     structure, pga = SCENES[request.param]
-    motion = Motion.synthetic(duration=12.0, pga=pga, seed=1)
+    motion = af.Motion.synthetic(duration=12.0, pga=pga, seed=1)
     damping = damping_of(structure)
-    best = build(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
+    best = af.build(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
     return structure, motion, damping, peaks(best, motion, damping, 0.00125)
 
 
@@ -59,7 +49,9 @@ def scene(request):
 def test_prediction_is_within_a_factor_of_three(scene, tolerance):
     """Predicted over actual error, the actual one over a whole motion and on a finer model."""
     structure, motion, damping, reference = scene
-    model = build(structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping)
+    model = af.build(
+        structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping
+    )
     predicted = model.prediction
     actual = largest_difference(peaks(model, motion, damping, predicted.dt), reference)
     assert actual <= 1.5 * tolerance or not predicted.met
@@ -68,9 +60,9 @@ def test_prediction_is_within_a_factor_of_three(scene, tolerance):
 
 def test_choice_climbs_as_the_tolerance_falls():
     structure, pga = SCENES["ring"]
-    motion = Motion.synthetic(duration=3.0, pga=pga, seed=1)
+    motion = af.Motion.synthetic(duration=3.0, pga=pga, seed=1)
     tried = [
-        len(build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
+        len(af.build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
         for t in (0.05, 0.005)
     ]
     assert tried[0] == 1 < tried[1]
@@ -87,9 +79,9 @@ def test_the_finest_model_is_built_once_and_asked_for_the_damping(ring, dt):
 
     def damping(model):
         asked.append(model)
-        return Rayleigh(0.05, (8.0, 24.0))
+        return af.Rayleigh(0.05, (8.0, 24.0))
 
-    motion = Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
     choose(ring, 1e-9, motion, damping, dt, builder=builder)
     assert [each for each, _ in built].count(finest(ring).discretisation) == 1
     assert asked == [model for each, model in built if each == finest(ring).discretisation]
@@ -97,45 +89,48 @@ def test_the_finest_model_is_built_once_and_asked_for_the_damping(ring, dt):
 
 def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
     """A function of the model, and what it gives, are the same to the last digit."""
-    motion = Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
     best = plain(ring, finest(ring).discretisation)
-    given = effective_damping(best, about=dead_load(best))
+    given = af.dynamics.effective_damping(best, about=af.dead_load(best))
     found = [
-        build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
-        for damping in (given, lambda model: effective_damping(model, about=dead_load(model)))
+        af.build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
+        for damping in (
+            given,
+            lambda model: af.dynamics.effective_damping(model, about=af.dead_load(model)),
+        )
     ]
     assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, float("nan")])
 def test_a_tolerance_that_cannot_be_meant(tolerance):
-    with pytest.raises(InvalidInput, match=r"tolerance .* is not between 0 and 1"):
-        build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
+    with pytest.raises(af.InvalidInput, match=r"tolerance .* is not between 0 and 1"):
+        af.build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
 
 
 def test_a_soft_block_keeps_its_nodes():
-    stack = column(breadth=1.0, heights=[1.0, 0.5])
-    soft = replace(stack.blocks[1], material=BACKFILL)
+    stack = af.column(breadth=1.0, heights=[1.0, 0.5])
+    soft = replace(stack.blocks[1], material=af.masonry.BACKFILL)
     stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
-    model = build(stack, fidelity="auto", tolerance=0.01)
+    model = af.build(stack, fidelity="auto", tolerance=0.01)
     assert "block 1: full" in model.fidelity
     assert model.prediction.met
 
 
 def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not():
     """The error predicted of the model, against all nodes over the whole motion."""
-    arch = Arch(span=5.0, rise=2.0, thickness=0.5, voussoirs=13)
-    structure = bridge(arches=[arch], backfill=Backfill(cover=0.5), width=4.0)
-    motion = Motion.synthetic(duration=10.0, pga=2.5, seed=2)
-    damping = Rayleigh(0.05, (4.0, 20.0))
+    arch = af.shapes.Arch(span=5.0, rise=2.0, thickness=0.5, voussoirs=13)
+    structure = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), width=4.0)
+    motion = af.Motion.synthetic(duration=10.0, pga=2.5, seed=2)
+    damping = af.Rayleigh(0.05, (4.0, 20.0))
     given = {"motion": motion, "damping": damping, "dt": 0.005}
-    model = build(structure, fidelity="auto", tolerance=0.005, **given)
+    model = af.build(structure, fidelity="auto", tolerance=0.005, **given)
     assert model.fidelity == "backfill: full, rest: faces"
     assert model.prediction.met
     assert model.prediction.dt == 0.005
     runs = [
         peaks(each, motion, damping, 0.005)
-        for each in (model, build(structure, quadrature="exact"))
+        for each in (model, af.build(structure, quadrature="exact"))
     ]
     assert 0.3 < runs[1].max() < 0.5  # the motion is severe, and no ring comes apart
     actual = largest_difference(*runs)
@@ -144,23 +139,23 @@ def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not():
 
 
 def test_without_a_motion_a_severe_one_is_assumed(ring):
-    model = build(ring, fidelity="auto", tolerance=0.02)
+    model = af.build(ring, fidelity="auto", tolerance=0.02)
     assert model.prediction.met
-    run = time_history(model, Motion.synthetic(duration=1.0, pga=1.0, seed=1))
+    run = af.time_history(model, af.Motion.synthetic(duration=1.0, pga=1.0, seed=1))
     assert run.dataset.attrs["predicted_error"] == model.prediction.error
     assert np.diff(run.time) == pytest.approx(model.prediction.dt)
 
 
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
-    motion = Motion.synthetic(duration=4.0, pga=4.0, seed=3)
+    motion = af.Motion.synthetic(duration=4.0, pga=4.0, seed=3)
     motion = motion.cut(0.0, 2.0)
-    model = build(ring, fidelity="auto", tolerance=1e-6, motion=motion)
+    model = af.build(ring, fidelity="auto", tolerance=1e-6, motion=motion)
     assert not model.prediction.met
     assert "no rung of the ladder" in caplog.text
 
 
 def test_the_strongest_part_holds_the_peak():
-    motion = Motion.synthetic(duration=30.0, pga=2.0, seed=4)
+    motion = af.Motion.synthetic(duration=30.0, pga=2.0, seed=4)
     part = strongest(motion)
     assert part.duration == pytest.approx(8.0)
     assert part.pga == pytest.approx(motion.pga)
@@ -168,8 +163,8 @@ def test_the_strongest_part_holds_the_peak():
 
 def test_study_of_speed_against_error(ring):
     """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance."""
-    motion = Motion.synthetic(duration=3.0, pga=1.7, seed=1)
-    found = accuracy(
+    motion = af.Motion.synthetic(duration=3.0, pga=1.7, seed=1)
+    found = af.accuracy(
         ring,
         motion,
         damping=damping_of(ring),
@@ -194,8 +189,8 @@ def test_study_of_speed_against_error(ring):
 
 def test_a_setting_that_fails_is_reported_as_such(ring):
     """Undamped and coarse in time, energy comes from nowhere: no error can be stated."""
-    motion = Motion.synthetic(duration=3.0, pga=1.7, seed=1)
-    found = accuracy(
+    motion = af.Motion.synthetic(duration=3.0, pga=1.7, seed=1)
+    found = af.accuracy(
         ring, motion, rungs=("rigid",), cells=((4, 4),), rules=(("nodal", None),), steps=(0.01,)
     )
     assert found.trials[0].error == np.inf
@@ -204,7 +199,7 @@ def test_a_setting_that_fails_is_reported_as_such(ring):
 
 
 def test_labels_name_the_setting():
-    faces = Discretisation("faces", (4, 2), quadrature="gauss", points=3)
+    faces = af.models.Discretisation("faces", (4, 2), quadrature="gauss", points=3)
     assert Setting(faces, 0.005).label == "faces 4×2 gauss 3 5 ms"
-    mixed = Discretisation({"backfill": "full", "rest": "faces"}, quadrature="exact")
+    mixed = af.models.Discretisation({"backfill": "full", "rest": "faces"}, quadrature="exact")
     assert Setting(mixed, 0.001).label == "faces + soil 4×4 exact 1 ms"

@@ -5,10 +5,6 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.cases.cli import main
-from archfem.cases.run import at_rest, damping_of, shaken
-from archfem.joints.criteria import judged
-from archfem.statics.strength import strength_use
 
 MESHES = Path(__file__).parents[2] / "meshes"
 PAPER_STRESS = 0.6e6
@@ -22,11 +18,11 @@ def case(name, *changes):
 
 @pytest.fixture(scope="module")
 def dead():
-    return at_rest(case("prusias"))
+    return af.cases.at_rest(case("prusias"))
 
 
 def test_no_criterion_is_exceeded_under_dead_load(dead):
-    joints = judged(dead.joints)
+    joints = af.joints.judged(dead.joints)
     assert float(abs(joints["eccentricity"]).max()) < 0.25
     assert float(joints["friction"].max()) < 0.25 * 0.60
     assert float(joints["N"].min()) > 1e5
@@ -36,8 +32,8 @@ def test_compression_nears_that_of_the_paper_under_two_metres_of_fill(dead):
     """The paper does not give its cover; a trial by other means found 0.32 MPa, and 2 m for 0.6."""
     deep = case("prusias", "structure.backfill.cover=2 m", "structure.backfill.erosion=0 m")
     largest = []
-    for state in (dead, at_rest(deep)):
-        use = strength_use(state.model, state.q)
+    for state in (dead, af.cases.at_rest(deep)):
+        use = af.statics.strength_use(state.model, state.q)
         rings = use["part"].str.endswith("arch").values
         largest.append(float(use["compression"][rings].max()))
     assert 0.15e6 < largest[0] < PAPER_STRESS / 2.0
@@ -58,17 +54,19 @@ def test_modes_of_a_trial():
         "structure.sidewalls.south sidewall.above=0 m",
         "structure.backfill.erosion=0 m",
     )
-    state = at_rest(held)
+    state = af.cases.at_rest(held)
     found = af.modes(state.model, 3, about=state)
     assert found.frequencies == pytest.approx([3.03, 3.57, 4.22], rel=0.02)
     assert found.mass_ratios[:, 0] == pytest.approx([0.29, 0.26, 0.21], abs=0.01)
 
 
 def test_the_restored_bridge_is_stiffer_and_nearer_its_centre_lines(dead):
-    restored = at_rest(case("prusias_restored"))
+    restored = af.cases.at_rest(case("prusias_restored"))
     first = [float(af.modes(each.model, 1, about=each).frequencies[0]) for each in (dead, restored)]
     assert first[1] > 1.4 * first[0]
-    largest = [float(abs(judged(each.joints)["eccentricity"]).max()) for each in (dead, restored)]
+    largest = [
+        float(abs(af.joints.judged(each.joints)["eccentricity"]).max()) for each in (dead, restored)
+    ]
     assert largest[1] < 0.7 * largest[0]
 
 
@@ -80,7 +78,7 @@ def test_run_command_on_the_bridge(tmp_path, capsys):
     ]
     options = [word for text in changes for word in ("--set", text)]
     command = ["run", str(MESHES / "prusias.toml"), "--out", str(tmp_path), *options]
-    assert main(command) == 0
+    assert af.cases.main(command) == 0
     told = capsys.readouterr().out
     assert "the first and the last effective along x" in told
     for name in ("dead.png", "dead_stress.png", "free_body.png", "suite.txt", "envelope.png"):
@@ -100,9 +98,9 @@ def test_the_verdict_of_the_paper_by_its_own_rule_and_by_exact_joints():
     for name in ("prusias", "prusias_restored"):
         for rule, changes in {"springs": [springs], "exact": []}.items():
             own = case(name, *changes)
-            state = at_rest(own)
+            state = af.cases.at_rest(own)
             motion = own.ground_suite().motions[0]
-            run = shaken(own, motion, state, damping_of(own, state)[0])
+            run = af.cases.shaken(own, motion, state, af.cases.damping_of(own, state)[0])
             found[name, rule] = af.first_mechanisms(run)
     first = found["prusias", "springs"]
     assert first["any four joints"].kind == "global"

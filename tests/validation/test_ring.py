@@ -10,11 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.dynamics.ladder import build
-from archfem.masonry.materials import Contact, Material
-from archfem.masonry.shapes import circular_arch
-from archfem.masonry.structure import Structure
-from archfem.statics.equilibrium import dead_load
+import archfem as af
 
 CONVERGED = 0.2853
 """Crown eccentricity that all rules approach, to four digits."""
@@ -33,8 +29,8 @@ TRIAL = {  # cells, rule, points: crown eccentricity as found in an independent 
 @pytest.mark.parametrize("setting", TRIAL, ids=str)
 def test_crown_eccentricity(ring, setting):
     cells, rule, points = setting
-    model = build(ring, cells=(cells, cells), quadrature=rule, points=points)
-    found = dead_load(model).joints
+    model = af.build(ring, cells=(cells, cells), quadrature=rule, points=points)
+    found = af.dead_load(model).joints
     assert float(found["eccentricity"][8]) == pytest.approx(TRIAL[setting], abs=6e-5)
 
 
@@ -42,14 +38,14 @@ def test_crown_eccentricity(ring, setting):
 def test_converges_under_refinement(ring, rule):
     errors = []
     for cells in (4, 8, 16):
-        found = dead_load(build(ring, cells=(cells, cells), quadrature=rule)).joints
+        found = af.dead_load(af.build(ring, cells=(cells, cells), quadrature=rule)).joints
         errors.append(abs(float(found["eccentricity"][8]) - CONVERGED))
     assert errors[-1] < 8e-4
     assert errors[2] < 0.5 * errors[0]
 
 
 def test_dead_load_values(ring):
-    found = dead_load(build(ring, cells=(16, 16))).joints
+    found = af.dead_load(af.build(ring, cells=(16, 16))).joints
     assert float(found["eccentricity"][8]) == pytest.approx(CONVERGED, abs=1e-4)
     assert float(found["eccentricity"][0]) == pytest.approx(0.124, abs=5e-4)
     assert float(found["N"][8]) == pytest.approx(21.65e3, rel=1e-3)
@@ -58,8 +54,8 @@ def test_dead_load_values(ring):
 @pytest.mark.parametrize("fidelity", ["rigid", "full"])
 def test_every_block_is_in_balance(fidelity):
     """Joint resultants and weight of each voussoir, forces and moments, to 1e-9 of the weight."""
-    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=4)
-    joints = dead_load(build(ring, fidelity=fidelity)).joints
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=4)
+    joints = af.dead_load(af.build(ring, fidelity=fidelity)).joints
     for number in ring.free:
         block = ring.blocks[number]
         force = np.array([0.0, -block.area * block.material.unit_weight * ring.width])
@@ -81,8 +77,8 @@ def test_rigid_is_full_projected_on_rigid_motions():
     """Same joint quadrature: BᵀMB and G B of the full model are the rigid model's own."""
     from archfem.masonry.rigid_motion import motion_of
 
-    ring = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
-    full, rigid = build(ring, cells=(3, 3)), build(ring, cells=(3, 3), fidelity="rigid")
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
+    full, rigid = af.build(ring, cells=(3, 3)), af.build(ring, cells=(3, 3), fidelity="rigid")
     places = full.cells.places
     owner = np.full(len(places), -1)
     for cell, block in zip(full.cells.polygons, full.cells.owner, strict=True):
@@ -105,11 +101,15 @@ def test_rigid_is_full_projected_on_rigid_motions():
 def test_full_approaches_rigid_as_stone_hardens():
     """Elasticity's share falls as 1/E: to 1e-5 of e at a thousand times the modulus of stone."""
     given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17, "chords": 4}
-    rigid = dead_load(build(circular_arch(**given), fidelity="rigid")).joints["eccentricity"]
+    rigid = af.dead_load(af.build(af.circular_arch(**given), fidelity="rigid")).joints[
+        "eccentricity"
+    ]
     off = []
     for factor in (10.0, 100.0, 1000.0):
-        hard = Material(factor * 30e9 / 10.0, 0.2, 20e3)
-        found = dead_load(build(circular_arch(**given, material=hard))).joints["eccentricity"]
+        hard = af.Material(factor * 30e9 / 10.0, 0.2, 20e3)
+        found = af.dead_load(af.build(af.circular_arch(**given, material=hard))).joints[
+            "eccentricity"
+        ]
         off.append(float(abs(found - rigid).max()))
     assert off[0] / off[1] == pytest.approx(10.0, rel=0.1)
     assert off[1] / off[2] == pytest.approx(10.0, rel=0.1)
@@ -117,9 +117,9 @@ def test_full_approaches_rigid_as_stone_hardens():
 
 
 def test_results_per_width_do_not_depend_on_the_width(ring):
-    reference = dead_load(build(ring, fidelity="rigid")).joints
+    reference = af.dead_load(af.build(ring, fidelity="rigid")).joints
     for width in (1e-3, 100.0):
-        found = dead_load(build(replace(ring, width=width), fidelity="rigid")).joints
+        found = af.dead_load(af.build(replace(ring, width=width), fidelity="rigid")).joints
         assert np.abs(found["eccentricity"] - reference["eccentricity"]).max() < 1e-9
         assert found["N"].values / width == pytest.approx(reference["N"].values, rel=1e-9)
 
@@ -132,17 +132,17 @@ def test_numbering_changes_nothing_physical(ring, fidelity):
     joints = tuple(
         replace(j, blocks=(int(place[j.blocks[1]]), int(place[j.blocks[0]]))) for j in ring.joints
     )
-    shuffled = Structure(tuple(ring.blocks[k] for k in order), joints, ring.width, ring.gravity)
-    first = dead_load(build(ring, fidelity=fidelity)).joints
-    second = dead_load(build(shuffled, fidelity=fidelity)).joints
+    shuffled = af.Structure(tuple(ring.blocks[k] for k in order), joints, ring.width, ring.gravity)
+    first = af.dead_load(af.build(ring, fidelity=fidelity)).joints
+    second = af.dead_load(af.build(shuffled, fidelity=fidelity)).joints
     for key in ("N", "eccentricity", "friction"):
         assert second[key].values == pytest.approx(first[key].values, rel=1e-7, abs=1e-9)
 
 
 def test_softer_joints_change_forces_little_and_displacements_in_proportion(ring):
     """With k_n and k_s a hundred times less the stones are rigid beside them: q grows likewise."""
-    soft = Contact(1.48e7, 0.30e7)
+    soft = af.Contact(1.48e7, 0.30e7)
     loose = replace(ring, joints=tuple(replace(j, contact=soft) for j in ring.joints))
-    first = dead_load(build(ring, fidelity="rigid"))
-    second = dead_load(build(loose, fidelity="rigid"))
+    first = af.dead_load(af.build(ring, fidelity="rigid"))
+    second = af.dead_load(af.build(loose, fidelity="rigid"))
     assert second.q == pytest.approx(100.0 * first.q, rel=1e-6, abs=1e-12)

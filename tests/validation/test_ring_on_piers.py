@@ -13,15 +13,13 @@ without sliding. The factors are by linear programming of the static theorem.
 
 import pytest
 
-from archfem.limit.collapse import collapse_factor
-from archfem.masonry.actions import BodyForce
-from archfem.masonry.shapes import arch_on_piers
+import archfem as af
 
 HALF_A_DIGIT = 5.1e-5
 
 
 def structure(courses):
-    return arch_on_piers(
+    return af.arch_on_piers(
         radius=3.0, thickness=0.6, voussoirs=15, pier_breadth=1.2, courses=[0.5] * courses
     )
 
@@ -36,7 +34,7 @@ def structure(courses):
 )
 def test_mechanism_changes_its_class(courses, factor, parts):
     built = structure(courses)
-    found = collapse_factor(built, live=BodyForce(1.0), friction=None)
+    found = af.collapse_factor(built, live=af.BodyForce(1.0), friction=None)
     assert found.factor == pytest.approx(factor, abs=HALF_A_DIGIT)
     assert [built.joints[joint].part for joint, _ in found.hinges] == parts
     if parts[-1] == "right pier":

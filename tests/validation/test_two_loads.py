@@ -21,19 +21,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.limit.collapse import collapse_factor
-from archfem.masonry.actions import PointLoad
-from archfem.masonry.materials import STONE_TO_STONE
-from archfem.masonry.shapes import circular_arch
+import archfem as af
 
 
 def ring(friction=0.6):
-    contact = replace(STONE_TO_STONE, friction=friction)
-    return circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, contact=contact)
+    contact = replace(af.masonry.STONE_TO_STONE, friction=friction)
+    return af.circular_arch(
+        radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, contact=contact
+    )
 
 
 def pair(x):
-    return [PointLoad(side * x, (0.0, -1e3)) for side in (-1.0, 1.0)]
+    return [af.PointLoad(side * x, (0.0, -1e3)) for side in (-1.0, 1.0)]
 
 
 QUARTER = 1.40
@@ -42,20 +41,20 @@ KEYSTONE = abs(ring().joints[8].extrados[0]) * (1.0 - 1e-9)
 
 @pytest.mark.parametrize("friction", [0.44, 0.6])
 def test_no_limit_at_the_quarter_points_with_enough_friction(friction):
-    found = collapse_factor(ring(friction), live=pair(QUARTER))
+    found = af.collapse_factor(ring(friction), live=pair(QUARTER))
     assert (found.outcome, found.factor) == ("unbounded", np.inf)
 
 
 @pytest.mark.parametrize("friction", [0.30, 0.42, 0.43])
 def test_sliding_limits_loads_at_the_quarter_points_with_less(friction):
-    found = collapse_factor(ring(friction), live=pair(QUARTER))
+    found = af.collapse_factor(ring(friction), live=pair(QUARTER))
     assert found.outcome == "collapses"
     assert found.sliding
     assert not found.hinges
 
 
 def test_limit_near_the_crown_by_hinges_at_springings_crown_and_haunches():
-    found = collapse_factor(ring(), live=pair(KEYSTONE), friction=None)
+    found = af.collapse_factor(ring(), live=pair(KEYSTONE), friction=None)
     assert found.factor == pytest.approx(72.65, rel=1e-3)
     e = found.joints["eccentricity"].values
     np.testing.assert_allclose(e[[0, 4, 8, 9, 13, 17]], [0.5, -0.5, 0.5, 0.5, -0.5, 0.5], atol=1e-6)
@@ -68,7 +67,7 @@ def test_limit_near_the_crown_by_hand():
     At the crown hinge act the thrust H, the load P beside it and half the weight of the keystone.
     """
     structure = ring()
-    found = collapse_factor(structure, live=pair(KEYSTONE), friction=None)
+    found = af.collapse_factor(structure, live=pair(KEYSTONE), friction=None)
     crown = np.array(structure.joints[9].extrados)
     half_keystone = 20e3 * structure.blocks[9].area / 2.0
     rows, known = [], []
@@ -84,12 +83,14 @@ def test_limit_near_the_crown_by_hand():
 
 
 def test_friction_lowers_the_limit_near_the_crown():
-    rough, slippery = (collapse_factor(ring(mu), live=pair(KEYSTONE)).factor for mu in (0.6, 0.43))
+    rough, slippery = (
+        af.collapse_factor(ring(mu), live=pair(KEYSTONE)).factor for mu in (0.6, 0.43)
+    )
     assert 0.0 < slippery < rough < 72.65
 
 
 def test_one_load_at_the_quarter_point_makes_four_hinges():
-    found = collapse_factor(ring(), live=PointLoad(QUARTER, (0.0, -1e3)))
+    found = af.collapse_factor(ring(), live=af.PointLoad(QUARTER, (0.0, -1e3)))
     assert [side for _, side in found.hinges] == ["extrados", "intrados"] * 2
     assert not found.sliding
     assert found.factor == pytest.approx(62.19, rel=1e-3)

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.schemes import HHT, Rayleigh
+import archfem as af
 from archfem.dynamics.stepping.banded import Banded
 from archfem.dynamics.stepping.choice import SHORTEST, chosen, stepper_for
 from archfem.dynamics.stepping.elimination import Elimination
-from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.stepping.exact import Exact
 from archfem.dynamics.stepping.joint_law import Law
 from archfem.dynamics.stepping.loop import advance
 from archfem.dynamics.stepping.modal import Modal
@@ -20,42 +17,34 @@ from archfem.dynamics.stepping.newmark import follow, numbers_of
 from archfem.dynamics.stepping.open_points import release
 from archfem.dynamics.stepping.panels import backward, factorised, forward
 from archfem.dynamics.stepping.sparse import Sparse
-from archfem.dynamics.stepping.stepper import Stepper
-from archfem.dynamics.time_history import time_history
-from archfem.errors import InvalidInput
 from archfem.joints.points import Facets, JointPoints, Springs
-from archfem.masonry.actions import Settlement
-from archfem.masonry.shapes import Arch, Backfill, bridge
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
-from archfem.statics.newton import Newton
 
-TIGHT = Newton(tolerance=1e-13)
-STRONG = Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
+TIGHT = af.statics.Newton(tolerance=1e-13)
+STRONG = af.Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
 
 
 @pytest.fixture(scope="module")
 def filled():
     """One span under backfill."""
-    arch = Arch(span=5.8, embrace=159.0, thickness=0.58, voussoirs=9, name="main arch")
-    return bridge(arches=[arch], backfill=Backfill(cover=0.4))
+    arch = af.shapes.Arch(span=5.8, embrace=159.0, thickness=0.58, voussoirs=9, name="main arch")
+    return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4))
 
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize(
-    ("joints", "scheme"), [("closed", None), ("initial", HHT(-0.1)), ("none", HHT(-0.2))]
+    ("joints", "scheme"), [("closed", None), ("initial", af.HHT(-0.1)), ("none", af.HHT(-0.2))]
 )
 def test_history_is_that_of_snes(filled, rule, joints, scheme):
     """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too."""
-    model = build(filled, quadrature=rule, cells=(2, 2))
+    model = af.build(filled, quadrature=rule, cells=(2, 2))
     given = {
-        "start": dead_load(model, TIGHT),
-        "damping": Rayleigh(0.05, (4.0, 20.0), joints),
+        "start": af.dead_load(model, TIGHT),
+        "damping": af.Rayleigh(0.05, (4.0, 20.0), joints),
         "scheme": scheme,
         "newton": TIGHT,
     }
     slow, fast = (
-        time_history(model, STRONG, method=method, **given) for method in ("snes", "compliance")
+        af.time_history(model, STRONG, method=method, **given) for method in ("snes", "compliance")
     )
     assert fast.dataset.attrs["method"] == "compliance"
     assert fast.dataset.attrs["fallback_steps"] == 0
@@ -69,18 +58,20 @@ def test_history_is_that_of_snes(filled, rule, joints, scheme):
 
 
 def test_steps_that_do_not_settle_are_left_to_snes(filled):
-    model = build(filled, fidelity="rigid")
-    equation = Equation(model, STRONG, Rayleigh(0.05, (4.0, 20.0)))
+    model = af.build(filled, fidelity="rigid")
+    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (4.0, 20.0)))
 
     def impatient(series, results, ground, system):
         count = advance(series, results, ground, system)
         many = np.flatnonzero(results[1][:count] > 4)
         return int(many[0]) if len(many) else count
 
-    solves = Exact(equation, TIGHT)
-    exact = time_history(model, STRONG, method=Stepper(equation, exact=solves), newton=TIGHT)
-    stepper = Stepper(equation, Sparse.of(equation), exact=solves, advance=impatient)
-    run = time_history(model, STRONG, method=stepper, newton=TIGHT)
+    solves = af.dynamics.Exact(equation, TIGHT)
+    exact = af.time_history(
+        model, STRONG, method=af.dynamics.Stepper(equation, exact=solves), newton=TIGHT
+    )
+    stepper = af.dynamics.Stepper(equation, Sparse.of(equation), exact=solves, advance=impatient)
+    run = af.time_history(model, STRONG, method=stepper, newton=TIGHT)
     assert run.dataset.attrs["fallback_steps"] > 3
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
@@ -101,34 +92,36 @@ class Laborious(Sparse):
 
 
 def test_the_fastest_strategy_is_taken_and_remembered(ring):
-    model = build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
-    equation = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0)))
-    start, dt = equation.at_rest(dead_load(model).q), STRONG.duration / SHORTEST
+    model = af.build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)))
+    start, dt = equation.at_rest(af.dead_load(model).q), STRONG.duration / SHORTEST
     ways = (Laborious, Banded)
     assert isinstance(chosen(equation, start, dt, ways), Banded)
     assert Laborious.tries == 1
-    assert isinstance(chosen(Equation(model, STRONG, equation.damping), start, dt, ways), Banded)
+    assert isinstance(
+        chosen(af.dynamics.Equation(model, STRONG, equation.damping), start, dt, ways), Banded
+    )
     assert Laborious.tries == 1  # the motion may be another
     assert isinstance(chosen(equation, start, 0.99 * dt, ways), Banded)
     assert Laborious.tries == 2  # the step may not
 
 
 def test_short_runs_take_the_first_that_applies(ring):
-    model = build(ring, fidelity="rigid")
-    equation = Equation(model, STRONG)
-    start = equation.at_rest(dead_load(model).q)
+    model = af.build(ring, fidelity="rigid")
+    equation = af.dynamics.Equation(model, STRONG)
+    start = equation.at_rest(af.dead_load(model).q)
     assert isinstance(chosen(equation, start, 0.005, (Banded, Sparse)), Banded)
-    undamped = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0), "none"))
+    undamped = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0), "none"))
     assert isinstance(chosen(undamped, start, 0.005, (Modal, Sparse)), Sparse)
-    slow = Equation(build(ring, cells=(1, 1), fidelity="monolithic"), STRONG)
+    slow = af.dynamics.Equation(af.build(ring, cells=(1, 1), fidelity="monolithic"), STRONG)
     assert stepper_for("auto", slow, start, 0.005).name == "snes"
 
 
 def test_what_is_timed_does_not_settle(ring):
     """A strategy that gives up steps about the peak is not taken, whatever it costs."""
-    model = build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
-    equation = Equation(model, STRONG, Rayleigh(0.05, (8.0, 16.0)))
-    start, dt = equation.at_rest(dead_load(model).q), STRONG.duration / SHORTEST
+    model = af.build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)))
+    start, dt = equation.at_rest(af.dead_load(model).q), STRONG.duration / SHORTEST
 
     class Indefinite(Banded):
         def system(self, dt):
@@ -139,10 +132,10 @@ def test_what_is_timed_does_not_settle(ring):
 
 
 def test_supports_that_have_moved_are_refused(ring):
-    model = build(ring, fidelity="rigid")
-    moved = model.settled(Settlement(0, (0.0, -1e-3, 0.0)))
-    with pytest.raises(InvalidInput, match="supports have not moved"):
-        stepper_for("compliance", Equation(moved, STRONG), None, 0.005)
+    model = af.build(ring, fidelity="rigid")
+    moved = model.settled(af.Settlement(0, (0.0, -1e-3, 0.0)))
+    with pytest.raises(af.InvalidInput, match="supports have not moved"):
+        stepper_for("compliance", af.dynamics.Equation(moved, STRONG), None, 0.005)
 
 
 def laplacian(side):

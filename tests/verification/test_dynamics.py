@@ -8,39 +8,35 @@ import pytest
 from orders import observed_order
 from scipy.linalg import eigh
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.schemes import HHT, Newmark, Rayleigh
-from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.stepping.exact import Exact
-from archfem.errors import InvalidInput
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load, self_weight
+import archfem as af
 
-STILL = Motion(np.zeros(2), 1.0)
+STILL = af.Motion(np.zeros(2), 1.0)
 
 
 @pytest.fixture(scope="module")
 def model(ring):
-    return build(ring, fidelity="rigid")
+    return af.build(ring, fidelity="rigid")
 
 
 @pytest.fixture(scope="module")
 def dead(model):
-    return dead_load(model)
+    return af.dead_load(model)
 
 
 def swinging(model, dead, mode):
     """A start in one mode about the dead load, so small that no joint point changes status."""
     tangent = model.tangent(dead.q)
     squares, shapes = eigh(tangent.toarray(), model.mass.toarray())
-    equation = Equation(model, STILL)
+    equation = af.dynamics.Equation(model, STILL)
     state = equation.at_rest(dead.q)
     shape = 1e-9 * shapes[:, mode] / np.abs(shapes[:, mode]).max()
     return equation.released(replace(state, q=dead.q + shape)), shape, np.sqrt(squares[mode])
 
 
 @pytest.mark.parametrize(
-    ("scheme", "bound"), [(Newmark(), 2e-3), (HHT(-0.1), 4e-3)], ids=["newmark", "hht"]
+    ("scheme", "bound"),
+    [(af.dynamics.Newmark(), 2e-3), (af.HHT(-0.1), 4e-3)],
+    ids=["newmark", "hht"],
 )
 def test_second_order_in_time(model, dead, scheme, bound):
     """Free vibration in the lowest mode against the cosine, over five periods.
@@ -52,7 +48,7 @@ def test_second_order_in_time(model, dead, scheme, bound):
     end = 5.0 * 2.0 * np.pi / omega
     errors, sizes = [], np.array([20, 40, 80])
     for steps in 5 * sizes:
-        stepper = Exact(Equation(model, STILL, scheme=scheme))
+        stepper = af.dynamics.Exact(af.dynamics.Equation(model, STILL, scheme=scheme))
         *_, last = stepper.steps(start, end / steps, end)
         amplitude = shape @ (last.state.q - dead.q) / (shape @ shape)
         velocity = shape @ last.state.velocity / (shape @ shape) / omega
@@ -64,9 +60,9 @@ def test_second_order_in_time(model, dead, scheme, bound):
 
 def energies(model, start, dt, end):
     """Kinetic + potential energy less the work of weight, along a run."""
-    weight = self_weight(model)
+    weight = af.statics.self_weight(model)
     found = []
-    for step in Exact(Equation(model, STILL)).steps(start, dt, end):
+    for step in af.dynamics.Exact(af.dynamics.Equation(model, STILL)).steps(start, dt, end):
         state = step.state
         kinetic = 0.5 * state.velocity @ (model.mass @ state.velocity)
         found.append(kinetic + model.energy(state.q) - weight @ state.q)
@@ -77,7 +73,7 @@ def test_energy_is_conserved_while_joints_stay_closed(model, dead):
     start, _, omega = swinging(model, dead, 0)
     dt = 2.0 * np.pi / omega / 20.0
     energy = energies(model, start, dt, 50.0 * dt)
-    rest = model.energy(dead.q) - self_weight(model) @ dead.q
+    rest = model.energy(dead.q) - af.statics.self_weight(model) @ dead.q
     kinetic = 0.5 * omega**2 * (start.q - dead.q) @ (model.mass @ (start.q - dead.q))
     # Both are differences of energies near 10 J: their rounding is 1e-15 J.
     assert np.ptp(energy) < 1e-6 * kinetic + 1e-13
@@ -86,7 +82,7 @@ def test_energy_is_conserved_while_joints_stay_closed(model, dead):
 
 def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
     """A push that opens joints: what the weight and the springs give is kept, but for O(dt²)."""
-    equation = Equation(model, STILL)
+    equation = af.dynamics.Equation(model, STILL)
     push = equation.at_rest(dead.q)
     velocity = np.zeros(model.size)
     velocity[0::3] = 0.05
@@ -102,11 +98,11 @@ def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
 def test_work_of_the_ground_balances_energy(ring, model, dead):
     """Undamped, joints closed: energy gained = work of -M r a_g, to the trapezoidal rule."""
     times = np.arange(0.0, 0.5, 0.005)
-    motion = Motion(0.002 * np.sin(2.0 * np.pi * 4.0 * times), 0.005)
-    equation = Equation(model, motion)
+    motion = af.Motion(0.002 * np.sin(2.0 * np.pi * 4.0 * times), 0.005)
+    equation = af.dynamics.Equation(model, motion)
     start = equation.at_rest(dead.q)
-    weight = self_weight(model)
-    states = [start] + [s.state for s in Exact(equation).steps(start, 0.005, 0.49)]
+    weight = af.statics.self_weight(model)
+    states = [start] + [s.state for s in af.dynamics.Exact(equation).steps(start, 0.005, 0.49)]
     force = [-model.body @ motion.at(s.time)[0] for s in states]
     moved = [b.q - a.q for a, b in pairwise(states)]
     work = sum(0.5 * (a + b) @ d for a, b, d in zip(force[:-1], force[1:], moved, strict=True))
@@ -116,17 +112,19 @@ def test_work_of_the_ground_balances_energy(ring, model, dead):
 
 
 def test_at_rest_stays_at_rest(model, dead):
-    equation = Equation(model, STILL, Rayleigh(0.05, (8.0, 16.0)))
-    *_, last = Exact(equation).steps(equation.at_rest(dead.q), 0.005, 5.0)
+    equation = af.dynamics.Equation(model, STILL, af.Rayleigh(0.05, (8.0, 16.0)))
+    *_, last = af.dynamics.Exact(equation).steps(equation.at_rest(dead.q), 0.005, 5.0)
     assert np.abs(last.state.q - dead.q).max() < 1e-12
 
 
 def test_free_fall(stack):
     """Ground that drops faster than g: nothing holds the blocks, which fall with g."""
-    model = build(stack, fidelity="rigid")
-    down = Motion(np.zeros(201), 0.001, np.full(201, -3.0 * 9.81))
-    equation = Equation(model, down)
-    steps = list(Exact(equation).steps(equation.at_rest(dead_load(model).q), 0.001, 0.2))
+    model = af.build(stack, fidelity="rigid")
+    down = af.Motion(np.zeros(201), 0.001, np.full(201, -3.0 * 9.81))
+    equation = af.dynamics.Equation(model, down)
+    steps = list(
+        af.dynamics.Exact(equation).steps(equation.at_rest(af.dead_load(model).q), 0.001, 0.2)
+    )
     # Relative to the ground the blocks rise at 2 g once the compressed joints have let go.
     late = steps[100:]
     rate = np.diff([s.state.velocity[1] for s in late]) / 0.001
@@ -137,12 +135,12 @@ def test_free_fall(stack):
 @pytest.mark.parametrize("joints", ["closed", "initial", "none"])
 def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
     """Logarithmic decrement of a closed structure; "none" leaves rigid blocks the mass part."""
-    model = build(stack, fidelity="rigid")
-    dead = dead_load(model)
+    model = af.build(stack, fidelity="rigid")
+    dead = af.dead_load(model)
     start, shape, omega = swinging(model, dead, 0)
     low = omega / 2.0 / np.pi
-    damping = Rayleigh(0.05, (low, 4.0 * low), joints)
-    stepper = Exact(Equation(model, STILL, damping))
+    damping = af.Rayleigh(0.05, (low, 4.0 * low), joints)
+    stepper = af.dynamics.Exact(af.dynamics.Equation(model, STILL, damping))
     dt = 2.0 * np.pi / omega / 400.0
     steps = list(stepper.steps(start, dt, 400 * dt * 3.2))
     found = np.array([shape @ (s.state.q - dead.q) / (shape @ shape) for s in steps])
@@ -154,15 +152,15 @@ def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
 
 
 def test_closed_and_initial_damping_differ_only_where_joints_open(stack):
-    model = build(stack, fidelity="rigid")
-    dead = dead_load(model)
+    model = af.build(stack, fidelity="rigid")
+    dead = af.dead_load(model)
     for amplitude, same in ((0.2, True), (4.0, False)):
         times = np.arange(0.0, 0.3, 0.005)
-        motion = Motion(amplitude * np.sin(2.0 * np.pi * 5.0 * times), 0.005)
+        motion = af.Motion(amplitude * np.sin(2.0 * np.pi * 5.0 * times), 0.005)
         ends = []
         for joints in ("closed", "initial"):
-            equation = Equation(model, motion, Rayleigh(0.05, (5.0, 40.0), joints))
-            *_, last = Exact(equation).steps(equation.at_rest(dead.q), 0.005, 0.25)
+            equation = af.dynamics.Equation(model, motion, af.Rayleigh(0.05, (5.0, 40.0), joints))
+            *_, last = af.dynamics.Exact(equation).steps(equation.at_rest(dead.q), 0.005, 0.25)
             ends.append(last.state.q)
         near = np.abs(ends[0] - ends[1]).max() < 1e-9 * np.abs(ends[0]).max()
         assert near == same
@@ -171,13 +169,13 @@ def test_closed_and_initial_damping_differ_only_where_joints_open(stack):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Rayleigh(5.0, (8.0, 16.0)), "ratio 5.0"),
-        (lambda: Rayleigh(0.05, (16.0, 8.0)), "lower one first"),
-        (lambda: Rayleigh(0.05, (8.0, 16.0), "open"), "joints = 'open'"),
-        (lambda: Newmark(0.0, 0.5), "not stable"),
-        (lambda: HHT(0.2), "HHT alpha 0.2"),
+        (lambda: af.Rayleigh(5.0, (8.0, 16.0)), "ratio 5.0"),
+        (lambda: af.Rayleigh(0.05, (16.0, 8.0)), "lower one first"),
+        (lambda: af.Rayleigh(0.05, (8.0, 16.0), "open"), "joints = 'open'"),
+        (lambda: af.dynamics.Newmark(0.0, 0.5), "not stable"),
+        (lambda: af.HHT(0.2), "HHT alpha 0.2"),
     ],
 )
 def test_refusals(make, says):
-    with pytest.raises(InvalidInput, match=says):
+    with pytest.raises(af.InvalidInput, match=says):
         make()

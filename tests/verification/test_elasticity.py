@@ -8,28 +8,30 @@ from orders import observed_order
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from archfem.joints.quadrature import Quadrature
-from archfem.masonry.materials import STONE, STONE_TO_STONE
-from archfem.masonry.shapes import column
-from archfem.models.discretisation import Discretisation
+import archfem as af
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.forms import Forms, plane_stress
 from archfem.models.fem.mesh import mesh
 from archfem.models.fem.space import broken_space, joint_operator
 
-RULES = [Quadrature(), Quadrature("nodal"), Quadrature("gauss"), Quadrature("lobatto", 4)]
+RULES = [
+    af.joints.Quadrature(),
+    af.joints.Quadrature("nodal"),
+    af.joints.Quadrature("gauss"),
+    af.joints.Quadrature("lobatto", 4),
+]
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_patch(ring, cell, degree):
     """A linear displacement: constant stress, no force inside a block, none across a joint."""
-    space = broken_space(mesh(ring, Discretisation(cells=(2, 3), cell=cell)), degree)
-    forms = Forms(space, Quadrature())
+    space = broken_space(mesh(ring, af.models.Discretisation(cells=(2, 3), cell=cell)), degree)
+    forms = Forms(space, af.joints.Quadrature())
     gradient = np.array([[1.0, -2.0], [0.5, 3.0]]) * 1e-4
     u = (space.places @ gradient.T).ravel()
     strain = 0.5 * (gradient + gradient.T)
-    young, poisson = STONE.young, STONE.poisson
+    young, poisson = af.STONE.young, af.STONE.poisson
     plane = young * poisson / (1.0 - poisson**2)
     stress = young / (1.0 + poisson) * strain + plane * np.trace(strain) * np.eye(2)
     found = (forms.stress() @ u).reshape(-1, 3)
@@ -40,7 +42,7 @@ def test_patch(ring, cell, degree):
     inside = _inside(space)
     assert inside.any()
     assert np.abs(force[inside]).max() < 1e-9 * np.abs(force).max()
-    joints = joint_operator(space, Quadrature())
+    joints = joint_operator(space, af.joints.Quadrature())
     closing = joints.opening @ u[space.free]
     inner = ~np.isin(joints.points.joint, [0, len(ring.joints) - 1])
     assert np.abs(closing[inner]).max() < 1e-15
@@ -67,18 +69,18 @@ def _inside(space):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     """Bᵀ K_broken B = K_conforming, with B the Boolean matrix that ties nodes at one place."""
-    grid = mesh(stack, Discretisation(cells=(2, 2)))
+    grid = mesh(stack, af.models.Discretisation(cells=(2, 2)))
     space = broken_space(grid, degree)
     places, number = np.unique(space.places.round(9), axis=0, return_inverse=True)
     tie = sparse.csr_matrix((np.ones(len(number)), (np.arange(len(number)), number.ravel())))
     tied = sparse.kron(tie, sparse.identity(2)).tocsr()
-    broken = Forms(space, Quadrature()).stiffness()
+    broken = Forms(space, af.joints.Quadrature()).stiffness()
 
     whole = _fenicsx.space(grid.grid, "CG", degree, 2)
     u, v = ufl.TrialFunction(whole), ufl.TestFunction(whole)
-    form = ufl.inner(plane_stress(u, STONE.young, STONE.poisson), ufl.sym(ufl.grad(v))) * ufl.dx(
-        domain=grid.grid
-    )
+    form = ufl.inner(
+        plane_stress(u, af.STONE.young, af.STONE.poisson), ufl.sym(ufl.grad(v))
+    ) * ufl.dx(domain=grid.grid)
     conforming = _fenicsx.assembled_matrix(fem.form(form))
     at = whole.tabulate_dof_coordinates()[:, :2].round(9)
     order = [int(np.flatnonzero(np.all(places == point, axis=1))[0]) for point in at]
@@ -95,7 +97,7 @@ def test_operator_equals_forms(ring, rule, degree, cell):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
     from archfem.models.full import full
 
-    space = broken_space(mesh(ring, Discretisation(cells=(3, 2), cell=cell)), degree)
+    space = broken_space(mesh(ring, af.models.Discretisation(cells=(3, 2), cell=cell)), degree)
     forms, model = Forms(space, rule), full(space, rule)
     random = np.random.default_rng(7)
     q = 1e-4 * random.standard_normal(model.size)  # about half of the points open
@@ -118,9 +120,9 @@ def exact(x, z, sin, cos):
     Below, u = (α sin x (1 + z)², -β (2 + cos x) z). Above, a field is added whose stress vanishes
     on the joint and which there equals (σ_xy / k_s, σ_yy / k_n). Written for NumPy and for UFL.
     """
-    young, poisson = STONE.young, STONE.poisson
-    a0 = young / (1.0 + poisson) * ALPHA / STONE_TO_STONE.shear_stiffness
-    c0 = young / (1.0 - poisson**2) / STONE_TO_STONE.normal_stiffness
+    young, poisson = af.STONE.young, af.STONE.poisson
+    a0 = young / (1.0 + poisson) * ALPHA / af.masonry.STONE_TO_STONE.shear_stiffness
+    c0 = young / (1.0 - poisson**2) / af.masonry.STONE_TO_STONE.normal_stiffness
     b = c0 * (-BETA * (2.0 + cos(x)) + poisson * ALPHA * cos(x))
     db = c0 * (BETA - poisson * ALPHA) * sin(x)
     below = (ALPHA * sin(x) * (1.0 + z) ** 2, -BETA * (2.0 + cos(x)) * z)
@@ -131,7 +133,8 @@ def exact(x, z, sin, cos):
 def jump_error(cells, degree, cell):
     """L2 error of the displacement on a mesh of so many cells a side, relative to its size."""
     grid = mesh(
-        column(breadth=1.0, heights=[1.0, 1.0]), Discretisation(cells=(cells, cells), cell=cell)
+        af.column(breadth=1.0, heights=[1.0, 1.0]),
+        af.models.Discretisation(cells=(cells, cells), cell=cell),
     )
     space = broken_space(grid, degree)
     x = ufl.SpatialCoordinate(grid.grid)
@@ -141,13 +144,15 @@ def jump_error(cells, degree, cell):
     parts = [dx(k, metadata={"quadrature_degree": 8}) for k in (1, 2)]
 
     v = ufl.TestFunction(space.functions)
-    forces = [ufl.inner(-ufl.div(plane_stress(u, STONE.young, STONE.poisson)), v) for u in fields]
+    forces = [
+        ufl.inner(-ufl.div(plane_stress(u, af.STONE.young, af.STONE.poisson)), v) for u in fields
+    ]
     load = _fenicsx.assembled_vector(
         fem.form(sum(force * part for force, part in zip(forces, parts, strict=True)))
     )
     pressed = np.zeros((len(space.places), 2))
     pressed[:, 1] = -1e-3 * space.owner  # the higher a block the lower it sits: joints are closed
-    tangent = Forms(space, Quadrature()).tangent(pressed.ravel())
+    tangent = Forms(space, af.joints.Quadrature()).tangent(pressed.ravel())
 
     px, py = space.places.T
     below, above = exact(px, py - 1.0, np.sin, np.cos)

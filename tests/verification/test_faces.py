@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.schemes import Rayleigh
-from archfem.dynamics.time_history import time_history
-from archfem.masonry.assembly import assembled
-from archfem.masonry.block import Block
-from archfem.masonry.materials import STONE, STONE_TO_STONE
-from archfem.masonry.shapes import Arch, Backfill, bridge
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
-from archfem.statics.newton import Newton
+import archfem as af
 
-TIGHT = Newton(tolerance=1e-13)
+TIGHT = af.statics.Newton(tolerance=1e-13)
 SOIL = {"backfill": "full"}
 STONES = 13
 
@@ -22,8 +13,8 @@ STONES = 13
 @pytest.fixture(scope="module")
 def arch():
     """A ring between fixed abutments, under fill that ends in wedges on the springings."""
-    ring = Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=STONES)
-    return bridge(arches=[ring], backfill=Backfill(cover=0.3))
+    ring = af.shapes.Arch(span=5.0, embrace=160.0, thickness=0.5, voussoirs=STONES)
+    return af.bridge(arches=[ring], backfill=af.shapes.Backfill(cover=0.3))
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +22,7 @@ def models(arch):
     """The ring's stones by their faces and by their joint nodes, on one mesh."""
     given = {"cells": (4, 4), "quadrature": "exact"}
     return {
-        rung: build(arch, fidelity={**SOIL, "rest": rung}, **given)
+        rung: af.build(arch, fidelity={**SOIL, "rest": rung}, **given)
         for rung in ("faces", "condensed", "full")
     }
 
@@ -59,12 +50,14 @@ def test_the_basis_holds_rigid_motions(models):
 
 def test_dead_load_and_shaking_against_all_joint_nodes(arch, models):
     """Bounds are twice the errors in e that were found, 0.0007 and 0.0011, where e reaches 0.47."""
-    motion = Motion.synthetic(duration=4.0, pga=3.0, seed=5)
+    motion = af.Motion.synthetic(duration=4.0, pga=3.0, seed=5)
     dead, shaken = {}, {}
     for rung in ("faces", "condensed"):
-        state = dead_load(models[rung], TIGHT)
+        state = af.dead_load(models[rung], TIGHT)
         dead[rung] = state.joints["eccentricity"].values
-        run = time_history(models[rung], motion, damping=Rayleigh(0.05, (3.0, 12.0)), start=state)
+        run = af.time_history(
+            models[rung], motion, damping=af.Rayleigh(0.05, (3.0, 12.0)), start=state
+        )
         shaken[rung] = abs(run.joints["eccentricity"]).max("time").values
     assert np.abs(shaken["condensed"]).max() > 0.4
     assert 1e-6 < np.abs(dead["faces"] - dead["condensed"]).max() < 0.0014
@@ -77,10 +70,12 @@ def test_a_long_bed_bends(length, bends):
 
     def box(low, high, name):
         outline = ((0.0, high), (0.0, low), (length, low), (length, high))
-        return Block(outline, STONE, name, fixed=low < 0.0, corners=(0, 1, 2, 3))
+        return af.Block(outline, af.STONE, name, fixed=low < 0.0, corners=(0, 1, 2, 3))
 
     courses = [box(-0.3, 0.0, "ground"), box(0.0, 0.4, "low"), box(0.4, 0.8, "high")]
-    wall = assembled(courses, STONE_TO_STONE)
-    sizes = {rung: build(wall, fidelity=rung, cells=(8, 4)).size for rung in ("faces", "condensed")}
+    wall = af.masonry.assembled(courses, af.masonry.STONE_TO_STONE)
+    sizes = {
+        rung: af.build(wall, fidelity=rung, cells=(8, 4)).size for rung in ("faces", "condensed")
+    }
     assert sizes["condensed"] > 50
     assert sizes["faces"] == (sizes["condensed"] if bends else 9)

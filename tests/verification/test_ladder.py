@@ -5,42 +5,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.schemes import HHT, Rayleigh
-from archfem.dynamics.time_history import time_history
-from archfem.errors import InvalidInput
+import archfem as af
 from archfem.joints.points import Facets, JointPoints, Springs
-from archfem.masonry.materials import BACKFILL
-from archfem.masonry.shapes import circular_arch, column
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
-from archfem.statics.newton import Newton
 
-MOTION = Motion.synthetic(duration=4.0, pga=2.5, seed=5)
-TIGHT = Newton(tolerance=1e-13)
+MOTION = af.Motion.synthetic(duration=4.0, pga=2.5, seed=5)
+TIGHT = af.statics.Newton(tolerance=1e-13)
 
 
 def envelope(model, **given):
     """Largest |e| of every joint over a run."""
-    given = {"damping": Rayleigh(0.05, (8.0, 16.0)), **given}
-    run = time_history(model, MOTION, **given)
+    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), **given}
+    run = af.time_history(model, MOTION, **given)
     return abs(run.joints["eccentricity"]).max("time").values
 
 
 @pytest.fixture(scope="module")
 def full(ring):
-    return build(ring, cells=(4, 4))
+    return af.build(ring, cells=(4, 4))
 
 
 def test_sizes(ring):
-    sizes = {rung: build(ring, fidelity=rung).size for rung in ("rigid", "faces", "condensed")}
+    sizes = {rung: af.build(ring, fidelity=rung).size for rung in ("rigid", "faces", "condensed")}
     assert sizes == {"rigid": 51, "faces": 102, "condensed": 340}
 
 
 def test_static_condensation_is_exact_for_statics(ring, full):
     """Guyan: joint displacements under any static load are those of the whole model."""
-    reference = dead_load(full, TIGHT).joints
-    found = dead_load(build(ring, fidelity="condensed"), TIGHT).joints
+    reference = af.dead_load(full, TIGHT).joints
+    found = af.dead_load(af.build(ring, fidelity="condensed"), TIGHT).joints
     for key in ("N", "V", "M"):
         scale = float(abs(reference[key]).max())
         assert np.abs(found[key] - reference[key]).max() < 1e-9 * scale
@@ -49,9 +41,9 @@ def test_static_condensation_is_exact_for_statics(ring, full):
 @pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
 def test_monolithic_is_full(ring, rule):
     """UFL forms assembled at each iteration, with joint tractions integrated as forms too."""
-    full = build(ring, cells=(2, 2), quadrature=rule)
-    slow = build(ring, cells=(2, 2), quadrature=rule, fidelity="monolithic")
-    dead = [dead_load(model, TIGHT) for model in (full, slow)]
+    full = af.build(ring, cells=(2, 2), quadrature=rule)
+    slow = af.build(ring, cells=(2, 2), quadrature=rule, fidelity="monolithic")
+    dead = [af.dead_load(model, TIGHT) for model in (full, slow)]
     assert dead[0].q == pytest.approx(dead[1].q, abs=1e-9 * np.abs(dead[1].q).max())
     for key in ("N", "V", "M"):
         scale = float(abs(dead[0].joints[key]).max())
@@ -62,8 +54,8 @@ def test_monolithic_is_full(ring, rule):
 def test_monolithic_history_is_that_of_full(ring):
     short = MOTION.cut(1.0, 1.2)
     runs = [
-        time_history(
-            build(ring, cells=(2, 2), fidelity=rung), short, newton=TIGHT, method="snes"
+        af.time_history(
+            af.build(ring, cells=(2, 2), fidelity=rung), short, newton=TIGHT, method="snes"
         ).joints["M"]
         for rung in ("full", "monolithic")
     ]
@@ -74,7 +66,7 @@ def test_errors_fall_up_the_ladder(ring, full):
     """Against all nodes on the same mesh; bounds about twice what was found on this motion."""
     reference = envelope(full)
     off = {
-        rung: np.abs(envelope(build(ring, fidelity=rung)) - reference).max()
+        rung: np.abs(envelope(af.build(ring, fidelity=rung)) - reference).max()
         for rung in ("rigid", "faces", "condensed")
     }
     assert off["condensed"] < 2e-5 < off["faces"] < off["rigid"] < 0.02
@@ -85,19 +77,19 @@ def test_errors_fall_up_the_ladder(ring, full):
 @pytest.mark.parametrize("rung", ["rigid", "faces", "condensed"])
 def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule):
     """To 1e-8 of the largest, joints opening and closing, either damping, Newmark and HHT."""
-    model = build(ring, fidelity=rung, quadrature=rule, cells=(2, 2))
-    dead = dead_load(model, TIGHT)
+    model = af.build(ring, fidelity=rung, quadrature=rule, cells=(2, 2))
+    dead = af.dead_load(model, TIGHT)
     short = MOTION.cut(0.8, 2.3)
-    for joints, scheme in (("closed", None), ("initial", HHT(-0.1))):
+    for joints, scheme in (("closed", None), ("initial", af.HHT(-0.1))):
         given = {
             "start": dead,
-            "damping": Rayleigh(0.05, (8.0, 16.0), joints),
+            "damping": af.Rayleigh(0.05, (8.0, 16.0), joints),
             "scheme": scheme,
             "newton": TIGHT,
         }
-        slow = time_history(model, short, method="snes", **given)
+        slow = af.time_history(model, short, method="snes", **given)
         for method in ("contact", "chain", "compliance"):
-            fast = time_history(model, short, method=method, **given)
+            fast = af.time_history(model, short, method=method, **given)
             assert fast.dataset.attrs["method"] == method
             assert fast.dataset.attrs["fallback_steps"] == 0
             assert fast.dataset["iterations"].max() > 1  # points have opened
@@ -112,47 +104,47 @@ def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule):
 @pytest.mark.parametrize("rung", ["faces", "condensed", "full"])
 def test_a_joint_at_the_crown(stones, rung):
     """Its normal lies along x: openings there have exact zeros, which patterns must survive."""
-    ring = circular_arch(radius=2.95, thickness=0.8, embrace=150.0, voussoirs=stones)
-    found = dead_load(build(ring, fidelity=rung, cells=(2, 2), quadrature="exact")).joints
+    ring = af.circular_arch(radius=2.95, thickness=0.8, embrace=150.0, voussoirs=stones)
+    found = af.dead_load(af.build(ring, fidelity=rung, cells=(2, 2), quadrature="exact")).joints
     e = found["eccentricity"].values
     assert e == pytest.approx(e[::-1], abs=1e-6)
 
 
 def test_contact_stepper_refuses_what_does_not_fall_into_modes(ring, full):
-    with pytest.raises(InvalidInput, match="use method='snes'"):
-        time_history(full, MOTION, damping=Rayleigh(0.05, (8, 16), "none"), method="contact")
-    slow = build(ring, cells=(1, 1), fidelity="monolithic")
-    with pytest.raises(InvalidInput, match="bandwidth up to"):
-        time_history(slow, MOTION, method="chain")
-    with pytest.raises(InvalidInput, match="method 'fast' is not known"):
-        time_history(full, MOTION, method="fast")
+    with pytest.raises(af.InvalidInput, match="use method='snes'"):
+        af.time_history(full, MOTION, damping=af.Rayleigh(0.05, (8, 16), "none"), method="contact")
+    slow = af.build(ring, cells=(1, 1), fidelity="monolithic")
+    with pytest.raises(af.InvalidInput, match="bandwidth up to"):
+        af.time_history(slow, MOTION, method="chain")
+    with pytest.raises(af.InvalidInput, match="method 'fast' is not known"):
+        af.time_history(full, MOTION, method="fast")
 
 
 @pytest.mark.parametrize("method", ["chain", "compliance"])
 def test_damping_on_the_blocks_alone(ring, method):
-    model = build(ring, fidelity="faces", cells=(2, 2), quadrature="nodal")
-    given = {"damping": Rayleigh(0.05, (8.0, 16.0), "none"), "newton": TIGHT}
+    model = af.build(ring, fidelity="faces", cells=(2, 2), quadrature="nodal")
+    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0), "none"), "newton": TIGHT}
     short = MOTION.cut(0.8, 1.6)
-    runs = [time_history(model, short, method=m, **given).joints["M"] for m in ("snes", method)]
+    runs = [af.time_history(model, short, method=m, **given).joints["M"] for m in ("snes", method)]
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
 def test_rungs_may_differ_from_block_to_block(ring, full):
-    mixed = build(ring, fidelity={"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"})
+    mixed = af.build(ring, fidelity={"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"})
     assert mixed.size == 15 * 6 + 50 + 3
     off = np.abs(envelope(mixed) - envelope(full)).max()
     assert off < 0.003
-    with pytest.raises(InvalidInput, match="no blocks or parts"):
-        build(ring, fidelity={"voussoir 99": "full"})
-    with pytest.raises(InvalidInput, match=r"rungs \['soft'\] are not known"):
-        build(ring, fidelity={"rest": "soft"})
+    with pytest.raises(af.InvalidInput, match="no blocks or parts"):
+        af.build(ring, fidelity={"voussoir 99": "full"})
+    with pytest.raises(af.InvalidInput, match=r"rungs \['soft'\] are not known"):
+        af.build(ring, fidelity={"rest": "soft"})
 
 
 def test_inner_fields_are_recovered(ring, full):
     """Stress of the condensed model is that of all nodes, but for the weight inside a block."""
-    condensed = build(ring, fidelity="condensed")
-    whole = full.cells.stress @ dead_load(full).q
-    found = condensed.cells.stress @ dead_load(condensed).q
+    condensed = af.build(ring, fidelity="condensed")
+    whole = full.cells.stress @ af.dead_load(full).q
+    found = condensed.cells.stress @ af.dead_load(condensed).q
     weight = 20e3 * 0.55  # the stress that a stone's own weight makes in it [Pa]
     assert np.abs(found - whole).max() < weight
     assert np.abs(whole).max() > 10.0 * weight
@@ -160,18 +152,18 @@ def test_inner_fields_are_recovered(ring, full):
 
 def test_rigid_and_condensed_are_wrong_where_a_block_is_soft(caplog):
     """A stone on a metre of backfill: rigid misses it all, condensation its inner modes."""
-    stack = column(breadth=1.0, heights=[1.0, 0.5])
-    soft = replace(stack.blocks[1], material=BACKFILL)
+    stack = af.column(breadth=1.0, heights=[1.0, 0.5])
+    soft = replace(stack.blocks[1], material=af.masonry.BACKFILL)
     stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
-    reference = envelope(build(stack, fidelity="full"))
+    reference = envelope(af.build(stack, fidelity="full"))
     off = {}
     for rung in ("rigid", "condensed"):
-        off[rung] = np.abs(envelope(build(stack, fidelity=rung)) - reference).max()
+        off[rung] = np.abs(envelope(af.build(stack, fidelity=rung)) - reference).max()
         assert "block 'block 1'" in caplog.text
         caplog.clear()
     assert off["rigid"] > 0.01
     assert off["condensed"] > 0.002
-    mixed = build(stack, fidelity={"block 1": "full", "rest": "faces"})
+    mixed = af.build(stack, fidelity={"block 1": "full", "rest": "faces"})
     assert np.abs(envelope(mixed) - reference).max() < 0.002
     assert not caplog.text
 
@@ -200,11 +192,13 @@ def test_joint_forces_integrate_the_traction(rule):
 
 def test_exact_facets_are_the_limit_of_quadrature(ring):
     """On one mesh, rules with more and more points approach the closed form."""
-    exact = dead_load(build(ring, fidelity="rigid", quadrature="exact")).joints["eccentricity"]
+    exact = af.dead_load(af.build(ring, fidelity="rigid", quadrature="exact")).joints[
+        "eccentricity"
+    ]
     off = [
         float(
             abs(
-                dead_load(build(ring, fidelity="rigid", points=n, cells=(8, 1))).joints[
+                af.dead_load(af.build(ring, fidelity="rigid", points=n, cells=(8, 1))).joints[
                     "eccentricity"
                 ]
                 - exact
@@ -218,5 +212,5 @@ def test_exact_facets_are_the_limit_of_quadrature(ring):
 
 def test_exact_quadrature_needs_linear_facets(ring):
     for given in ({"degree": 2}, {"fidelity": "monolithic"}):
-        with pytest.raises(InvalidInput, match="linear along a facet"):
-            build(ring, quadrature="exact", **given)
+        with pytest.raises(af.InvalidInput, match="linear along a facet"):
+            af.build(ring, quadrature="exact", **given)

@@ -3,20 +3,13 @@
 import numpy as np
 import pytest
 
-from archfem.dynamics.ladder import build
-from archfem.dynamics.time_history import time_history
-from archfem.errors import InvalidInput
+import archfem as af
 from archfem.joints.rigid import gaps_of
-from archfem.masonry.actions import Settlement
 from archfem.masonry.rigid_motion import motion_of
-from archfem.masonry.shapes import circular_arch, column
-from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
-from archfem.statics.newton import Newton
 
-RING = circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
-COUPLE = circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)
-TIGHT = Newton(tolerance=1e-13)
+RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+COUPLE = af.circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)
+TIGHT = af.statics.Newton(tolerance=1e-13)
 RUNGS = ("rigid", "faces", "condensed", "full", "monolithic")
 
 
@@ -43,12 +36,12 @@ def force_on_higher(joints):
 @pytest.mark.parametrize("rung", RUNGS)
 def test_supports_that_move_together_change_nothing(rung):
     """The ring goes with them: a rigid motion of everything, by 1 cm and 1 mrad."""
-    model = build(RING, fidelity=rung, cells=(2, 2))
-    reference = dead_load(model, TIGHT)
+    model = af.build(RING, fidelity=rung, cells=(2, 2))
+    reference = af.dead_load(model, TIGHT)
     moved = model
     for block in (0, len(RING.blocks) - 1):
-        moved = moved.settled(Settlement(block, about(RING, block, 1e-3, (0.01, -0.01))))
-    found = dead_load(moved, TIGHT)
+        moved = moved.settled(af.Settlement(block, about(RING, block, 1e-3, (0.01, -0.01))))
+    found = af.dead_load(moved, TIGHT)
     assert differ(found.joints, reference.joints) < 1e-5  # round-off of 1 cm against µm
     gap = model.cells.displacement(found.q - reference.q)
     plane = motion_of(model.cells.places, np.zeros(2)) @ [0.01, -0.01, 1e-3]
@@ -57,20 +50,20 @@ def test_supports_that_move_together_change_nothing(rung):
 
 @pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss", "exact"])
 def test_condensation_and_modes_follow_as_all_nodes_do(rule):
-    spread = Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
+    spread = af.Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
     built = {
-        rung: build(RING, fidelity=rung, cells=(2, 2), quadrature=rule).settled(spread)
+        rung: af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule).settled(spread)
         for rung in ("condensed", "full")
     }
-    found = {rung: dead_load(model, TIGHT).joints for rung, model in built.items()}
+    found = {rung: af.dead_load(model, TIGHT).joints for rung, model in built.items()}
     assert differ(found["condensed"], found["full"]) < 1e-7
 
 
 def test_nodes_of_the_support_may_move_instead_of_joints():
     """The monolithic model moves the abutment's own nodes, and knows nothing of offsets."""
-    spread = Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
+    spread = af.Settlement("left abutment", (-2e-4, -1e-4, 1e-5))
     full, slow = (
-        dead_load(build(RING, fidelity=rung, cells=(2, 2)).settled(spread), TIGHT).joints
+        af.dead_load(af.build(RING, fidelity=rung, cells=(2, 2)).settled(spread), TIGHT).joints
         for rung in ("full", "monolithic")
     )
     assert differ(full, slow) < 1e-8
@@ -81,10 +74,11 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
 
     The crown is sheared and not turned, and the springings carry the same weight between them.
     """
-    model = build(COUPLE, fidelity="rigid")
-    before = dead_load(model, TIGHT).joints[["N", "V", "M"]]
+    model = af.build(COUPLE, fidelity="rigid")
+    before = af.dead_load(model, TIGHT).joints[["N", "V", "M"]]
     sunk, risen = (
-        dead_load(model.settled(Settlement(3, (0.0, by, 0.0))), TIGHT).joints[[*before]] - before
+        af.dead_load(model.settled(af.Settlement(3, (0.0, by, 0.0))), TIGHT).joints[[*before]]
+        - before
         for by in (-1e-6, 1e-6)
     )
     assert float(sunk["V"][1]) < -1.0  # the higher block, on the right, hangs on its neighbour
@@ -98,7 +92,9 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
 
 def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges():
     """Moments about the hinges alone give the thrust between the blocks, whatever the stiffness."""
-    joints = dead_load(build(COUPLE, fidelity="rigid").settled(Settlement(3, (0, -0.2, 0)))).joints
+    joints = af.dead_load(
+        af.build(COUPLE, fidelity="rigid").settled(af.Settlement(3, (0, -0.2, 0)))
+    ).joints
     assert joints["eccentricity"].values == pytest.approx([-0.5, -0.5, 0.5], abs=1e-6)
     left, crown, right = (
         np.array(joint.extrados if e > 0.0 else joint.intrados)
@@ -115,20 +111,22 @@ def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges():
 
 
 def test_the_gap_of_a_support_is_its_motion_across_the_joint():
-    base = column(breadth=1.0, heights=[1.0])
-    model = build(base, fidelity="rigid")
+    base = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(base, fidelity="rigid")
     gaps = gaps_of(base, model.operator.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(gaps, [[0.02] * 9 if k == 0 else [0.0] * 9 for k in range(2)])
 
 
 def test_a_settled_ring_is_shaken_by_solving_each_step(ring):
-    model = build(RING, fidelity="rigid").settled(Settlement("left abutment", (-1e-3, 0.0, 0.0)))
-    start = dead_load(model)
-    run = time_history(model, Motion.synthetic(duration=0.3, pga=1e-6, seed=1), start=start)
+    model = af.build(RING, fidelity="rigid").settled(
+        af.Settlement("left abutment", (-1e-3, 0.0, 0.0))
+    )
+    start = af.dead_load(model)
+    run = af.time_history(model, af.Motion.synthetic(duration=0.3, pga=1e-6, seed=1), start=start)
     assert run.dataset.attrs["method"] == "snes"
     np.testing.assert_allclose(run.joints["N"][-1], start.joints["N"], rtol=1e-4)
 
 
 def test_only_supports_settle():
-    with pytest.raises(InvalidInput, match="cannot settle"):
-        build(RING, fidelity="rigid").settled(Settlement(3, (0.0, 0.1, 0.0)))
+    with pytest.raises(af.InvalidInput, match="cannot settle"):
+        af.build(RING, fidelity="rigid").settled(af.Settlement(3, (0.0, 0.1, 0.0)))
