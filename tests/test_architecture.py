@@ -194,8 +194,10 @@ PROMISED = [
 """What scripts were told to import before there were rooms."""
 
 
-@pytest.mark.parametrize("name", PROMISED)
-def test_what_scripts_import_is_still_found(name):
-    module, _, thing = name.rpartition(".")
-    script = f"from {module} import {thing}; assert {thing}.__name__ == {thing!r}"
-    subprocess.run([sys.executable, "-c", script], check=True)
+def test_what_scripts_import_is_still_found():
+    """In a process of its own, where nothing has been loaded under another name before."""
+    lines = [
+        f"from {module} import {thing}; assert {thing}.__name__ == {thing!r}"
+        for module, _, thing in (name.rpartition(".") for name in PROMISED)
+    ]
+    subprocess.run([sys.executable, "-c", "\n".join(lines)], check=True)
