@@ -66,7 +66,7 @@ def run(small, *changes):
     return af.cases.main(["run", str(small), "--out", str(small.parent / "out"), *given])
 
 
-def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, capsys):
+def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undrawn, capsys):
     out = small.parent / "out"
     assert run(small) == 0
     made = {path.name for path in out.iterdir()}
@@ -105,7 +105,7 @@ def told(small, shake):
     tell(case, af.cases.carried_out(case, out, shake=shake), out)
 
 
-def test_an_interrupted_suite_goes_on_with_what_is_left(small, capsys):
+def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     def broken_off(case, motion, *given):
         history = af.cases.shaken(case, motion, *given)
         if motion.name == "second":
@@ -121,7 +121,7 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, capsys):
     assert "second: finished before" not in said
 
 
-def test_a_pair_that_fails_does_not_end_the_suite(small, capsys):
+def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys):
     def failing(case, motion, *given):
         history = af.cases.shaken(case, motion, *given)
         if motion.name == "first":

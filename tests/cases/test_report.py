@@ -13,7 +13,7 @@ def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
     assert [path.name for path in files] == ["suite.txt", "envelope.png", "envelope_2.png"]
 
 
-def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, tmp_path):
+def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, undrawn, tmp_path):
     rest, _, run = af.cases.carried_out(af.Case.read(small), tmp_path, pairs=["first"])
     assert not results.is_written(run)
     files = results.write_run(run, rest, "a table", run.path.parent)
