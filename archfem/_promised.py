@@ -20,11 +20,18 @@ PLACES = {
     "push": "statics.pushover",
     "shapes": "masonry.shapes",
     "strength": "statics.strength",
+    "view.capacity": "view",
     "view.compare": "view",
     "view.plots": "view",
+    "view.scenes": "view",
     "view.tradeoff": "view",
 }
 """Where the names of each such module are now."""
+
+RENAMED = {
+    "view.capacity": {"capacity_figure": "draw_capacity", "collapse_figure": "draw_collapse"},
+}
+"""Names that such a module had, by which something is not known any more."""
 
 
 class _Finder:
@@ -45,9 +52,13 @@ class _Finder:
 
     @staticmethod
     def exec_module(module: ModuleType) -> None:
-        """Put the module of today in the place of the empty one."""
-        name = module.__name__
-        sys.modules[name] = import_module(f"archfem.{PLACES[name.removeprefix('archfem.')]}")
+        """Put the module of today in the place of the empty one, or names of it under old ones."""
+        name = module.__name__.removeprefix("archfem.")
+        place = import_module(f"archfem.{PLACES[name]}")
+        if name in RENAMED:
+            vars(module).update({old: getattr(place, new) for old, new in RENAMED[name].items()})
+        else:
+            sys.modules[module.__name__] = place
 
 
 def keep() -> None:

@@ -185,10 +185,12 @@ PROMISED = [
     "archfem.statics.self_weight",
     "archfem.strength.strength_use",
     "archfem.strength.use_table",
+    "archfem.view.capacity.collapse_figure",
     "archfem.view.compare.draw_instants",
     "archfem.view.envelopes.draw_envelope",
     "archfem.view.plots.draw_structure",
     "archfem.view.pushover.draw_pushover",
+    "archfem.view.scenes.picture",
     "archfem.view.tradeoff.draw_accuracy",
 ]
 """What scripts were told to import before there were rooms."""
@@ -197,7 +199,7 @@ PROMISED = [
 def test_what_scripts_import_is_still_found():
     """In a process of its own, where nothing has been loaded under another name before."""
     lines = [
-        f"from {module} import {thing}; assert {thing}.__name__ == {thing!r}"
+        f"from {module} import {thing}; assert {thing}.__module__.startswith('archfem.')"
         for module, _, thing in (name.rpartition(".") for name in PROMISED)
     ]
     subprocess.run([sys.executable, "-c", "\n".join(lines)], check=True)
