@@ -12,7 +12,7 @@ import xarray as xr
 from archfem.cases.case import Case
 from archfem.dynamics.damping import effective_range
 from archfem.dynamics.events import CountedMechanism
-from archfem.dynamics.history import Ending, History
+from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveRayleigh, Rayleigh
 from archfem.dynamics.time_history import Record, time_history
@@ -287,9 +287,7 @@ def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake
     try:
         history = shake(case, motion, rest.dead, rest.damping[0])
     except DidNotConverge as error:
-        if error.history is None:
-            raise
-        history, failure = error.history, error
+        history, failure = history_of(error), error
     seconds = perf_counter() - start
     if path is not None:
         history.save(path)
