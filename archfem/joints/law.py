@@ -1,13 +1,22 @@
-"""Tractions of a dry joint from its opening and slip.
+"""Tractions of a dry joint from its opening and slip, at an instant and over a step.
 
 Written with arithmetic and `abs` alone, so that one definition serves NumPy arrays and UFL
 expressions. Openings are positive where the joint is open, tractions where they pull.
+
+Over a step opening and slip go straight from their start to their end, and tractions are averaged
+on the way: the mean of a force along its path is what makes the work of a step the change of the
+stored energy, whatever opens or closes on the way (the averaged vector field of Quispel and
+McLaren, J. Phys. A 41 (2008) 045206). Friction is a stop in series with the elastic shear, whose
+limit over a step is that of its mean normal traction.
 """
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+NONE = 1e-300
+"""Added to a denominator that may be zero, where the quotient then is zero as well."""
 
 
 def negative(x: Any) -> Any:
@@ -32,16 +41,63 @@ def normal_traction(opening: Any, stiffness: Any) -> Any:
 
 
 def shear_traction(slip: Any, stiffness: Any) -> Any:
-    """Return the traction along a joint, t_s = k_s s [Pa].
-
-    Elastic whether the joint is open or closed, as in Demirel and Aldemir (2021): a spring that
-    acts only while the joint is closed is a discontinuous law, on which Newton's method fails.
+    """Return the elastic traction along a joint, t_s = k_s s [Pa].
 
     Args:
-        slip: relative displacement s along the joint [m].
+        slip: relative displacement s along the joint, less what it has slid for good [m].
         stiffness: k_s [Pa/m].
     """
     return stiffness * slip
+
+
+def held(trial: Any, limit: Any) -> Any:
+    """Return what friction holds of an elastic traction along a joint [Pa].
+
+    Args:
+        trial: the traction if the joint did not slide [Pa].
+        limit: Coulomb's, μ |t_n| + c, finite and not negative [Pa].
+    """
+    return 0.5 * (abs(trial + limit) - abs(trial - limit))
+
+
+def closed_time(start: Any, end: Any) -> Any:
+    """Return the part of a step for which a joint is closed [-].
+
+    Args:
+        start: gap at its start [m].
+        end: gap at its end [m].
+    """
+    return -(negative(start) + negative(end)) / (abs(start) + abs(end) + NONE)
+
+
+def mean_closing(start: Any, end: Any) -> Any:
+    """Return the mean of <g>_- over a step [m].
+
+    Args:
+        start: gap at its start [m].
+        end: gap at its end [m].
+    """
+    return 0.5 * (negative(start) + negative(end)) * closed_time(start, end)
+
+
+def shear_over_step(start: Any, change: Any, late: Any, limit: Any) -> tuple[Any, Any]:
+    """Return the mean traction along a joint over a step, and its elastic part at the end [Pa].
+
+    The elastic traction grows in proportion to the slip until it meets the limit, and stays there;
+    what it exceeds the limit by at the start is lost. Damping adds to the mean, up to the limit.
+    The work of the mean is the change of the stored energy and a loss that is never negative.
+
+    Args:
+        start: elastic traction at the start [Pa].
+        change: of it, if the joint did not slide [Pa].
+        late: lag of damping over the length of the step [-].
+        limit: Coulomb's [Pa].
+    """
+    first = held(start, limit)
+    last = held(first + change, limit)
+    over = first + change - last
+    mean = first + 0.5 * change - 0.5 * over * abs(over) / (abs(change) + NONE)
+    return held(mean + late * change, limit), last
 
 
 def is_closed(opening: NDArray[np.float64]) -> NDArray[np.bool_]:

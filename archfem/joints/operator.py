@@ -2,8 +2,11 @@
 
 With G the sparse operator that takes generalised coordinates q to (opening, slip) at points along
 the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G. Whatever the
-coordinates are (nodes, rigid motions, modes), the rest is the same. How the traction becomes the
-forces f is told in `points`.
+coordinates are (nodes, rigid motions, modes), the rest is the same. How openings become normal
+forces is told in `points`; how slips become shear, and what of it friction holds, in `law`.
+
+Joints have memory: how far each point has slid for good. It belongs to the operator, whose forces
+are those after a load has changed since; `remembered` takes in what has slid meanwhile.
 """
 
 from collections.abc import Sequence
@@ -15,11 +18,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.law import is_closed
+from archfem.joints.law import held, is_closed
 from archfem.joints.points import Facets, JointPoints, Law
 from archfem.joints.sparsity import Pattern
 
 Status = NDArray[np.bool_]
+
+TOUCHING = 1e-9
+"""Excess over Coulomb's limit, relative to it, that is rounding of a point which holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,25 +33,39 @@ class JointOperator:
     """Opening and slip along the joints as linear functions of coordinates, and their forces.
 
     Attributes:
-        law: forces from openings and slips, and the points at which those are taken.
+        law: normal forces from openings, and the points at which those are taken.
         opening: rows of G for the opening, positive open (p, n).
         slip: rows of G for the slip, of the higher block toward the extrados (p, n).
         offset: opening and slip at q = 0, which supports cause that have moved (2, p) [m], or None.
+        slid: how far each point has slid for good, that part of the slip which friction did not
+            hold (p,) [m]; None where nothing has.
     """
 
     law: Law
     opening: sparse.csr_matrix
     slip: sparse.csr_matrix
     offset: Array | None = None
+    slid: Array | None = None
 
     @property
     def points(self) -> JointPoints:
         """Where openings and slips are taken."""
         return self.law.points
 
+    @property
+    def memory(self) -> Array:
+        """How far each point has slid for good (p,) [m]."""
+        return np.zeros(len(self.points.arm)) if self.slid is None else self.slid
+
+    @property
+    def slides(self) -> bool:
+        """Whether any point can slide."""
+        return bool(self.points.slides.any())
+
     @cached_property
-    def _back(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        return self.opening.T.tocsr(), (self.slip.T @ self.law.shear).tocsr()
+    def back(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """From forces at the points to generalised ones: of openings and of slips, each (n, p)."""
+        return self.opening.T.tocsr(), self.slip.T.tocsr()
 
     @cached_property
     def sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
@@ -74,24 +94,76 @@ class JointOperator:
         found: Array = self.slip @ q
         return found if self.offset is None else found + self.offset[1]
 
+    def elastic(self, q: Array) -> Array:
+        """Return the shear forces at the points if nothing slid any further (p,) [N].
+
+        Args:
+            q: coordinates (n,).
+        """
+        slips = self.slips(q)
+        return self.points.shear * (slips if self.slid is None else slips - self.slid)
+
+    def limits(self, normal: Array, closed: Array) -> Array:
+        """Return Coulomb's limit of the shear at the points; 0 where one never slides (p,) [N].
+
+        Args:
+            normal: forces, positive where they pull (p,) [N].
+            closed: area on which each point is closed (p,) [m²].
+        """
+        slides, points = self.points.slides, self.points
+        found = points.cohesion * closed
+        found[slides] -= points.friction[slides] * normal[slides]
+        return np.where(slides, found, 0.0)
+
+    def tractions(self, q: Array) -> tuple[Array, Array]:
+        """Return normal and shear forces at the points, each (p,) [N].
+
+        Args:
+            q: coordinates (n,).
+        """
+        opening, shear = self.openings(q), self.elastic(q)
+        normal = self.law.forces(opening)
+        if not self.slides:
+            return normal, shear
+        limit = self.limits(normal, self.law.closed(opening))
+        return normal, np.where(self.points.slides, held(shear, limit), shear)
+
     def force(self, q: Array) -> Array:
         """Return the generalised forces that the joints exert, as internal forces (n,).
 
         Args:
             q: coordinates (n,).
         """
-        normal, shear = self._back
-        force: Array = normal @ self.law.forces(self.openings(q)) + shear @ self.slips(q)
+        return self.pushed(*self.tractions(q))
+
+    def pushed(self, normal: Array, shear: Array) -> Array:
+        """Return generalised forces from those at the points (n,).
+
+        Args:
+            normal: forces, positive where they pull (p,) [N].
+            shear: forces (p,) [N].
+        """
+        force: Array = self.back[0] @ normal + self.back[1] @ shear
         return force
 
     def energy(self, q: Array) -> float:
-        """Return the energy stored in the joints [J]: half of f·g, as forces are homogeneous.
+        """Return the energy stored in the joints if nothing slid any further [J].
 
         Args:
             q: coordinates (n,).
         """
-        opening, slip = self.openings(q), self.slips(q)
-        return 0.5 * float(opening @ self.law.forces(opening) + slip @ (self.law.shear @ slip))
+        opening, shear = self.openings(q), self.elastic(q)
+        stored = opening @ self.law.forces(opening) + shear @ (shear / self.points.shear)
+        return 0.5 * float(stored)
+
+    def remembered(self, q: Array) -> Array:
+        """Return how far each point has slid for good once it is at q (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        shear = self.tractions(q)[1] / self.points.shear
+        return np.where(self.points.slides, self.slips(q) - shear, 0.0)
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).
@@ -102,40 +174,64 @@ class JointOperator:
         return is_closed(self.openings(q))
 
     def stiffness(self, q: Array) -> Array:
-        """Return the numbers on which the tangent depends, as `matrices` takes them (m,) [N/m].
+        """Return the numbers on which the tangent depends, as `tangents` takes them (m,) [N/m].
 
         Args:
             q: coordinates (n,).
         """
-        return self.law.stiffness(self.openings(q))
+        opening, points = self.openings(q), self.points
+        across = self.law.stiffness(opening)
+        if not self.slides:
+            return np.concatenate([across, points.shear])
+        normal, shear = self.law.forces(opening), self.elastic(q)
+        limit = (1.0 + TOUCHING) * self.limits(normal, self.law.closed(opening))
+        over = points.slides & (np.abs(shear) > limit)
+        sign, along = np.where(over, np.sign(shear), 0.0), np.where(over, 0.0, points.shear)
+        coupled = self.limit_rates(across, self.law.closed_rate(opening), sign)
+        return np.concatenate([across, along, coupled])
 
-    def matrices(self, pattern: Pattern) -> tuple[Array, sparse.csr_matrix]:
-        """Return the parts of the tangent on a pattern, as always + across @ `stiffness`.
+    def limit_rates(self, across: Array, closed: Array, rate: Array) -> Array:
+        """Return the derivative of shear by opening through Coulomb's limit, of each of `entries`.
+
+        Args:
+            across: derivative of normal forces, for each of `entries` (m,) [N/m].
+            closed: derivative of closed areas (m,) [m].
+            rate: of the shear by its limit (p,) [-].
+        """
+        row = self.law.entries[0]
+        friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
+        coupled: Array = rate[row] * (self.points.cohesion[row] * closed - friction * across)
+        return coupled
+
+    def glued(self) -> Array:
+        """Return what `stiffness` is where all is closed and nothing slides (m,) [N/m]."""
+        across = self.law.stiffness(np.full(len(self.points.arm), -1.0))
+        parts = [across, self.points.shear]
+        return np.concatenate([*parts, np.zeros_like(across)] if self.slides else parts)
+
+    def tangents(self, pattern: Pattern) -> sparse.csr_matrix:
+        """Return the linear map from `stiffness` to the entries of the tangent (nnz, m).
 
         Args:
             pattern: that has all `couplings` (nnz entries).
-
-        Returns:
-            Entries that never change, of the slips (nnz,), and the linear map from `stiffness` to
-            the entries of the openings (nnz, m).
         """
-        first, second = (self.opening[side] for side in self.law.entries)
-        return pattern.spread(self.shear_stiffness()).data, pattern.outer(first, second)
-
-    def shear_stiffness(self) -> sparse.csr_matrix:
-        """The part of the tangent that never changes (n, n)."""
-        return self._back[1] @ self.slip
-
-    def shear_resultants(self) -> sparse.csr_matrix:
-        """Shear resultant of each joint from coordinates, sparse (n_joints, n) [N]."""
-        return (self.sums[0] @ self.law.shear @ self.slip).tocsr()
+        first, second = self.law.entries
+        maps = [
+            pattern.outer(self.opening[first], self.opening[second]),
+            pattern.outer(self.slip, self.slip),
+        ]
+        if self.slides:
+            maps.append(pattern.outer(self.slip[first], self.opening[second]))
+        return sparse.hstack(maps, "csr")
 
     def couplings(self) -> sparse.csr_matrix:
         """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
         first, second = self.law.entries
         opening, slip = _ones(self.opening), _ones(self.slip)
-        across = opening[first].T @ opening[second]
-        return (across + slip.T @ (_ones(self.law.shear) @ slip)).tocsr()
+        across = opening[first].T @ opening[second] + slip.T @ slip
+        if self.slides:
+            across = across + slip[first].T @ opening[second]
+        return across.tocsr()
 
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m].
@@ -145,8 +241,15 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        normal = self.law.forces(self.openings(q))
-        shear = self.law.shear @ self.slips(q)
+        return self.summed(*self.tractions(q))
+
+    def summed(self, normal: Array, shear: Array) -> Array:
+        """Return N, V, M of every joint from the forces at the points (n_joints, 3) [N, N, N m].
+
+        Args:
+            normal: forces, positive where they pull (p,) [N].
+            shear: forces (p,) [N].
+        """
         force, moment = self.sums
         return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
 
@@ -177,16 +280,9 @@ class JointOperator:
                 own = own[[0, -1]]
             rows.append(own)
         kept = np.concatenate(rows)
-        chosen = JointPoints(
-            points.joint[kept],
-            points.arm[kept],
-            weight[kept],
-            points.normal_stiffness[kept],
-            points.shear_stiffness[kept],
-            points.count,
-        )
         offset = None if self.offset is None else self.offset[:, kept]
-        return JointOperator(Facets(chosen), self.opening[kept], self.slip[kept], offset)
+        chosen = Facets(points.chosen(kept, weight[kept]))
+        return JointOperator(chosen, self.opening[kept], self.slip[kept], offset)
 
 
 def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:

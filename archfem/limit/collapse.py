@@ -281,7 +281,8 @@ def _result(
         motion = motion / asked.blocks.reach(motion)
     least = MOVING * asked.blocks.reach(motion)
     intrados, extrados, slip = asked.blocks.gaps(motion)
-    apart = np.minimum(intrados, extrados) - structure.friction * abs(slip) > least
+    slid = np.where(abs(slip) > 0.0, structure.friction, 0.0) * abs(slip)
+    apart = np.minimum(intrados, extrados) - slid > least
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
         (int(j), "intrados" if intrados[j] < extrados[j] else "extrados")

@@ -57,10 +57,11 @@ def friction_limits(coefficient: Array, cohesion: Array) -> Limits:
     """Return the limits |V| <= c + μ N of each joint.
 
     Args:
-        coefficient: μ (n_joints,) [-].
+        coefficient: μ, infinite where a joint never slides (n_joints,) [-].
         cohesion: c (n_joints,) [mean block weights].
     """
-    slope, one = sparse.diags(-coefficient), sparse.identity(len(coefficient))
+    slides = np.isfinite(coefficient)
+    slope, one = sparse.diags(-np.where(slides, coefficient, 0.0)), sparse.diags(1.0 * slides)
     rows = sparse.bmat([[slope, slope, one], [slope, slope, -one]], format="csr")
     return Limits(rows, np.tile(cohesion, 2))
 

@@ -1,6 +1,7 @@
 """What blocks are made of and how they touch, with the values of Demirel and Aldemir (2021)."""
 
 from dataclasses import dataclass
+from math import inf
 
 from archfem.arguments import real
 from archfem.errors import InvalidInput
@@ -65,19 +66,27 @@ class Contact:
 
     Attributes:
         normal_stiffness: compression per closing of the joint, k_n [Pa/m].
-        shear_stiffness: shear traction per slip, k_s [Pa/m].
-        friction: Coulomb's coefficient μ of the sliding criterion [-].
+        shear_stiffness: shear traction per elastic slip, k_s [Pa/m].
+        friction: Coulomb's coefficient μ: the joint slides where |t_s| reaches μ |t_n| + c, along
+            itself, and remembers how far. None, kept as infinity, never slides: its shear is
+            elastic whether the joint is open or closed, as in Demirel and Aldemir (2021).
         name: what it is called in tables and files.
+        cohesion: c, over the closed part of the joint; it stays as the joint slides [Pa].
     """
 
     normal_stiffness: float
     shear_stiffness: float
-    friction: float = 0.60
+    friction: float | None = 0.60
     name: str = "contact"
+    cohesion: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a contact, or can only be a wrong unit."""
-        for key in ("normal_stiffness", "shear_stiffness", "friction"):
+        if self.friction is None or self.friction == inf:
+            object.__setattr__(self, "friction", inf)
+        else:
+            real(self.friction, f"friction of '{self.name}'")
+        for key in ("normal_stiffness", "shear_stiffness", "cohesion"):
             real(getattr(self, key), f"{key} of '{self.name}'")
         for key in ("normal_stiffness", "shear_stiffness"):
             value = getattr(self, key)
@@ -87,10 +96,25 @@ class Contact:
                 "give it in Pa/m: 1 MPa/mm is 1e9",
             )
         _require(
-            0.0 <= self.friction <= 10.0,
-            f"friction {self.friction:.3g} of '{self.name}' is not between 0 and 10",
-            "give the coefficient, not the angle",
+            0.0 <= self.coefficient <= 10.0 or not self.slides,
+            f"friction {self.coefficient:.3g} of '{self.name}' is not between 0 and 10",
+            "give the coefficient, not the angle, or None for a joint that never slides",
         )
+        _require(
+            0.0 <= self.cohesion <= 1e9,
+            f"cohesion {self.cohesion:.3g} Pa of '{self.name}' is not between 0 and 1 GPa",
+            "give it in Pa, e.g. 5 * kPa",
+        )
+
+    @property
+    def coefficient(self) -> float:
+        """Coulomb's coefficient μ, infinite where the joint never slides [-]."""
+        return inf if self.friction is None else self.friction
+
+    @property
+    def slides(self) -> bool:
+        """Whether the joint can slide at all."""
+        return self.coefficient < inf
 
 
 STONE = Material(30.0 * GPa, 0.2, 20.0 * kN, 56.0 * MPa, "stone")

@@ -148,7 +148,7 @@ class Structure:
     @cached_property
     def friction(self) -> Array:
         """Coefficients μ of the joints (n_joints,) [-]."""
-        return np.array([joint.contact.friction for joint in self.joints])
+        return np.array([joint.contact.coefficient for joint in self.joints])
 
     @cached_property
     def pairs(self) -> NDArray[np.intp]:

@@ -1,13 +1,14 @@
 """Linear blocks between dry joints: the model behind every rung that has matrices."""
 
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.joints.operator import JointOperator
+from archfem.joints.passage import Passage
 from archfem.joints.rigid import gaps_of
 from archfem.joints.sparsity import Pattern
 from archfem.masonry.actions import Action, BodyForce, Settlement
@@ -19,9 +20,9 @@ from archfem.models.model import Prediction
 class Jointed:
     """A model whose only nonlinearity is the status of its joint points.
 
-    Forces are K q + Gᵀ W t(G q). The tangent changes only when a point opens or closes, so the
-    last one is kept and given again, as the same object, until then. `Model` says what attributes
-    and methods mean.
+    Forces are K q + Gᵀ W t(G q). The tangent changes only when a point opens, closes or begins to
+    slide, so the last one is kept and given again, as the same object, until then. `Model` says
+    what attributes and methods mean.
     """
 
     def __init__(
@@ -46,8 +47,7 @@ class Jointed:
         self.cells = cells
         self.supports = np.zeros((len(structure.blocks), 3))
         self._pattern = pattern
-        always, self._across = operator.matrices(pattern)
-        self._always = self.blocks.data + always
+        self._across = operator.tangents(pattern)
         self.prediction: Prediction | None = None
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
@@ -89,6 +89,38 @@ class Jointed:
         other._last = None
         return other
 
+    @property
+    def memory(self) -> Array:
+        """How far each joint point has slid for good (p,) [m]."""
+        return self.operator.memory
+
+    def remembering(self, memory: Array) -> "Jointed":
+        """Return the same model, whose joints have slid so far.
+
+        Args:
+            memory: how far each joint point has slid for good (p,) [m].
+        """
+        other = copy(self)
+        other.operator = replace(self.operator, slid=memory if memory.any() else None)
+        return other
+
+    def remembered(self, q: Array) -> Array:
+        """Return how far each joint point has slid for good once it is at q (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        return self.operator.remembered(q)
+
+    def passage(self, start: Array, late: float) -> "JointedPassage":
+        """Return a step from a state that the joints remember.
+
+        Args:
+            start: coordinates at its start (n,).
+            late: lag of damping over the length of the step [-].
+        """
+        return JointedPassage(self, Passage(self.operator, start, late))
+
     def predicted(self, prediction: Prediction) -> "Jointed":
         """Return the same model, with what was predicted of it.
 
@@ -116,17 +148,24 @@ class Jointed:
         """
         stiffness = self.operator.stiffness(q)
         if self._last is None or not np.array_equal(stiffness, self._last[0]):
-            matrix = self._pattern.matrix(self._always + self._across @ stiffness)
-            self._last = (stiffness, matrix)
+            self._last = (stiffness, self.matrix(1.0, stiffness))
         return self._last[1]
 
+    def matrix(self, share: float, stiffness: Array) -> sparse.csr_matrix:
+        """Return the stiffness of blocks and joints together (n, n).
+
+        Args:
+            share: factor of that of the blocks [-].
+            stiffness: of the joints, as by `JointOperator.stiffness` (m,) [N/m].
+        """
+        return self._pattern.matrix(share * self.blocks.data + self._across @ stiffness)
+
     def closed(self) -> sparse.csr_matrix:
-        """Tangent with every joint closed over its whole depth."""
-        whole = self.operator.law.stiffness(np.full(self.operator.opening.shape[0], -1.0))
-        return self._pattern.matrix(self._always + self._across @ whole)
+        """Tangent with every joint closed over its whole depth, and nothing sliding."""
+        return self.matrix(1.0, self.operator.glued())
 
     def energy(self, q: Array) -> float:
-        """Return the potential energy of blocks and joints [J].
+        """Return the potential energy of blocks and joints if nothing slid any further [J].
 
         Args:
             q: coordinates (n,).
@@ -154,3 +193,59 @@ class Jointed:
         block, point = action.place(self.structure)
         force: Array = self.cells.at(block, point).T @ np.array(action.force)
         return force
+
+
+@dataclass(frozen=True, eq=False)
+class JointedPassage:
+    """A step of a model with matrices; `models.model.Passage` says what its methods mean.
+
+    Attributes:
+        model: with what its joints remember of the time before.
+        joints: the same step of the joints alone.
+    """
+
+    model: Jointed
+    joints: Passage
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the internal forces of blocks and joints (n,).
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        start, late = self.joints.start, self.joints.late
+        of_blocks: Array = self.model.blocks @ ((0.5 - late) * start + (0.5 + late) * q)
+        return of_blocks + self.joints.force(q)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force` (n, n).
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        return self.model.matrix(0.5 + self.joints.late, self.joints.stiffness(q))
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m].
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        return self.joints.resultants(q)
+
+    def remembered(self, q: Array) -> Array:
+        """Return how far each joint point has slid for good at the end (p,) [m].
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        return self.joints.remembered(q)
+
+    def lost(self, q: Array) -> float:
+        """Return the energy that friction and the lag of damping take [J].
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        moved = q - self.joints.start
+        return self.joints.lost(q) + self.joints.late * float(moved @ (self.model.blocks @ moved))

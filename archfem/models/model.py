@@ -40,6 +40,49 @@ class Prediction:
         return self.error <= self.tolerance
 
 
+class Passage(Protocol):
+    """A step of a model, from a state that is known, along which displacements go straight.
+
+    Forces are means over the step, so that their work is the change of the stored energy, and what
+    friction and damping take. Damping by a lag β is felt as forces of u + β v.
+    """
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the internal forces of blocks and joints (n,).
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force` (n, n).
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m].
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+
+    def remembered(self, q: Array) -> Array:
+        """Return what the joints remember at the end, as `Model.memory`.
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+
+    def lost(self, q: Array) -> float:
+        """Return the energy that friction and the lag of damping take [J]; never negative.
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+
+
 @runtime_checkable
 class Model(Protocol):
     """A structure ready to be moved: generalised coordinates q and what they cost.
@@ -82,7 +125,7 @@ class Model(Protocol):
         """
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Return the derivative of `force` (n, n).
+        """Return the derivative of `force`; not symmetric where joints slide (n, n).
 
         Args:
             q: coordinates (n,).
@@ -96,7 +139,7 @@ class Model(Protocol):
         """Return the tangent with every joint closed over its whole depth (n, n)."""
 
     def energy(self, q: Array) -> float:
-        """Return the potential energy of blocks and joints, whose gradient is `force` [J].
+        """Return the potential energy of blocks and joints if nothing slid any further [J].
 
         Args:
             q: coordinates (n,).
@@ -107,6 +150,34 @@ class Model(Protocol):
 
         Args:
             q: coordinates (n,).
+        """
+
+    @property
+    def memory(self) -> Array:
+        """How far each joint point has slid for good (p,) [m]."""
+
+    def remembering(self, memory: Array) -> Self:
+        """Return the same model, whose joints have slid so far.
+
+        Its `force` is that after a further change: elastic, but for what friction does not hold.
+
+        Args:
+            memory: how far each joint point has slid for good (p,) [m].
+        """
+
+    def remembered(self, q: Array) -> Array:
+        """Return what the joints remember once the model is at q, as `memory`.
+
+        Args:
+            q: coordinates (n,).
+        """
+
+    def passage(self, start: Array, late: float) -> Passage:
+        """Return a step from a state that the joints remember.
+
+        Args:
+            start: coordinates at its start (n,).
+            late: lag of damping over the length of the step, β/Δt [-].
         """
 
     def settled(self, settlement: Settlement) -> Self:

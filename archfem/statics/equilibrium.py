@@ -24,7 +24,7 @@ class Equilibrium:
     """A structure at rest.
 
     Attributes:
-        model: whose equilibrium it is.
+        model: whose equilibrium it is, with what its joints remember of how it came about.
         q: coordinates (n,).
         iterations: of Newton's method, over all steps.
         steps: in which the load, and then any motion of the supports, was brought on.
@@ -64,8 +64,8 @@ def self_weight(model: Model) -> Array:
 def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
-    Joints open as they must (nonlinear statics); steps of the load are halved where Newton's
-    method fails. Displacements are small: the structure keeps its shape.
+    Joints open and slide as they must (nonlinear statics); steps of the load are halved where
+    Newton's method fails. Displacements are small: the structure keeps its shape.
 
     Args:
         model: any rung of the ladder.
@@ -123,6 +123,7 @@ def _grown(
     while factor < 1.0:
         target = min(1.0, factor + step)
         model, load = at(target)
+        model = model.remembering(found.model.memory)
         try:
             solved = _solve(solver, model, load, found.q)
         except DidNotConverge as error:
@@ -134,6 +135,7 @@ def _grown(
                 "carry it; make it thicker, or check the outline, the supports and the load",
                 last=found,
             ) from error
+        model = model.remembering(model.remembered(solved.q))
         found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
         factor = target
     return found

@@ -28,7 +28,7 @@ class LoadPath:
     """Equilibria under a growing load found so far, and what is needed for the next.
 
     Attributes:
-        model: what is loaded.
+        model: what is loaded, at the last step.
         dead: generalised forces of the self-weight (n,).
         live: of the load (n,).
         probe: displacement of the load along itself is probe·(q - q_0) (n,).
@@ -112,6 +112,7 @@ class LoadPath:
             if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
                 self.states.append(x[:-1])
                 self.resisted.append(self.model.resultants(x[:-1]))
+                self.model = self.model.remembering(self.model.remembered(x[:-1]))
                 self.factors.append(float(x[-1]))
                 self.iterations.append(iteration)
                 return True
@@ -146,7 +147,8 @@ class SupportPath:
     """Equilibria under the dead load over a support that moves, as `LoadPath`.
 
     Attributes:
-        model: before the support moves.
+        model: at the last step.
+        supports: motions of the supports before this one moves (n_blocks, 3) [m, m, rad].
         motion: of all blocks, per unit (n_blocks, 3) [m, m, rad].
         dead: generalised forces of the self-weight (n,).
         reach: displacement of the support's fastest corner, per unit [m].
@@ -160,6 +162,7 @@ class SupportPath:
     """
 
     model: Model
+    supports: Array
     motion: Array
     dead: Array
     reach: float
@@ -190,8 +193,9 @@ class SupportPath:
         reach = RigidBlocks(model.structure).reach(motion)
         if reach == 0.0:
             raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
-        unit, first = (FIRST * model.structure.size, np.inf), model.resultants(start.q)
-        return cls(model, motion, self_weight(model), reach, unit, [0.0], [start.q], [first], [0])
+        unit, first = (FIRST * model.structure.size, np.inf), [model.resultants(start.q)]
+        dead, supports = self_weight(model), model.supports
+        return cls(model, supports, motion, dead, reach, unit, [0.0], [start.q], first, [0])
 
     @property
     def displacements(self) -> Array:
@@ -228,7 +232,7 @@ class SupportPath:
             Whether there is one.
         """
         part = self.parts[-1] + distance * self.unit[0] / self.reach
-        model = self.model.moved(self.model.supports + part * self.motion)
+        model = self.model.moved(self.supports + part * self.motion)
         try:
             solved = Solver(model.size).solve(
                 lambda q: model.force(q) - self.dead,
@@ -240,6 +244,7 @@ class SupportPath:
             return False
         self.parts.append(part)
         self.states.append(solved.q)
+        self.model = model.remembering(model.remembered(solved.q))
         self.resisted.append(model.resultants(solved.q))
         self.iterations.append(solved.iterations)
         if len(self.parts) == 2:
