@@ -8,6 +8,7 @@ from .history import History as History
 from .history import history_of as history_of
 from .scales import mechanism_scales as mechanism_scales
 from .schemes import HHT as HHT
+from .schemes import Conserving as Conserving
 from .schemes import Newmark as Newmark
 from .schemes import Rayleigh as Rayleigh
 from .stepping.equation import Equation as Equation

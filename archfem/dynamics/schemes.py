@@ -140,4 +140,20 @@ class HHT:
         return 0.5 - self.alpha
 
 
-Scheme = Newmark | HHT
+@dataclass(frozen=True)
+class Conserving:
+    """The midpoint rule with forces averaged along each step: energy is neither made nor lost.
+
+    Displacements go straight over a step, and what acts is the mean of each force on the way:
+    of blocks and closed joints that at its middle, of a joint that opens, closes or slides its
+    own. The work of a step then is the change of the stored energy, and what friction, damping and
+    the ground take or give, whatever the length of the step (the averaged vector field of Quispel
+    and McLaren, J. Phys. A 41 (2008) 045206; of second order). Resultants are means over steps.
+    """
+
+    beta = 0.5
+    gamma = 1.0
+    alpha = -0.5
+
+
+Scheme = Newmark | HHT | Conserving

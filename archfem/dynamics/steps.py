@@ -18,12 +18,14 @@ class State:
         q: coordinates (n,).
         velocity: their rates (n,).
         acceleration: the rates of those (n,).
+        memory: how far each joint point has slid for good (p,) [m]; None where nothing has.
     """
 
     time: float
     q: Array
     velocity: Array
     acceleration: Array
+    memory: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +74,14 @@ class Step:
 
     Attributes:
         state: at its end.
-        contact: u + β v, which the joint law and the blocks' stress see (n,).
+        resultants: N, V, M of every joint (n_joints, 3) [N, N, N m].
         iterations: of Newton's method.
         smallest: the smallest step that was needed to get there [s].
         energy: kinetic, potential, work and loss, as by `Meter.step` (4,) [J].
     """
 
     state: State
-    contact: Array
+    resultants: Array
     iterations: int
     smallest: float
     energy: Array

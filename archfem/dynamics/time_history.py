@@ -13,7 +13,7 @@ from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.recorder import Recorder
-from archfem.dynamics.schemes import HHT, Newmark, Rayleigh, Scheme
+from archfem.dynamics.schemes import HHT, Conserving, Newmark, Rayleigh, Scheme
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.stepper import Stepper
@@ -55,7 +55,7 @@ class Record:
 _KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
     "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
     "damping": ((Rayleigh,), "damping", "give Rayleigh(0.05, (8.0, 16.0)), or None"),
-    "scheme": ((Newmark, HHT), "scheme", "give Newmark() or HHT()"),
+    "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
     "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
     "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
     "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
@@ -91,7 +91,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
         damping: None is undamped.
-        scheme: `Newmark` (average acceleration, the default) or `HHT`.
+        scheme: `Conserving` (the default), `Newmark` (average acceleration) or `HHT`; the last two
+            for joints that never slide.
         record: what is kept; by default the resultants of every step.
         until: event that ends the run, or a function of the structure and N, V, M of its joints
             (n_joints, 3) [N, N, N m] that gives words to end it; by default only the end of the
@@ -119,9 +120,10 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     dt = _step(model, dt)
     criteria = agreed(criteria, until)
     watch = None if until is None else begun(until, model.structure, criteria)
-    equation = Equation(model, motion, damping, scheme or Newmark())
+    equation = Equation(model, motion, damping, scheme or Conserving())
     if not isinstance(start, State):
-        start = equation.at_rest((start or dead_load(model, newton)).q)
+        rest = start or dead_load(model, newton)
+        start = equation.at_rest(rest.q, memory=rest.model.memory)
     stepper = stepper_for(method, equation, start, dt, newton)
     first = _first(stepper, start, dt)
     recorder = _recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
@@ -159,7 +161,7 @@ def _first(stepper: Stepper, start: State, dt: float) -> Batch:
     equation = stepper.equation
     return Batch(
         np.array([start.time]),
-        equation.model.resultants(equation.contact(start))[None],
+        equation.remembering(start).resultants(equation.contact(start))[None],
         np.zeros(1, dtype=np.int64),
         np.array([dt]),
         equation.energy(start)[None],

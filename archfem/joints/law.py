@@ -50,14 +50,24 @@ def shear_traction(slip: Any, stiffness: Any) -> Any:
     return stiffness * slip
 
 
-def held(trial: Any, limit: Any) -> Any:
-    """Return what friction holds of an elastic traction along a joint [Pa].
+def excess(trial: Any, limit: Any) -> Any:
+    """Return what friction does not hold of an elastic traction along a joint [Pa].
 
     Args:
         trial: the traction if the joint did not slide [Pa].
         limit: Coulomb's, μ |t_n| + c, finite and not negative [Pa].
     """
-    return 0.5 * (abs(trial + limit) - abs(trial - limit))
+    return negative(trial + limit) - negative(limit - trial)
+
+
+def held(trial: Any, limit: Any) -> Any:
+    """Return what friction holds of an elastic traction along a joint [Pa].
+
+    Args:
+        trial: the traction if the joint did not slide [Pa].
+        limit: Coulomb's, finite and not negative [Pa].
+    """
+    return trial - excess(trial, limit)
 
 
 def closed_time(start: Any, end: Any) -> Any:
@@ -94,10 +104,9 @@ def shear_over_step(start: Any, change: Any, late: Any, limit: Any) -> tuple[Any
         limit: Coulomb's [Pa].
     """
     first = held(start, limit)
-    last = held(first + change, limit)
-    over = first + change - last
+    over = excess(first + change, limit)
     mean = first + 0.5 * change - 0.5 * over * abs(over) / (abs(change) + NONE)
-    return held(mean + late * change, limit), last
+    return held(mean + late * change, limit), first + change - over
 
 
 def is_closed(opening: NDArray[np.float64]) -> NDArray[np.bool_]:

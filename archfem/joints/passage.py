@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.law import held, shear_over_step
+from archfem.joints.law import excess, held, shear_over_step
 from archfem.joints.operator import JointOperator
 
 
@@ -91,11 +91,11 @@ class Passage:
         """
         operator, points = self.operator, self.operator.points
         before, after = self._before[0], operator.openings(q)
-        normal, shear, limit, last = self._over(q)
+        normal, shear, limit, _ = self._over(q)
         lagging = (normal - operator.law.mean(before, after)[0]) @ (after - before)
         change, first = self._sheared(q), self._before[1]
         start = np.where(points.slides, held(first, limit), first)
-        over = np.abs(start + change - last)
+        over = np.abs(excess(start + change, limit))
         mean = np.where(
             points.slides,
             shear_over_step(first, change, 0.0, limit)[0],
@@ -124,7 +124,7 @@ class Passage:
         """Derivatives of the mean shear by its elastic change and by the limit, each (p,) [-]."""
         first, change, limit = self._before[1], self._sheared(q), self._over(q)[2]
         start = held(first, limit)
-        over = start + change - held(start + change, limit)
+        over = excess(start + change, limit)
         with np.errstate(divide="ignore", invalid="ignore"):
             slid = np.where(over != 0.0, over / change, 0.0)
         lost = np.where(np.abs(first) > limit, np.sign(first), 0.0)

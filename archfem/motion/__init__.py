@@ -1,6 +1,7 @@
 """The ground: records of eight formats, synthetic motions, spectra, matching, suites.
 
     motion          `Motion`: a ground acceleration, read, cut, filtered, rotated and scaled
+    averages        mean accelerations between instants
     signals         what is done to one sampled acceleration: integrals, filters, base line
     measures        intensity measures: peaks, Arias, CAV, Housner, duration
     oscillator      a damped oscillator under straight-line accelerations

@@ -4,7 +4,8 @@ With u the displacements relative to the ground, at every step
 
     M a + C v + f(u + β v) = p - M r a_g,
 
-f the internal forces of blocks and joints, p the self-weight. Stiffness-proportional damping is
+f the internal forces of blocks and joints, p the self-weight. Newmark's method and HHT write it at
+an instant, the conserving scheme for the means over a step. Stiffness-proportional damping is
 written as f(u + β v), so that the joint's dashpot acts only where the joint is closed,
 t_n = k_n <g + β ġ>_-: a continuous law, whose energy stays convex. Damping on a constant matrix
 (the initial stiffness, or that of the blocks alone) enters through C = α M + R.
@@ -19,11 +20,13 @@ from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.dynamics.energy import Meter
-from archfem.dynamics.schemes import Newmark, Rayleigh, Scheme
+from archfem.dynamics.schemes import Conserving, Rayleigh, Scheme
 from archfem.dynamics.stepping.newmark import Numbers, numbers_of
 from archfem.dynamics.steps import State
 from archfem.joints.operator import JointOperator
+from archfem.errors import InvalidInput
 from archfem.models.model import Model
+from archfem.motion.averages import mean_accelerations
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import self_weight
 
@@ -36,13 +39,30 @@ class Equation:
         model: any rung.
         motion: of the ground.
         damping: None is undamped.
-        scheme: Newmark's or HHT-α.
+        scheme: conserving, Newmark's or HHT-α.
+
+    Raises:
+        InvalidInput: joints can slide, and the scheme has no memory.
     """
 
     model: Model
     motion: Motion
     damping: Rayleigh | None = None
-    scheme: Scheme = field(default_factory=Newmark)
+    scheme: Scheme = field(default_factory=Conserving)
+
+    def __post_init__(self) -> None:
+        """Refuse sliding by schemes that write the equation at an instant."""
+        if not self.conserving and np.isfinite(self.model.structure.friction).any():
+            raise InvalidInput(
+                f"{type(self.scheme).__name__} follows no sliding, and joints slide at "
+                f"μ = {np.min(self.model.structure.friction):g}: use scheme=Conserving(), the "
+                "default, or joints that never slide, Contact(friction=None)"
+            )
+
+    @property
+    def conserving(self) -> bool:
+        """Whether forces are means over steps."""
+        return isinstance(self.scheme, Conserving)
 
     @cached_property
     def lag(self) -> float:
@@ -117,18 +137,22 @@ class Equation:
             Where the equation of each step is written, and the mean over it
             (2, steps, 2) [m/s²].
         """
-        ends = self.motion.at(np.append(times[0] - dt, times))
+        starts = np.append(times[0] - dt, times)
+        if self.conserving:
+            return np.stack(2 * [mean_accelerations(self.motion, starts)])
+        ends = self.motion.at(starts)
         written = self.motion.at(times + self.scheme.alpha * dt)
         return np.stack([written, 0.5 * (ends[:-1] + ends[1:])])
 
-    def at_rest(self, q: Array, time: float = 0.0) -> State:
+    def at_rest(self, q: Array, time: float = 0.0, memory: Array | None = None) -> State:
         """Return the state of a structure at rest, with the acceleration that its forces give.
 
         Args:
             q: coordinates (n,).
             time: since the motion began [s].
+            memory: how far each joint point has slid for good (p,) [m].
         """
-        return self.released(State(time, q, np.zeros_like(q), np.zeros_like(q)))
+        return self.released(State(time, q, np.zeros_like(q), np.zeros_like(q), memory))
 
     def released(self, state: State) -> State:
         """Return the same state with the acceleration that its forces give.
@@ -139,9 +163,17 @@ class Equation:
         forces = (
             self.load(state.time)
             - self.viscous @ state.velocity
-            - self.model.force(self.contact(state))
+            - self.remembering(state).force(self.contact(state))
         )
         return replace(state, acceleration=splu(self.model.mass.tocsc()).solve(forces))
+
+    def remembering(self, state: State) -> Model:
+        """Return the model with what its joints remember in a state.
+
+        Args:
+            state: of the structure.
+        """
+        return self.model if state.memory is None else self.model.remembering(state.memory)
 
     def contact(self, state: State) -> Array:
         """Return what the joint law sees, u + β v (n,).
@@ -157,5 +189,6 @@ class Equation:
         Args:
             state: of the structure.
         """
-        now = (state.q, state.velocity)
-        return self.meter.step(now, now, np.zeros(2))
+        kinetic = 0.5 * float(state.velocity @ (self.model.mass @ state.velocity))
+        potential = self.remembering(state).energy(state.q) - float(self.weight @ state.q)
+        return np.array([kinetic, potential, 0.0, 0.0])

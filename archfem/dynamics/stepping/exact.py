@@ -1,4 +1,4 @@
-"""Newmark and HHT-α, each step one equilibrium solve by SNES: what all strategies must equal."""
+"""Every scheme, each step one equilibrium solve by SNES: what all strategies must equal."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -17,8 +17,8 @@ from archfem.statics.newton import Newton, Solver, magnitude
 HALVINGS = 8
 """Times that a step may be halved before giving up."""
 
-Attempt = Callable[[State, float], tuple[State, int]]
-"""From a state and a time step to the state after it and the iterations that took."""
+Attempt = Callable[[State, float], Step]
+"""From a state and a time step to the step."""
 
 
 class Exact:
@@ -27,15 +27,15 @@ class Exact:
     Args:
         equation: of motion.
         newton: settings of the solves.
-        attempts: tries a step in one; by default `attempt`. What it gives up by `DidNotConverge`
-            is tried in halves.
+        attempts: tries a step in one; by default as the scheme has it. What it gives up by
+            `DidNotConverge` is tried in halves.
     """
 
     def __init__(
         self, equation: Equation, newton: Newton | None = None, *, attempts: Attempt | None = None
     ) -> None:
         self.equation = equation
-        self._attempts = attempts or self.attempt
+        self._attempts = attempts or (self.averaged if equation.conserving else self.attempt)
         self._scale = magnitude(equation.weight)
         self._solver = Solver(equation.model.size, newton)
         self._step: tuple[float, Numbers, sparse.csr_matrix] | None = None
@@ -74,22 +74,19 @@ class Exact:
         for step in self.steps(start, dt, end):
             yield Batch(
                 np.array([step.state.time]),
-                self.equation.model.resultants(step.contact)[None],
+                step.resultants[None],
                 np.array([step.iterations]),
                 np.array([step.smallest]),
                 step.energy[None],
                 partial(_given, step.state),
             )
 
-    def attempt(self, state: State, dt: float) -> tuple[State, int]:
-        """Try a step in one.
+    def attempt(self, state: State, dt: float) -> Step:
+        """Try a step of Newmark's method or HHT in one.
 
         Args:
             state: from which it goes.
             dt: its length [s].
-
-        Returns:
-            The state after it, and how many iterations that took.
 
         Raises:
             DidNotConverge: there was no equilibrium to be found.
@@ -115,7 +112,52 @@ class Exact:
 
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
         solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
-        return end(solved.q), solved.iterations
+        new = end(solved.q)
+        ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
+        before, after = (state.q, state.velocity), (new.q, new.velocity)
+        energy = equation.meter.step(before, after, ground)
+        resultants = equation.model.resultants(equation.contact(new))
+        return Step(new, resultants, solved.iterations, dt, energy)
+
+    def averaged(self, state: State, dt: float) -> Step:
+        """Try a step of the conserving scheme in one.
+
+        Args:
+            state: from which it goes.
+            dt: its length [s].
+
+        Raises:
+            DidNotConverge: there was no equilibrium to be found.
+        """
+        equation, (numbers, linear) = self.equation, self._prepared(dt)
+        model = equation.remembering(state)
+        passage = model.passage(state.q, equation.lag / dt)
+        ground = equation.ground(np.array([state.time + dt]), dt)[0, 0]
+        load = equation.weight - model.body @ ground
+        gain = numbers.velocity[1]
+
+        def speed(q: Array) -> Array:
+            return np.asarray(gain * (q - state.q) - state.velocity)
+
+        def unbalanced(q: Array) -> Array:
+            change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
+            moving = model.mass @ change + equation.viscous @ drag
+            return np.asarray(moving + passage.force(q) - load)
+
+        def tangent(q: Array) -> sparse.csr_matrix:
+            matrix = passage.tangent(q)
+            matrix.data = matrix.data + linear.data / numbers.gain
+            return matrix
+
+        guess = state.q + dt * state.velocity
+        solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
+        q, moved = solved.q, solved.q - state.q
+        memory, velocity = passage.remembered(q), speed(q)
+        new = State(state.time + dt, q, velocity, (velocity - state.velocity) / dt, memory)
+        lost = passage.lost(q) + float(moved @ (equation.viscous @ moved)) / dt
+        work = -float(moved @ (model.body @ ground))
+        energy = equation.energy(new) + np.array([0.0, 0.0, work, lost])
+        return Step(new, passage.resultants(q), solved.iterations, dt, energy)
 
     def _prepared(self, dt: float) -> tuple[Numbers, sparse.csr_matrix]:
         """Numbers of a step, and μ M + ν R; the same objects as before while the step stays."""
@@ -139,7 +181,7 @@ class Exact:
         """Reach a time in one step, or in halves of it where that fails."""
         dt = target - state.time
         try:
-            new, iterations = self._attempts(state, dt)
+            step = self._attempts(state, dt)
         except DidNotConverge as error:
             if halvings == HALVINGS:
                 raise DidNotConverge(
@@ -149,11 +191,7 @@ class Exact:
                 ) from error
             first = self._advance(state, state.time + dt / 2.0, halvings + 1)
             return self._advance(first.state, target, halvings + 1).after(first)
-        new = replace(new, time=target)
-        ground = self.equation.motion.at(np.array([state.time, target])).mean(axis=0)
-        before, after = (state.q, state.velocity), (new.q, new.velocity)
-        energy = self.equation.meter.step(before, after, ground)
-        return Step(new, self.equation.contact(new), iterations, dt, energy)
+        return replace(step, state=replace(step.state, time=target))
 
 
 def _written(start: State, end: State, share: float) -> State:
