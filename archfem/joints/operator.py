@@ -162,8 +162,8 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        shear = self.tractions(q)[1] / self.points.shear
-        return np.where(self.points.slides, self.slips(q) - shear, 0.0)
+        further = (self.elastic(q) - self.tractions(q)[1]) / self.points.shear
+        return self.memory + np.where(self.points.slides, further, 0.0)
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).
@@ -184,8 +184,9 @@ class JointOperator:
         if not self.slides:
             return np.concatenate([across, points.shear])
         normal, shear = self.law.forces(opening), self.elastic(q)
-        limit = (1.0 + TOUCHING) * self.limits(normal, self.law.closed(opening))
-        over = points.slides & (np.abs(shear) > limit)
+        closed = self.law.closed(opening)
+        limit = (1.0 + TOUCHING) * self.limits(normal, closed)
+        over = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
         sign, along = np.where(over, np.sign(shear), 0.0), np.where(over, 0.0, points.shear)
         coupled = self.limit_rates(across, self.law.closed_rate(opening), sign)
         return np.concatenate([across, along, coupled])
