@@ -4,6 +4,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.equation import Equation
@@ -59,6 +60,22 @@ class Strategy(Protocol):
         Args:
             dt: time step [s].
         """
+
+
+def in_own_terms(strategy: Strategy, matrix: sparse.csr_matrix) -> sparse.csr_matrix | Array:
+    """Return a linear map of displacements as one of displacements in a strategy's own terms.
+
+    Args:
+        strategy: whose terms they are; other than reordered ones are asked for one by one.
+        matrix: D, of which D q is wanted (r, n).
+
+    Returns:
+        D L, where q = L η (r, m).
+    """
+    if isinstance(strategy, Reordered):
+        return matrix[:, strategy.order]
+    size = strategy.enter(np.zeros((3, matrix.shape[1]))).shape[-1]
+    return np.asarray(matrix @ strategy.leave(np.eye(size)).T)
 
 
 class Reordered:
