@@ -73,19 +73,21 @@ class Reach:
         """
         middles = self._gauges.middles(readings)
         if self._start is None:
-            self._start = middles[0]
-            self.largest, self.when = np.zeros(len(self._start)), np.full(len(self._start), times[0])
-        moved = np.hypot(*np.moveaxis(middles - self._start, -1, 0))
-        farthest = moved.max(axis=0)
-        self.when = np.where(farthest > self.largest, times[moved.argmax(axis=0)], self.when)
-        self.largest, self.last = np.maximum(farthest, self.largest), moved[-1]
+            blocks = middles.shape[1]
+            self._start, self._when = middles[0], np.full(blocks, times[0])
+            self._square = np.zeros(blocks)
+        squares = np.square(middles - self._start).sum(axis=-1)
+        farthest = squares.argmax(axis=0)
+        found = squares[farthest, np.arange(len(farthest))]
+        self._when = np.where(found > self._square, times[farthest], self._when)
+        self._square, self._last = np.maximum(found, self._square), squares[-1]
 
     def variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
         """What was found, as variables of a dataset over block."""
         words = {
-            "largest_displacement": (self.largest, "m", "largest displacement of a block's middle"),
-            "largest_displacement_time": (self.when, "s", "when it was"),
-            "residual_displacement": (self.last, "m", "displacement of its middle at the end"),
+            "largest_displacement": (np.sqrt(self._square), "m", "largest displacement of a block's middle"),
+            "largest_displacement_time": (self._when, "s", "when it was"),
+            "residual_displacement": (np.sqrt(self._last), "m", "displacement of its middle at the end"),
         }
         return {
             name: ("block", values, {"units": units, "long_name": f"{text}, from the start"})

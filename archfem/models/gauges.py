@@ -6,6 +6,7 @@ All of it is linear in the coordinates: readings are D q + d.
 
 from dataclasses import dataclass
 from typing import Protocol, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import sparse
@@ -14,6 +15,9 @@ from archfem.arrays import Array
 from archfem.joints.faces import face_matrix
 from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
+
+
+_made: WeakKeyDictionary[Model, "Gauges"] = WeakKeyDictionary()
 
 
 class Assembled(Protocol):
@@ -40,11 +44,18 @@ class Gauges:
 
     @classmethod
     def on(cls, model: Model) -> "Gauges":
-        """Return the gauges of a model.
+        """Return the gauges of a model, made once.
 
         Args:
             model: any rung.
         """
+        if model not in _made:
+            _made[model] = cls._made_for(model)
+        return _made[model]
+
+    @classmethod
+    def _made_for(cls, model: Model) -> "Gauges":
+        """Put gauges on a model."""
         operator = model.operator or cast(Assembled, model).kinematics
         faces, moved = face_matrix(operator)
         cells = model.cells

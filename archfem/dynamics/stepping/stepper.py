@@ -103,16 +103,18 @@ class Stepper:
         )
 
     @cached_property
-    def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array]:
-        """Matrix and offset of the model's gauges, on the strategy's own terms."""
+    def _gauges(self) -> sparse.csr_matrix | Array:
+        """From displacements in the strategy's own terms to readings of the gauges (r, m)."""
         assert self.strategy is not None
-        gauges = Gauges.on(self.equation.model)
-        return in_own_terms(self.strategy, gauges.matrix), gauges.offset
+        model = self.equation.model
+        return in_own_terms(self.strategy, Gauges.on(model).matrix, model.mass)
 
     def _read(self, displacements: Array) -> Array:
-        """Readings of the gauges (steps, r), from displacements in the strategy's own terms."""
-        matrix, offset = self._gauges
-        readings: Array = (matrix @ np.ascontiguousarray(displacements.T)).T + offset
+        """Readings (steps, r), from displacements in the strategy's own terms (steps, m).
+
+        Strategies are for supports that have not moved, which alone make readings at q = 0.
+        """
+        readings: Array = (self._gauges @ np.ascontiguousarray(displacements.T)).T
         return readings
 
     def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:

@@ -5,9 +5,13 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.equation import Equation
+
+ROUND_OFF = 1e-8
+"""Of two ways to the same readings, relative to the largest: entering and leaving modes."""
 
 
 class Strategy(Protocol):
@@ -62,20 +66,31 @@ class Strategy(Protocol):
         """
 
 
-def in_own_terms(strategy: Strategy, matrix: sparse.csr_matrix) -> sparse.csr_matrix | Array:
+def in_own_terms(
+    strategy: Strategy, matrix: sparse.csr_matrix, mass: sparse.csr_matrix
+) -> sparse.csr_matrix | Array:
     """Return a linear map of displacements as one of displacements in a strategy's own terms.
 
+    With q = L η that is D L. Of reordered coordinates it is D with its columns in their order; of
+    modes, for which Lᵀ M L = 1 and so entering is η = Lᵀ M q, it is what D M⁻¹ becomes when
+    entered. Where neither holds, L is found vector by vector.
+
     Args:
-        strategy: whose terms they are; other than reordered ones are asked for one by one.
-        matrix: D, of which D q is wanted (r, n).
+        strategy: whose terms they are.
+        matrix: D (r, n).
+        mass: M (n, n).
 
     Returns:
-        D L, where q = L η (r, m).
+        D L (r, m).
     """
     if isinstance(strategy, Reordered):
         return matrix[:, strategy.order]
-    size = strategy.enter(np.zeros((3, matrix.shape[1]))).shape[-1]
-    return np.asarray(matrix @ strategy.leave(np.eye(size)).T)
+    found = strategy.enter(splu(mass.tocsc()).solve(matrix.T.toarray()).T)
+    probe = np.cos(np.arange(found.shape[-1]))
+    expected = matrix @ strategy.leave(np.stack([probe] * 3))[0]
+    if np.allclose(found @ probe, expected, rtol=0.0, atol=ROUND_OFF * np.abs(expected).max()):
+        return found
+    return np.asarray(matrix @ strategy.leave(np.eye(len(probe))).T)
 
 
 class Reordered:
