@@ -8,6 +8,7 @@ import xarray as xr
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import failed, flagged
 from archfem.limit.counted import Mechanism
+from archfem.units import mm
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,21 @@ class Episode:
 
     def __str__(self) -> str:
         """How long, how far, and whether it closes again."""
-        wide = "" if self.opening is None else f", opens by up to {1e3 * self.opening:.3g} mm"
+        wide = "" if self.opening is None else f", opens by up to {self.opening / mm:.3g} mm"
         if self.closes:
-            return f"it lasts {self.duration:.3g} s{wide} and closes again"
-        return f"it lasts {self.duration:.3g} s{wide} and has not closed at the end of the record"
+            return f"it lasts {lasting(self.duration)}{wide} and closes again"
+        if self.duration == 0.0:
+            return f"it begins as the record ends{wide.replace('opens by up to', 'open by')}"
+        return f"it lasts {lasting(self.duration)}{wide} and has not closed when the record ends"
+
+
+def lasting(duration: float) -> str:
+    """Return a duration in words, short ones in milliseconds.
+
+    Args:
+        duration: [s].
+    """
+    return f"{duration:.3g} s" if duration >= 1.0 else f"{1e3 * duration:.3g} ms"
 
 
 def episode(joints: xr.Dataset, found: Mechanism) -> Episode:

@@ -94,7 +94,7 @@ class LoadPath:
 
     @property
     def faces(self) -> Array:
-        """Gaps at mid-depth, rotations and slips of every joint (steps, 3, n_joints) [m, rad, m]."""
+        """Gaps at mid-depth, rotations and slips of joints (steps, 3, n_joints) [m, rad, m]."""
         gauges = Gauges.on(self.model)
         return gauges.faces(np.array([gauges.read(q) for q in self.states]))
 
