@@ -85,9 +85,17 @@ class Reach:
     def variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
         """What was found, as variables of a dataset over block."""
         words = {
-            "largest_displacement": (np.sqrt(self._square), "m", "largest displacement of a block's middle"),
+            "largest_displacement": (
+                np.sqrt(self._square),
+                "m",
+                "largest displacement of a block's middle",
+            ),
             "largest_displacement_time": (self._when, "s", "when it was"),
-            "residual_displacement": (np.sqrt(self._last), "m", "displacement of its middle at the end"),
+            "residual_displacement": (
+                np.sqrt(self._last),
+                "m",
+                "displacement of its middle at the end",
+            ),
         }
         return {
             name: ("block", values, {"units": units, "long_name": f"{text}, from the start"})

@@ -69,4 +69,3 @@ def measures(faces: Array, depth: Array) -> dict[str, Array]:
     gap, rotation, slip = np.moveaxis(faces, -2, 0)
     opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
     return {"opening": opening, "rotation": rotation, "slip": slip}
-

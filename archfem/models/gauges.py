@@ -16,7 +16,6 @@ from archfem.joints.faces import face_matrix
 from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
 
-
 _made: WeakKeyDictionary[Model, "Gauges"] = WeakKeyDictionary()
 
 

@@ -114,4 +114,5 @@ def _tell(axes: Axes, told: Mapping[tuple[float, float], str], *, above: bool) -
     axes.annotate(
         "\n".join(lines), (0.97, 0.95 if above else 0.05), xycoords="axes fraction",
         fontsize=SMALL, color=INK, ha="right", va="top" if above else "bottom",
+        multialignment="left",
     )  # fmt: skip
