@@ -139,10 +139,11 @@ def study_table(findings: Mapping[str, Finding]) -> str:
     """Return two tables, a line for each case.
 
     The first tells of the motions as each case applies them: the first mode, the gravest joint of
-    rings and piers (its median over the pairs), in how many pairs each definition of a mechanism is
-    met, and of what class it is by the words of Demirel and Aldemir; a run that broke off tells
-    only of the time before, and is counted below. The second, where they were looked for, tells by
-    what factor on the whole motions they begin: the median over the pairs, and their range.
+    rings and piers (its median over the pairs), in how many pairs each definition of a mechanism
+    is met, and in how many a mechanism of which class by the words of Demirel and Aldemir; a run
+    that broke off tells only of the time before, and is counted below. The second, where they were
+    looked for, tells by what factor on the whole motions they begin: the median over the pairs, and
+    their range.
 
     Args:
         findings: by name of the case.

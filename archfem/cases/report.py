@@ -55,7 +55,7 @@ def write_limit(case: Case, found: Collapse, text: str, folder: Path) -> list[Pa
 
 
 def write_dead(rest: Rest, folder: Path) -> list[Path]:
-    """Draw the dead load: thrust lines; names of the joints; where there is a mesh, stress; a free body where asked.
+    """Draw names of joints, thrust lines of the dead load, stress on a mesh, a free body if asked.
 
     Args:
         rest: a case, which names the block to be cut free, if any, and its dead load.

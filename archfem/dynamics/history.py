@@ -23,7 +23,8 @@ from archfem.masonry.structure import Structure
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
-    "higher block slips toward the extrados; rotation > 0 opens the intrados; gravity along -y; displacements relative to the ground"
+    "higher block slips toward the extrados; rotation > 0 opens the intrados; "
+    "gravity along -y; displacements relative to the ground"
 )
 
 

@@ -88,17 +88,17 @@ class Reach:
             "largest_displacement": (
                 np.sqrt(self._square),
                 "m",
-                "largest displacement of a block's middle",
+                "largest, of its middle",
             ),
             "largest_displacement_time": (self._when, "s", "when it was"),
-            "residual_displacement": (
-                np.sqrt(self._last),
-                "m",
-                "displacement of its middle at the end",
-            ),
+            "residual_displacement": (np.sqrt(self._last), "m", "at the end, of its middle"),
         }
         return {
-            name: ("block", values, {"units": units, "long_name": f"{text}, from the start"})
+            name: (
+                "block",
+                values,
+                {"units": units, "long_name": f"displacement, {text}"},
+            )
             for name, (values, units, text) in words.items()
         }
 

@@ -11,7 +11,7 @@ DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
 """Definitions of a mechanism, in the order of tables."""
 
 PUBLISHED = "Demirel and Aldemir"
-"""The criterion of `demirel_aldemir_mechanism`: the instant of "four in a ring", classes by piers."""
+"""The criterion of `demirel_aldemir_mechanism`, met when "four in a ring" is."""
 
 
 def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str, Mechanism | None]:

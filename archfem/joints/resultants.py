@@ -67,8 +67,9 @@ def joint_dataset(
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` where they
-        are known, and `flags` of failure, over joint, or over time and joint, with the joints' names, parts, roles, depths and friction limits, and
-        whether they are judged, as coordinates, and the criteria as attributes.
+        are known, and `flags` of failure, over joint, or over time and joint, with the joints'
+        names, parts, roles, depths and friction limits, and whether they are judged, as
+        coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()

@@ -57,8 +57,9 @@ def counted_mechanism(
 
     A wide reading of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
     ring alone (local), with joints of one pier among the four (semi-global), or of more rings and
-    piers (global); `demirel_aldemir_mechanism` keeps to their words. A joint that has come apart counts too. The class is that of all joints failed
-    at the instant; ask for `kinds=("local",)` to find four in one ring whatever else fails.
+    piers (global); `demirel_aldemir_mechanism` keeps to their words. A joint that has come apart
+    counts too. The class is that of all joints failed at the instant; ask for `kinds=("local",)` to
+    find four in one ring whatever else fails.
 
     Args:
         joints: over joint, or over time and joint; those of `judged` are counted.

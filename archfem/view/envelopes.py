@@ -48,8 +48,8 @@ def draw_envelope(
 ) -> Figure:
     """Draw the least and largest eccentricity of each joint over runs, against the faces.
 
-    Each ring and pier has a panel of its own, with short names of its joints below. Crosses above the
-    upper face mark joints that came apart at some time. Where runs have different criteria, the
+    Each ring and pier has a panel of its own, with short names of its joints below. Crosses above
+    the upper face mark joints that came apart at some time. Where runs have different criteria, the
     least |e| of a hinge is shown.
 
     Args:

@@ -77,7 +77,7 @@ def draw_names(structure: Structure) -> Figure:
 def _inch(page: Figure, structure: Structure) -> float:
     """Length that an inch of the page stands for, about [m]."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
-    return float(np.ptp(points[:, 0])) / (page.get_size_inches()[0] - 0.8)
+    return float(np.ptp(points[:, 0]) / (page.get_size_inches()[0] - 0.8))
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:

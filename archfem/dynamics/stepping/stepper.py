@@ -110,10 +110,8 @@ class Stepper:
         return in_own_terms(self.strategy, Gauges.on(model).matrix, model.mass)
 
     def _read(self, displacements: Array) -> Array:
-        """Readings (steps, r), from displacements in the strategy's own terms (steps, m).
-
-        Strategies are for supports that have not moved, which alone make readings at q = 0.
-        """
+        """Readings (steps, r), from displacements in the strategy's own terms (steps, m)."""
+        # Only supports that have moved make readings at q = 0, and strategies are not for them.
         readings: Array = (self._gauges @ np.ascontiguousarray(displacements.T)).T
         return readings
 
