@@ -1,7 +1,7 @@
 """Mechanisms by counting failed joints, and the classes of mechanisms."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -27,7 +27,7 @@ class Mechanism:
         time: when [s]; None for a static state.
         blocks: numbers of the blocks that can move; empty where rings and piers cannot, or nobody
             asked.
-        names: of the failed joints.
+        names: of those joints; they say the same again, and do not count in comparisons.
     """
 
     kind: str
@@ -35,7 +35,7 @@ class Mechanism:
     joints: tuple[int, ...]
     time: float | None = None
     blocks: tuple[int, ...] = ()
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = field(default=(), compare=False)
 
 
 def mechanism_kind(roles: Collection[str]) -> str:

@@ -1,5 +1,6 @@
 """What a strategy of time stepping has to provide, and what most of them have in common."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -85,12 +86,20 @@ def in_own_terms(
     """
     if isinstance(strategy, Reordered):
         return matrix[:, strategy.order]
-    found = strategy.enter(splu(mass.tocsc()).solve(matrix.T.toarray()).T)
+    found = _in_threes(strategy.enter, splu(mass.tocsc()).solve(matrix.T.toarray()).T)
     probe = np.cos(np.arange(found.shape[-1]))
-    expected = matrix @ strategy.leave(np.stack([probe] * 3))[0]
+    expected = matrix @ _in_threes(strategy.leave, probe[None])[0]
     if np.allclose(found @ probe, expected, rtol=0.0, atol=ROUND_OFF * np.abs(expected).max()):
         return found
-    return np.asarray(matrix @ strategy.leave(np.eye(len(probe))).T)
+    return np.asarray(matrix @ _in_threes(strategy.leave, np.eye(len(probe))).T)
+
+
+def _in_threes(way: Callable[[Array], Array], vectors: Array) -> Array:
+    """Enter or leave with any number of vectors (k, …), which go three at a time as states do."""
+    missing = -len(vectors) % 3
+    filled = np.concatenate([vectors, np.zeros((missing, *vectors.shape[1:]))])
+    found = [way(filled[first : first + 3]) for first in range(0, len(filled), 3)]
+    return np.concatenate(found)[: len(vectors)]
 
 
 class Reordered:
