@@ -152,11 +152,11 @@ class History:
         if self.structure is not None:
             found["verified"] = None if self.verified is None else self.verified.moved
             names = [block.name for block in self.structure.blocks]
-        whole = self.dataset.attrs.get("ended", Ending.FINISHED) == Ending.FINISHED
-        ending = [] if whole else [f"The run {self.outcome}"]
-        said = extremes(self.dataset)
-        lines = mechanism_lines(self.joints, found, names)
-        return "\n".join([*ending, *([said] if said else []), *lines])
+        told = self.dataset.attrs
+        whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
+        lines = ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
+        lines += mechanism_lines(self.joints, found, names)
+        return "\n".join(line for line in lines if line)
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
@@ -45,6 +46,7 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     _ground(ground, run)
+    ground.xaxis.set_major_locator(MaxNLocator(5))
     panels = []
     for row, own in enumerate(chosen, start=1):
         left, right = (figure.add_subplot(grid[row, k], sharex=ground) for k in range(2))

@@ -66,7 +66,7 @@ def test_a_calm_run_says_so(model, motion):
 def test_a_run_that_did_not_finish_says_so_first(model, motion):
     halted = af.time_history(model, motion, until=af.CountedMechanism())
     first, _, counted, *_ = halted.verdict.splitlines()
-    assert first == f"The run {halted.outcome}"
+    assert first == f"outcome: {halted.outcome}"
     assert "a mechanism of arch by joint" in first
     assert f"{halted.time[-1]:.3f} s by joint" in counted
     assert "it begins as the record ends, open by " in counted
