@@ -84,21 +84,14 @@ class Reach:
 
     def variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
         """What was found, as variables of a dataset over block."""
+        about = "displacement of its middle"
         words = {
-            "largest_displacement": (
-                np.sqrt(self._square),
-                "m",
-                "largest, of its middle",
-            ),
-            "largest_displacement_time": (self._when, "s", "when it was"),
-            "residual_displacement": (np.sqrt(self._last), "m", "at the end, of its middle"),
+            "largest_displacement": (np.sqrt(self._square), "m", f"largest {about}"),
+            "largest_displacement_time": (self._when, "s", f"time of the largest {about}"),
+            "residual_displacement": (np.sqrt(self._last), "m", f"{about} at the end"),
         }
         return {
-            name: (
-                "block",
-                values,
-                {"units": units, "long_name": f"displacement, {text}"},
-            )
+            name: ("block", values, {"units": units, "long_name": text})
             for name, (values, units, text) in words.items()
         }
 

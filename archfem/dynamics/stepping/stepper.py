@@ -103,17 +103,18 @@ class Stepper:
         )
 
     @cached_property
-    def _gauges(self) -> sparse.csr_matrix | Array:
-        """From displacements in the strategy's own terms to readings of the gauges (r, m)."""
+    def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array | None]:
+        """Of the model, from the strategy's own terms: matrix, and offset where there is one."""
         assert self.strategy is not None
-        model = self.equation.model
-        return in_own_terms(self.strategy, Gauges.on(model).matrix, model.mass)
+        gauges, mass = Gauges.on(self.equation.model), self.equation.model.mass
+        offset = gauges.offset if gauges.offset.any() else None
+        return in_own_terms(self.strategy, gauges.matrix, mass), offset
 
     def _read(self, displacements: Array) -> Array:
         """Readings (steps, r), from displacements in the strategy's own terms (steps, m)."""
-        # Only supports that have moved make readings at q = 0, and strategies are not for them.
-        readings: Array = (self._gauges @ np.ascontiguousarray(displacements.T)).T
-        return readings
+        matrix, offset = self._gauges
+        readings: Array = (matrix @ np.ascontiguousarray(displacements.T)).T
+        return readings if offset is None else readings + offset
 
     def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
         """Return what `loop.advance` takes to go from a state to these times.
