@@ -8,6 +8,7 @@
     skeleton   the blocks that move as rigid bodies when joints fail
     screen     a quick look at whether they can move at all
     counted    mechanisms by counting failed joints
+    episodes   how long a mechanism lasts, and how far it opens
     verified   mechanisms by a motion that the failed joints permit
 
 It imports from `masonry`, `joints` and the ground. Start reading at `collapse`.

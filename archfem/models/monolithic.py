@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.operator import JointOperator
 from archfem.joints.quadrature import Quadrature
 from archfem.joints.sparsity import Pattern
 from archfem.masonry.actions import Settlement
@@ -32,6 +33,7 @@ class Monolithic:
         self.body = linear.body
         self.cells = linear.cells
         self.load = linear.load
+        self._linear = linear
         self._forms = Forms(space, rule)
         self._free = space.free
         self.supports = linear.supports
@@ -77,6 +79,11 @@ class Monolithic:
         other = copy(self)
         other.prediction = prediction
         return other
+
+    @property
+    def kinematics(self) -> JointOperator:
+        """From coordinates to openings and slips at points on the joints, for what is read off."""
+        return self._linear.moved(self.supports).operator
 
     def _spread(self, q: Array) -> Array:
         """Displacements of all nodes, those of fixed blocks included."""
