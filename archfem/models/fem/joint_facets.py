@@ -24,7 +24,7 @@ from archfem.models.fem.space import BrokenSpace
 Numbers = NDArray[np.intp]
 
 PLACE = 5
-"""Numbers that place a facet: its begin, its direction over its length, the sense of slips."""
+"""Numbers that place a facet: its beginning, direction over length, and sense of slips."""
 
 
 @dataclass(frozen=True)
@@ -172,17 +172,11 @@ class JointFacets:
         grid, joints = self.space.mesh.grid, self.space.mesh.structure.joints
         contacts = list(dict.fromkeys(joint.contact for joint in joints))
         of_joint = np.array([contacts.index(joint.contact) for joint in joints])
-        numbers = of_joint[self.joint] * self._colour_count + self.colours
+        count = self._colour_count
+        numbers = of_joint[self.joint] * count + self.colours
         tags = _fenicsx.tags(grid, 1, self.numbers, numbers)
         dS = _fenicsx.jump_measure(grid, tags, *self._scheme)
-        return [
-            Patch(
-                contacts[number // self._colour_count],
-                int(number % self._colour_count),
-                dS(int(number)),
-            )
-            for number in np.unique(numbers)
-        ]
+        return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
 
     @property
     def _scheme(self) -> tuple[str, int]:
