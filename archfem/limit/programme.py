@@ -94,11 +94,13 @@ class Optimum:
         value: the least value of the objective.
         forces: F_i, F_e and V of all joints (3 n_joints,) [mean block weights].
         coordinates: multipliers of the balance, the motion of the free blocks (3 n_free,).
+        unknowns: z, the unknowns beside the forces (k,).
     """
 
     value: float
     forces: Array
     coordinates: Array
+    unknowns: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +126,15 @@ class Programme:
     cost: Array | None = None
     columns: sparse.csr_matrix | None = None
     prices: Array = field(default_factory=lambda: np.zeros(0))
+
+    def objective(self, state: Optimum) -> float:
+        """Return a·x + b·z of a state that another programme over the same unknowns found.
+
+        Args:
+            state: its forces and unknowns.
+        """
+        cost = 0.0 if self.cost is None else self.cost @ state.forces
+        return float(cost + self.prices @ state.unknowns)
 
     def solve(self) -> Optimum | None:
         """Solve, adding crushing cuts until none is violated.
@@ -184,4 +195,5 @@ class Programme:
             return None
         if found.status != 0:
             raise DidNotConverge(f"the linear programme found no state: {found.message}")
-        return Optimum(float(found.fun), found.x[:size], np.array(found.eqlin.marginals))
+        multipliers = np.array(found.eqlin.marginals)
+        return Optimum(float(found.fun), found.x[:size], multipliers, found.x[size:])
