@@ -20,6 +20,10 @@ EXCESS = 1e-7
 CUTS = 60  # rounds of crushing cuts; as tangents of a parabola they need about six
 
 
+class NoState(DidNotConverge):
+    """The programme has nothing to choose from: no forces balance the loads within the limits."""
+
+
 @dataclass(frozen=True, eq=False)
 class Limits:
     """Linear limits on the joint forces, `rows @ forces <= bounds`, besides F_i, F_e >= 0.
@@ -143,7 +147,7 @@ class Programme:
             The optimum, or None where the objective falls without bound.
 
         Raises:
-            DidNotConverge: the solver gave up, or no state fulfils the limits.
+            DidNotConverge: the solver gave up; `NoState` where no state fulfils the limits.
         """
         limits = self.limits
         if self.crushing is not None:
@@ -193,6 +197,8 @@ class Programme:
         )
         if found.status == 3:
             return None
+        if found.status == 2:
+            raise NoState("no state of equilibrium fulfils the limits")
         if found.status != 0:
             raise DidNotConverge(f"the linear programme found no state: {found.message}")
         multipliers = np.array(found.eqlin.marginals)
