@@ -36,6 +36,9 @@ ROUNDS = 40
 SETTLED = 1e-8
 """Penetration, slip, and work of forces on gaps per weight, that count as none [sizes]."""
 
+CLOSED = 1e-10
+"""Gap that is round-off, which the solver of programmes would stumble over [sizes]."""
+
 LEAP = 0.1
 """Largest motion of a corner within one step [sizes]: beyond, the step is shortened."""
 
@@ -47,6 +50,7 @@ class End(StrEnum):
     """Why a movement goes no further."""
 
     FALLS = "falls"
+    LEAPS = "leaps"
     SLIDES = "slides"
     LOCKS = "locks"
     HOLDS = "holds"
@@ -60,7 +64,8 @@ class End(StrEnum):
 _SENTENCES = {
     End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
     End.SLIDES: "beyond, a joint needs more than its friction and slides",
-    End.LOCKS: "it cannot follow any further",
+    End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
+    End.LOCKS: "without sliding in its joints it cannot follow any further",
     End.HOLDS: "it stands at the whole movement",
 }
 
@@ -160,7 +165,8 @@ def largest_movement(
             an option is unknown.
 
     Note:
-        Joints do not slide on the way, and blocks touch at the ends of their joints only. Where it
+        Joints do not slide on the way, so that a bonded wall, whose upright joints would have to,
+        locks at once; and blocks touch at the ends of their joints only. Where it
         falls there may be equilibrium elsewhere, which it could reach by a leap alone: that is not
         counted as standing.
 
@@ -213,7 +219,9 @@ class _Path:
 
     def _programme(self, blocks: DisplacedBlocks, further: Array | None = None) -> Programme:
         """Ask for the forces of least work on the gaps, with those of a further movement."""
-        gaps = blocks.opened if further is None else blocks.opened + blocks.gaps(further)
+        gaps = np.where(np.abs(blocks.opened) > CLOSED * self.structure.size, blocks.opened, 0.0)
+        if further is not None:
+            gaps = gaps + blocks.gaps(further)
         load = blocks.scaled(rigid_load(self.structure, [SELF_WEIGHT]))
         limits = no_limits(len(self.structure.joints))
         return Programme(blocks, load, limits, cost=np.concatenate([*gaps[:2], -gaps[2]]))
@@ -246,7 +254,7 @@ class _Path:
             blocks = blocks.moved(blocks.motion(state.coordinates))
             if blocks.reach(blocks.displacement - begun.displacement) > LEAP * size:
                 break
-        raise _Ends(End.FALLS)
+        raise _Ends(End.LEAPS)
 
     def _check_friction(self, blocks: DisplacedBlocks) -> None:
         """Look for a state at the same places that friction permits too."""

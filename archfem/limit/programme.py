@@ -17,6 +17,9 @@ FEASIBLE = 1e-9
 EXCESS = 1e-7
 """Largest violation of the crushing limit accepted, as a fraction of the crushing force σ w h."""
 
+ENDED = (0, 2, 3)
+"""Answers of the solver that are one: an optimum, no state, an objective without bound."""
+
 CUTS = 60  # rounds of crushing cuts; as tangents of a parabola they need about six
 
 
@@ -181,20 +184,23 @@ class Programme:
         beside = sparse.csr_matrix((len(limits.bounds), extra))
         bounds = np.tile([0.0, np.inf], (size + extra, 1))
         bounds[2 * joints : size, 0] = -np.inf
-        found = linprog(
-            cost,
-            A_ub=sparse.hstack([limits.rows, beside], format="csr"),
-            b_ub=limits.bounds,
-            A_eq=balance,
-            b_eq=self.load,
-            bounds=bounds,
-            method="highs-ds",
-            options={
-                "primal_feasibility_tolerance": FEASIBLE,
-                "dual_feasibility_tolerance": FEASIBLE,
-                "presolve": False,
-            },
-        )
+        for presolve in (False, True):  # the second where round-off stopped the first
+            found = linprog(
+                cost,
+                A_ub=sparse.hstack([limits.rows, beside], format="csr"),
+                b_ub=limits.bounds,
+                A_eq=balance,
+                b_eq=self.load,
+                bounds=bounds,
+                method="highs-ds",
+                options={
+                    "primal_feasibility_tolerance": FEASIBLE,
+                    "dual_feasibility_tolerance": FEASIBLE,
+                    "presolve": presolve,
+                },
+            )
+            if found.status in ENDED:
+                break
         if found.status == 3:
             return None
         if found.status == 2:
