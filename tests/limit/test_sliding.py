@@ -260,6 +260,18 @@ def test_a_settlement_without_dilatancy_pushes_at_least_as_hard():
     assert without.solutions.bracket[0] == pytest.approx(plain.factor, rel=EXACT)
 
 
+def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
+    monkeypatch.setattr("archfem.limit.sliding._solution", lambda *_: None)
+    structure = ring(embrace=120.0, voussoirs=9, contact=rough(0.4))
+    push = af.PointLoad(0.0, (-1e3, 0.0))
+    found = af.collapse_factor(structure, live=push, friction="nonassociated")
+    upper = af.collapse_factor(structure, live=push).factor
+    assert found.outcome is Outcome.BRACKETED
+    assert found.solutions.bracket == pytest.approx((found.factor, upper))
+    assert 0.0 < found.factor < upper
+    assert np.isnan(found.joints["N"]).all()
+
+
 def test_the_words_tell_names_and_where_solutions_lie():
     structure = wall(HALVES, 0.5)
     words = str(af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated"))
