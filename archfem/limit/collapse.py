@@ -86,11 +86,22 @@ class Collapse:
     motion: Array
     solutions: WithoutDilatancy | None = None
 
+    @property
+    def hinge_names(self) -> tuple[str, ...]:
+        """Names of the joints that turn, in the order of `hinges`."""
+        return tuple(str(self.joints["name"].values[joint]) for joint, _ in self.hinges)
+
+    @property
+    def sliding_names(self) -> tuple[str, ...]:
+        """Names of the joints that slide, in the order of `sliding`."""
+        return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
+
     def __str__(self) -> str:
         """Outcome, factor and failing joints, by number and name, in one line."""
-        names = self.joints["name"].values
-        hinges = ", ".join(f"{j} ({names[j]}) {side}" for j, side in self.hinges) or "none"
-        sliding = ", ".join(f"{j} ({names[j]})" for j in self.sliding) or "none"
+        turning = zip(self.hinges, self.hinge_names, strict=True)
+        hinges = ", ".join(f"{j} ({name}) {side}" for (j, side), name in turning) or "none"
+        slipping = zip(self.sliding, self.sliding_names, strict=True)
+        sliding = ", ".join(f"{j} ({name})" for j, name in slipping) or "none"
         words = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; "
         known = "" if self.solutions is None else f"; {self.solutions}"
         return f"{words}sliding {sliding}{known}"
@@ -177,9 +188,10 @@ def collapse_factor(
     result = replace(result, solutions=known)
     if friction == "coulomb" and result.sliding:
         logger.warning(
-            "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "
-            "estimate; friction='nonassociated' does without it",
+            "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
+            "upper estimate; friction='nonassociated' does without it",
             list(result.sliding),
+            ", ".join(result.sliding_names),
             result.factor,
         )
     return result

@@ -79,11 +79,24 @@ class Stage:
         work: of the weights on that movement, at its present rate [N m]: for a translation by 1 m,
             the thrust on the support along it, in N.
         hinges: joints that are open, with the face where the blocks stay in contact.
+        names: of these joints.
     """
 
     share: float
     work: float
     hinges: tuple[tuple[int, str], ...]
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Share, work, and hinges by number and name, in one line."""
+        words = [
+            f"{joint} ({name}) {side}"
+            for (joint, side), name in zip(self.hinges, self.names, strict=True)
+        ]
+        return (
+            f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "
+            f"hinges {', '.join(words) or 'none'}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,20 +135,11 @@ class Movement:
     def __str__(self) -> str:
         """Largest movement, its end, and the hinges by number and name, line by line."""
         x, y, turn = self.settlement.motion
-        lines = [
+        head = (
             f"support {self.asked.block} moves by {x:.4g} m, {y:.4g} m and {turn:.4g} rad: "
             f"{self.end.sentence}"
-        ]
-        for stage in self.sequence:
-            names = [
-                f"{joint} ({self.structure.joints[joint].name}) {side}"
-                for joint, side in stage.hinges
-            ]
-            lines.append(
-                f"from {stage.share:.4f} of the movement, work {stage.work:.4g} N m: "
-                f"hinges {', '.join(names) or 'none'}"
-            )
-        return "\n".join(lines)
+        )
+        return "\n".join([head, *map(str, self.sequence)])
 
 
 def largest_movement(
@@ -171,7 +175,7 @@ def largest_movement(
         counted as standing.
 
     References:
-        Ochsendorf, The Structural Engineer 84 (2006) 29-35. Portioli and Cascini, Eng. Struct. 148
+        Ochsendorf, The Structural Engineer 84 (2), 2006. Portioli and Cascini, Eng. Struct. 148
         (2017) 485-496.
     """
     instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
@@ -278,7 +282,8 @@ class _Path:
         hinges = tuple(
             (int(j), "intrados" if intrados[j] < extrados[j] else "extrados") for j in hinged
         )
-        return Stage(share, float(blocks.force * (cost @ state.forces)), hinges)
+        names = tuple(self.structure.joints[j].name for j, _ in hinges)
+        return Stage(share, float(blocks.force * (cost @ state.forces)), hinges, names)
 
 
 class _Ends(Exception):

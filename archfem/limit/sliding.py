@@ -23,7 +23,7 @@ from archfem.limit.programme import Limits, Optimum, Programme, friction_limits
 STARTS = 40
 """States from which the search starts, besides the associated one; fewer for many joints."""
 
-JOINTS = 200
+JOINTS = 150
 """Joints up to which every start is tried, and normal forces are bounded one by one."""
 
 ROUNDS = 30
@@ -52,7 +52,8 @@ class WithoutDilatancy:
             solution.
         unbalanced: largest residual of the balance of the solution returned [mean block weights].
         excess: largest |V| - μ N, relative to the largest N.
-        opening: largest opening of an end that carries force, relative to the largest gap.
+        opening: largest opening of an end that carries force, relative to the largest gap;
+            undefined (NaN) with a strength, at which ends that carry force give way.
         gap: complementarity left: by how much friction dissipates more than loads do work,
             relative to the objective.
     """
@@ -194,18 +195,25 @@ def _bound(programme: Programme, seen: Array) -> float:
     for joint in np.flatnonzero(seen > ROOM) if joints <= JOINTS else ():
         cost = np.zeros(3 * joints)
         cost[[joint, joints + joint]] = 1.0
-        state = replace(programme, cost=cost, prices=np.zeros_like(programme.prices)).solve()
-        least[joint] = 0.0 if state is None else max(state.value - ROOM, 0.0)
+        found = _least(replace(programme, cost=cost, prices=np.zeros_like(programme.prices)))
+        least[joint] = max(found - ROOM, 0.0)
     negated = None if programme.cost is None else -programme.cost
-    highest = replace(programme, cost=negated, prices=-programme.prices).solve()
-    bounds = [np.inf if highest is None else -highest.value]
+    highest = -_least(replace(programme, cost=negated, prices=-programme.prices))
+    limits = _cohesive(programme.blocks.structure.friction * least)
     try:
-        limits = _cohesive(programme.blocks.structure.friction * least)
         safe = replace(programme, limits=limits).solve()
-        bounds.append(-np.inf if safe is None else safe.value)
     except DidNotConverge:  # no equilibrium with so little friction
-        pass
-    return min(bounds)
+        return highest
+    return -np.inf if safe is None else min(highest, safe.value)
+
+
+def _least(programme: Programme) -> float:
+    """Least objective, or -inf where it is without bound or the solver cannot tell."""
+    try:
+        found = programme.solve()
+    except DidNotConverge:
+        return -np.inf
+    return -np.inf if found is None else found.value
 
 
 def _checked(
@@ -220,6 +228,8 @@ def _checked(
     carries = state.forces[: 2 * len(thrust)] > CLOSED * max(float(thrust.max()), 1.0)
     excess = np.max(shear - programme.blocks.structure.friction * thrust)
     opening = np.max(gaps[: len(carries)][carries], initial=0.0)
+    if programme.crushing is not None:
+        opening = np.nan
     return replace(
         known,
         unbalanced=float(np.abs(left).max()),

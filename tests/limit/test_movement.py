@@ -149,6 +149,17 @@ def test_it_falls_where_no_three_hinges_at_all_hold_the_thrust_line(thickness, s
     assert not hinged.stands((found.largest + 3.0 * TOLERANCE) * shift)
 
 
+def test_it_leaps_where_only_far_hinges_would_hold():
+    ring = semicircle(0.2, 10)
+    found = largest_movement(ring, SINK, friction=None)
+    assert found.end is End.LEAPS
+    hinged, shift = ThreeHinges(ring), np.array(SINK.motion[:2])
+    beyond = (found.largest + 3.0 * TOLERANCE) * shift
+    assert hinges_of(found.stages[-1]) == ((0, 5, 8), [1, 1, 0])
+    assert not hinged.admissible((0, 5, 8), (1, 1, 0), beyond)
+    assert hinged.admissible((0, 6, 9), (1, 1, 0), beyond)
+
+
 def test_weights_lose_what_the_thrust_does():
     ring = semicircle(0.2, 12)
     found = largest_movement(ring, SPREAD, friction=None)
@@ -202,6 +213,7 @@ def test_the_words_name_the_joints():
     found = largest_movement(semicircle(0.15, 8), SPREAD, friction=None)
     assert "moves by -0.2269 m" in str(found)
     assert "1 (joint 1) intrados, 4 (joint 4) extrados" in str(found)
+    assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
 
 
 def test_gaps_of_displaced_blocks_are_rates_of_what_is_open():
