@@ -109,13 +109,14 @@ def collapse_words(structure: Structure, found: Collapse) -> str:
     """
     joints = structure.joints
     outcome = f"limit analysis: {found.outcome.sentence}"
-    if found.outcome is Outcome.COLLAPSES:
+    if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
         outcome += f", at a factor of {found.factor:.4g} on the load"
     hinges = [f"{joints[number].name} at the {side}" for number, side in found.hinges]
     sliding = [joints[number].name for number in found.sliding]
     lines = [outcome]
     lines += [f"hinges, by the face in contact: {listed(hinges)}"] if hinges else []
     lines += [f"sliding: {listed_joints(sliding)}"] if sliding else []
+    lines += [str(found.solutions)] if found.solutions else []
     return "\n".join(lines)
 
 

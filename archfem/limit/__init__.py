@@ -4,6 +4,8 @@
     programme  the linear programme and its limits
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
+    displaced  rigid blocks that have moved far
+    movement   the largest movement of a support that is survived
     thickness  the least thickness that stands
     skeleton   the blocks that move as rigid bodies when joints fail
     screen     a quick look at whether they can move at all
