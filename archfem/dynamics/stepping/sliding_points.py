@@ -138,7 +138,10 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
     gap, z, last = start.copy(), chosen(law.guess, rows), np.inf
     wanted, share, calm = np.empty(size), 1.0, 0
-    rooms = (np.empty((5 * size + len(law.group), 2), dtype=np.int64), np.empty(5 * size + len(law.group)))
+    rooms = (
+        np.empty((5 * size + len(law.group), 2), dtype=np.int64),
+        np.empty(5 * size + len(law.group)),
+    )
     count = _taken(law, (gap, z), rows, local, wanted, rooms)
     for passes in range(1, ITERATIONS + 1):
         step = _newton(matrix, free + matrix @ wanted - z, rooms, count)
