@@ -26,10 +26,10 @@ _EFFORT = {
 
 
 class Rows:
-    """Rows of one array, made at once as long as it may become, and filled step by step.
+    """Rows of one array, filled step by step; it is made anew, twice as long, where it is full.
 
     Args:
-        most: rows that there can be.
+        most: rows that there may be.
         shape: of each row.
         kind: of the numbers.
     """
@@ -44,6 +44,10 @@ class Rows:
         Args:
             rows: (some, …), with the shape of the others.
         """
+        if self.count + len(rows) > len(self._array):
+            longer = np.empty((2 * self.count + len(rows), *self._array.shape[1:]), self._array.dtype)
+            longer[: self.count] = self.values
+            self._array = longer
         self._array[self.count : self.count + len(rows)] = rows
         self.count += len(rows)
 
@@ -103,8 +107,8 @@ class Recorder:
     Attributes:
         model: that moves.
         method: name of its stepper.
-        dt: time step that was asked for [s].
-        steps: most that the run can take, its start not counted.
+        dt: time step that was asked for [s]; None where steps have lengths of their own.
+        steps: that the run may take, its start not counted.
         every: the joints' resultants are kept at every n-th step.
         fields_every: coordinates are kept at every n-th step; None keeps none.
         criteria: by which joints are judged.
@@ -115,7 +119,7 @@ class Recorder:
 
     model: Model
     method: str
-    dt: float
+    dt: float | None
     steps: int
     every: int
     fields_every: int | None
@@ -201,7 +205,9 @@ class Recorder:
             "last_time": self.state.time,
             "energy_drift": self.guard.worst,
             "largest_displacement": self.guard.largest_displacement,
-            "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)),
+            "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)) if self.dt else 0,
+            "shortest_step": float(self._smallest.values[1:].min(initial=np.inf)),
+            "steps": self._drift.count - 1,
             "fallback_steps": self.fallback,
             "signs": SIGNS,
             "versions": versions(),

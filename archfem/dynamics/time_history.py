@@ -16,6 +16,7 @@ from archfem.dynamics.recorder import Recorder
 from archfem.dynamics.schemes import HHT, Conserving, Newmark, Rayleigh, Scheme
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.pace import Pace
 from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.steps import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
@@ -28,7 +29,10 @@ from archfem.statics.newton import Newton
 logger = logging.getLogger("archfem")
 
 STEP = 0.005
-"""Time step where none is given [s]."""
+"""Time step by which strategies are compared where steps have lengths of their own [s]."""
+
+TOLERANCE = 0.005
+"""Error of |e| that steps in time may cause where none is given [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +72,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     motion: Motion,
     *,
     dt: float | None = None,
+    tolerance: float | None = None,
     start: Equilibrium | State | None = None,
     damping: Rayleigh | None = None,
     scheme: Scheme | None = None,
@@ -86,8 +91,11 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     Args:
         model: any rung of the ladder.
         motion: of the ground.
-        dt: time step [s], by default 0.005, or that for which the model was chosen; ground
-            accelerations between samples are interpolated.
+        dt: time step [s]; by default that for which the model was chosen, or steps of different
+            lengths, as the tolerance asks for. Accelerations between samples are interpolated.
+        tolerance: error of |e| of the joints of rings and piers that steps in time may cause [-],
+            without `dt`; by default 0.005. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of
+            the history says for which part of the shortest the error was larger.
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
         damping: None is undamped.
@@ -117,19 +125,20 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     _check_kinds(start=start, damping=damping, scheme=scheme, record=record)
     _check_kinds(criteria=criteria, newton=newton)
-    dt = _step(model, dt)
+    dt, tolerance = _steps(model, dt, tolerance)
     criteria = agreed(criteria, until)
     watch = None if until is None else begun(until, model.structure, criteria)
     equation = Equation(model, motion, damping, scheme or Conserving())
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)
         start = equation.at_rest(rest.q, memory=rest.model.memory)
-    stepper = stepper_for(method, equation, start, dt, newton)
-    first = _first(stepper, start, dt)
+    stepper = stepper_for(method, equation, start, dt or STEP, newton)
+    first = _first(stepper, start, dt or STEP)
     recorder = _recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
+    pace = None if dt else Pace(stepper, tolerance, first)
     try:
         recorder.add(first)
-        ended, outcome = _stepped(stepper, recorder, watch, motion.duration)
+        ended, outcome = _stepped(pace or stepper, recorder, watch, motion.duration)
     except KeyboardInterrupt:
         ended, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
@@ -137,16 +146,27 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         words = f"failed at {recorder.state.time:.4g} s: {error}"
         error.history = recorder.history(motion, Ending.FAILED, words)
         raise
-    return recorder.history(motion, ended, outcome)
+    history = recorder.history(motion, ended, outcome)
+    if pace is not None:
+        history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": pace.unmet_share}
+    return history
 
 
-def _step(model: Model, dt: float | None) -> float:
-    """The time step that was asked for, or that for which the model was chosen [s]."""
+def _steps(
+    model: Model, dt: float | None, tolerance: float | None
+) -> tuple[float | None, float]:
+    """The time step [s], None where steps have lengths of their own, and the tolerance [-]."""
+    if tolerance is not None:
+        if dt is not None:
+            raise InvalidInput(f"dt = {dt!r} s and tolerance = {tolerance!r}: give one of both")
+        if not 0.0 < real(tolerance, "tolerance on |e| [-]") < 1.0:
+            raise InvalidInput(f"tolerance {tolerance!r} on |e| is not between 0 and 1: try 0.005")
+        return None, tolerance
     if dt is None:
-        return model.prediction.dt if model.prediction else STEP
+        return (model.prediction.dt if model.prediction else None), TOLERANCE
     if not 0.0 < real(dt, "dt [s]") <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
-    return dt
+    return dt, TOLERANCE
 
 
 def _check_kinds(**given: Any) -> None:
@@ -170,7 +190,7 @@ def _first(stepper: Stepper, start: State, dt: float) -> Batch:
 
 
 def _recorder(
-    stepper: Stepper, first: Batch, dt: float, end: float, record: Record, criteria: Criteria
+    stepper: Stepper, first: Batch, dt: float | None, end: float, record: Record, criteria: Criteria
 ) -> Recorder:
     """A recorder of a run yet to begin, with a guard over it."""
     model, start = stepper.equation.model, first.state(0)
@@ -178,7 +198,7 @@ def _recorder(
         model=model,
         method=stepper.name,
         dt=dt,
-        steps=max(0, round((end - start.time) / dt)),
+        steps=max(0, round((end - start.time) / (dt or STEP))),
         every=record.every,
         fields_every=record.fields_every,
         criteria=criteria,
@@ -188,23 +208,29 @@ def _recorder(
 
 
 def _stepped(
-    stepper: Stepper, recorder: Recorder, watch: Watch | None, end: float
+    stepper: Stepper | Pace, recorder: Recorder, watch: Watch | None, end: float
 ) -> tuple[Ending, str]:
     """Record steps to the end of the motion, or up to an event; which of both, also in words."""
     # Steps are too small for threads, which only get in each other's way.
-    with _bar(recorder.steps) as bar, threadpool_limits(limits=1, user_api="blas"):
-        for batch in stepper.batches(recorder.state, recorder.dt, end):
+    start = recorder.state
+    batches = (
+        stepper.batches(start, end)
+        if isinstance(stepper, Pace)
+        else stepper.batches(start, recorder.dt or STEP, end)
+    )
+    with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
+        for batch in batches:
             reason, size = _reason(watch, batch)
             recorder.add(batch.cut(size), last=reason is not None)
-            bar.update(size)
+            bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
                 time = recorder.state.time
                 return Ending.EVENT, f"ended at {time:.4g} s by {reason}"
     return Ending.FINISHED, "reached the end of the motion"
 
 
-def _bar(steps: int) -> tqdm:
-    return tqdm(total=steps, unit="step", disable=None, leave=False)
+def _bar(duration: float) -> tqdm:
+    return tqdm(total=round(duration, 4), unit="s", disable=None, leave=False)
 
 
 def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:

@@ -136,5 +136,5 @@ class Stepper:
         passes = np.zeros(steps, dtype=np.int64)
         results = (np.empty((steps, joints, 3)), passes, np.empty((steps, 4)))
         if dt not in self._systems:
-            self._systems = {dt: self.strategy.system(dt)}
+            self._systems[dt] = self.strategy.system(dt)
         return series, memories, results, self.equation.ground(times, dt), self._systems[dt]
