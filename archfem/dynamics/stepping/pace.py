@@ -2,8 +2,8 @@
 
 An averaged force is its value at the middle of the step, but for ¹/₂₄ Δt² of its curvature in time.
 So the second difference of the resultants from step to step, ¼ Δt² f'' and more where vibration is
-not resolved, tells what a step does not see, and costs nothing: it is taken of M / (N h) and of
-N, with N at least half of that under dead load, and the worst joint of rings and piers counts.
+not resolved, tells what a step does not see, and costs nothing: it is taken of M / (N h), with N
+at least half of that under dead load, and the worst joint of rings and piers counts.
 Steps whose error is too large are taken again, half as long; where it is small they become twice as
 long. They are the record's own, halved or doubled, so that a step never ends between two samples
 unless it is shorter than they are apart.
@@ -136,11 +136,10 @@ class Pace:
         return replace(batch, iterations=batch.iterations + ITERATIONS, fallback=True)
 
     def _scaled(self, resultants: Array) -> Array:
-        """M / (N h) and N, relative, of the joints that are judged (steps, 2, joints)."""
+        """M / (N h) of the joints that are judged (steps, joints)."""
         normal, moment = resultants[:, self._judged, 0], resultants[:, self._judged, 2]
-        whole = np.maximum(normal, self._least)
-        e = moment / (whole * self._depths)
-        return np.stack([e, 0.5 * np.minimum(normal / self._least, 1.0)], axis=1)
+        e: Array = moment / (np.maximum(normal, self._least) * self._depths)
+        return e
 
     def _errors(self, batch: Batch) -> Array:
         """Errors of the steps in |e| of the worst joint (steps,)."""
@@ -151,7 +150,7 @@ class Pace:
         values = np.concatenate([*(value[None] for _, value in before), values])
         errors = np.zeros(len(times))
         if len(times) > 2:
-            slopes = np.diff(values, axis=0) / np.diff(times)[:, None, None]
-            bends = 2.0 * np.diff(slopes, axis=0) / (times[2:] - times[:-2])[:, None, None]
-            errors[2:] = dt**2 * np.abs(bends).max(axis=(1, 2)) / SEEN
+            slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+            bends = 2.0 * np.diff(slopes, axis=0) / (times[2:] - times[:-2])[:, None]
+            errors[2:] = dt**2 * np.abs(bends).max(axis=1) / SEEN
         return errors[len(before) :]
