@@ -13,11 +13,12 @@ from archfem.arguments import instance, real
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.blocks import RigidBlocks, rigid_load
+from archfem.limit.blocks import RigidBlocks
+from archfem.limit.fill import Fill
+from archfem.limit.filled import Stones, stones_of
 from archfem.limit.programme import Optimum, Programme, friction_limits, no_limits
 from archfem.limit.sliding import without_dilatancy
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
-from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
 logger = logging.getLogger("archfem")
@@ -73,6 +74,9 @@ class Collapse:
         motion: velocities of all blocks' centroids and rotations (n_blocks, 3), scaled so that
             the fastest corner has 1 m/s, or those that follow a settlement. Zero where nothing
             moves. Where it does not stand: how it falls under its own weight.
+        soil: where there is a fill, its pressure on each piece of a stone's face, between the least
+            and the most that it can be [Pa], with the number of the block, the piece's ends and the
+            sense of the pressure along x; else None.
     """
 
     factor: float
@@ -81,6 +85,7 @@ class Collapse:
     sliding: tuple[int, ...]
     joints: xr.Dataset
     motion: Array
+    soil: xr.Dataset | None = None
 
     def __str__(self) -> str:
         """Outcome, factor and failing joints in one line."""
@@ -97,6 +102,7 @@ def collapse_factor(
     live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     friction: str | None = "coulomb",
     strength: float | None = None,
+    fill: Fill | None = None,
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
@@ -126,13 +132,15 @@ def collapse_factor(
             iterates until joints slide without dilating; None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
+        fill: strength of blocks softer than their joints, which become weight and pressures on the
+            stones (`Fill`), with those that rest on them; None where there are none.
 
     Returns:
         The factor, how it was found, and the mechanism.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure, or bodies such as a
-            fill cannot be taken as rigid.
+        InvalidInput: an option is unknown, an action misses the structure, or bodies too soft to
+            be rigid are without the strength of a fill.
         DidNotConverge: the iteration for sliding joints did not settle.
 
     Note:
@@ -143,26 +151,27 @@ def collapse_factor(
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
         (1978) 1853-1871. Gilbert, Casapulla and Ahmed, Computers & Structures 84 (2006) 873-887.
     """
-    dead = _self_weight(structure, friction, strength)
-    fall = _unbalanced(dead)
-    if not _balanced(fall, dead):
-        return _result(dead, Outcome.INFEASIBLE, np.nan, replace(fall, forces=np.nan * fall.forces))
+    stones, dead = self_weight(structure, friction, strength, fill)
+    fall = dead.unbalanced()
+    if not balanced(fall, dead):
+        nothing = replace(fall, forces=np.nan * fall.forces, extra=np.nan * fall.extra)
+        return _result(stones, dead, Outcome.INFEASIBLE, np.nan, nothing)
     support = None
     if isinstance(live, Settlement):
-        support = np.zeros((len(structure.blocks), 3))
-        support[live.place(structure)] = live.motion
+        support = np.zeros((len(stones.skeleton.blocks), 3))
+        support[stones.skeleton.blocks.index(live.place(structure))] = live.motion
         asked, scale = _settled(dead, support), dead.blocks.force
         ends = Outcome.SETTLES, Outcome.LOCKS
     else:
-        asked, scale = _loaded(dead, loads(live)), -1.0
+        asked, scale = dead.growing(stones.load(loads(live))), -1.0
         ends = Outcome.COLLAPSES, Outcome.UNBOUNDED
     found = asked.solve()
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
-        return _result(dead, ends[1], np.inf, rest)
+        return _result(stones, dead, ends[1], np.inf, rest)
     if friction == "nonassociated":
         found = without_dilatancy(asked, found)
-    result = _result(asked, ends[0], scale * found.value, found, support=support)
+    result = _result(stones, asked, ends[0], scale * found.value, found, support=support)
     if friction == "coulomb" and result.sliding:
         logger.warning(
             "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "
@@ -174,7 +183,11 @@ def collapse_factor(
 
 
 def stands(
-    structure: Structure, *, friction: str | None = "coulomb", strength: float | None = None
+    structure: Structure,
+    *,
+    friction: str | None = "coulomb",
+    strength: float | None = None,
+    fill: Fill | None = None,
 ) -> bool:
     """Tell whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
 
@@ -190,18 +203,20 @@ def stands(
             sliding.
         strength: compressive strength of the blocks [Pa], as for `collapse_factor`; None for no
             limit.
+        fill: strength of the fill, as for `collapse_factor`; None where there is none.
 
     Returns:
         Whether it stands.
 
     Raises:
-        InvalidInput: an option is unknown, or bodies such as a fill cannot be taken as rigid.
+        InvalidInput: an option is unknown, or bodies too soft to be rigid are without the strength
+            of a fill.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
     """
-    dead = _self_weight(structure, friction, strength)
-    return _balanced(_unbalanced(dead), dead)
+    _, dead = self_weight(structure, friction, strength, fill)
+    return balanced(dead.unbalanced(), dead)
 
 
 def _checked(friction: str | None, strength: float | None) -> None:
@@ -212,47 +227,37 @@ def _checked(friction: str | None, strength: float | None) -> None:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
 
 
-def _check_stiff(structure: Structure) -> None:
-    """Refuse bodies that cannot be taken as rigid: they would hold what lies under them."""
-    names = [structure.blocks[number].name for number in yielding_blocks(structure)]
-    if names:
-        raise InvalidInput(
-            f"blocks {names} are softer than the joints around them: rigid, they would hold every "
-            "ring below; build the structure without them, with their weight as point loads, or "
-            "push a finite-element model over, in which they deform"
-        )
+def self_weight(
+    structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
+) -> tuple[Stones, Programme]:
+    """Return what stands, and the programme of its self-weight with nothing asked of it.
 
+    Args:
+        structure: supports are its fixed blocks.
+        friction: as for `collapse_factor`.
+        strength: as for `collapse_factor` [Pa].
+        fill: as for `collapse_factor`.
 
-def _self_weight(structure: Structure, friction: str | None, strength: float | None) -> Programme:
-    """Programme whose load is the self-weight, with nothing asked of it."""
+    Raises:
+        InvalidInput: as for `collapse_factor`.
+    """
     instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
     _checked(friction, strength)
-    _check_stiff(structure)
-    blocks = RigidBlocks(structure)
-    count = len(structure.joints)
-    limits = no_limits(count)
+    stones = stones_of(structure, fill)
+    left = stones.skeleton.structure
+    blocks = RigidBlocks(left)
+    limits = no_limits(len(left.joints))
     if friction is not None:
-        limits = friction_limits(structure.friction, np.zeros(count))
+        limits = friction_limits(left.friction, np.zeros(len(left.joints)))
     crushing = None
     if strength is not None:
-        crushing = strength * structure.width * structure.depths / blocks.force
-    return Programme(blocks, blocks.scaled(rigid_load(structure, [SELF_WEIGHT])), limits, crushing)
-
-
-def _unbalanced(dead: Programme) -> Optimum:
-    """Least forces to be added for equilibrium; their multipliers are the fall of the blocks."""
-    size = len(dead.load)
-    either = sparse.identity(size)
-    columns = sparse.hstack([either, -either], format="csr")
-    found = replace(dead, columns=columns, prices=np.ones(2 * size)).solve()
-    assert found is not None  # no sum of magnitudes is below zero
-    return found
-
-
-def _loaded(dead: Programme, live: Sequence[BodyForce | PointLoad]) -> Programme:
-    """Ask for the largest factor of live actions."""
-    load = dead.blocks.scaled(rigid_load(dead.blocks.structure, live))
-    return replace(dead, columns=sparse.csr_matrix(-load[:, None]), prices=np.array([-1.0]))
+        crushing = strength * left.width * left.depths / blocks.force
+    weight = blocks.scaled(stones.load([SELF_WEIGHT]) + stones.active())
+    dead = Programme(blocks, weight, limits, crushing)
+    if fill is None:
+        return stones, dead
+    pressures = sparse.diags(-blocks.coordinates / blocks.force) @ stones.passive()
+    return stones, dead.also(pressures, np.zeros(pressures.shape[1]), 1.0)
 
 
 def _settled(dead: Programme, support: Array) -> Programme:
@@ -261,19 +266,29 @@ def _settled(dead: Programme, support: Array) -> Programme:
     return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
 
 
-def _balanced(fall: Optimum, dead: Programme) -> bool:
-    """Whether the forces missing for equilibrium are nothing."""
+def balanced(fall: Optimum, dead: Programme) -> bool:
+    """Return whether the forces missing for equilibrium are nothing.
+
+    Args:
+        fall: as `dead.unbalanced()` found it.
+        dead: programme of the self-weight.
+    """
     return fall.value <= UNBALANCED * len(dead.blocks.structure.free)
 
 
 def _result(
-    asked: Programme, outcome: Outcome, factor: float, found: Optimum, support: Array | None = None
+    stones: Stones,
+    asked: Programme,
+    outcome: Outcome,
+    factor: float,
+    found: Optimum,
+    support: Array | None = None,
 ) -> Collapse:
-    """Return the optimum read as joint resultants and as a motion of blocks.
+    """Return the optimum read as joint resultants and as a motion of the whole's blocks.
 
     A motion that follows a moving support keeps its size, any other is scaled.
     """
-    structure = asked.blocks.structure
+    structure, skeleton = asked.blocks.structure, stones.skeleton
     motion = asked.blocks.motion(found.coordinates)
     if support is not None:
         motion = motion + support
@@ -284,9 +299,12 @@ def _result(
     apart = np.minimum(intrados, extrados) - structure.friction * abs(slip) > least
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
-        (int(j), "intrados" if intrados[j] < extrados[j] else "extrados")
+        (skeleton.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")
         for j in np.flatnonzero(turning)
     )
-    slides = tuple(int(j) for j in np.flatnonzero((abs(slip) > least) & ~apart))
-    joints = joint_dataset(structure, asked.blocks.resultants(found.forces))
-    return Collapse(float(factor), outcome, hinges, slides, joints, motion)
+    slides = tuple(skeleton.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
+    resultants = np.full((len(stones.whole.joints), 3), np.nan)
+    resultants[list(skeleton.joints)] = asked.blocks.resultants(found.forces)
+    joints = joint_dataset(stones.whole, resultants)
+    moved, soil = skeleton.in_whole(motion), stones.soil(found.extra)
+    return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil)

@@ -1,6 +1,6 @@
 """Linear programmes over the forces at the joints of rigid blocks, and what joints can carry."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,18 +94,20 @@ class Optimum:
         value: the least value of the objective.
         forces: F_i, F_e and V of all joints (3 n_joints,) [mean block weights].
         coordinates: multipliers of the balance, the motion of the free blocks (3 n_free,).
+        extra: the further unknowns z (k,).
     """
 
     value: float
     forces: Array
     coordinates: Array
+    extra: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """A linear programme over joint forces x and further unknowns z >= 0.
+    """A linear programme over joint forces x and further unknowns z.
 
-        min  a·x + b·z   subject to   A x + D z = f,   limits on x,   F_i, F_e >= 0
+        min  a·x + b·z   subject to   A x + D z = f,   limits on x,   F_i, F_e >= 0,   0 <= z <= c
 
     Attributes:
         blocks: which give A.
@@ -115,6 +117,7 @@ class Programme:
         cost: a (3 n_joints,), or None for nothing.
         columns: D (3 n_free, k), or None for no unknowns but the forces.
         prices: b (k,).
+        most: c (k,), infinite where z has no upper limit.
     """
 
     blocks: RigidBlocks
@@ -124,6 +127,39 @@ class Programme:
     cost: Array | None = None
     columns: sparse.csr_matrix | None = None
     prices: Array = field(default_factory=lambda: np.zeros(0))
+    most: Array = field(default_factory=lambda: np.zeros(0))
+
+    def also(self, columns: sparse.csr_matrix, prices: Array, most: float = np.inf) -> "Programme":
+        """Return the programme with further unknowns behind those it has.
+
+        Args:
+            columns: of D (3 n_free, m).
+            prices: of b (m,).
+            most: upper limit of all of them.
+        """
+        return replace(
+            self,
+            columns=columns if self.columns is None else sparse.hstack([self.columns, columns]),
+            prices=np.concatenate([self.prices, prices]),
+            most=np.concatenate([self.most, np.full(len(prices), most)]),
+        )
+
+    def growing(self, load: Array) -> "Programme":
+        """Return the programme that asks for the largest factor of a load beside f.
+
+        Args:
+            load: generalised forces (3 n_free,) [N, N, N m].
+        """
+        column = sparse.csr_matrix(-self.blocks.scaled(load)[:, None])
+        return self.also(column, np.array([-1.0]))
+
+    def unbalanced(self) -> Optimum:
+        """Return the least forces to be added for equilibrium; their multipliers are a fall."""
+        either = sparse.identity(len(self.load))
+        columns = sparse.hstack([either, -either], format="csr")
+        found = self.also(columns, np.ones(2 * len(self.load))).solve()
+        assert found is not None  # no sum of magnitudes is below zero
+        return found
 
     def solve(self) -> Optimum | None:
         """Solve, adding crushing cuts until none is violated.
@@ -166,6 +202,7 @@ class Programme:
         beside = sparse.csr_matrix((len(limits.bounds), extra))
         bounds = np.tile([0.0, np.inf], (size + extra, 1))
         bounds[2 * joints : size, 0] = -np.inf
+        bounds[size:, 1] = self.most
         found = linprog(
             cost,
             A_ub=sparse.hstack([limits.rows, beside], format="csr"),
@@ -184,4 +221,6 @@ class Programme:
             return None
         if found.status != 0:
             raise DidNotConverge(f"the linear programme found no state: {found.message}")
-        return Optimum(float(found.fun), found.x[:size], np.array(found.eqlin.marginals))
+        return Optimum(
+            float(found.fun), found.x[:size], np.array(found.eqlin.marginals), found.x[size:]
+        )
