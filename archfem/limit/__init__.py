@@ -4,6 +4,10 @@
     programme  the linear programme and its limits
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
+    fill       strength of a fill, earth pressure, how it spreads loads
+    strips     what lies above which stone, and what a fan of load meets first
+    filled     stones under a fill: its weight and its pressures as loads and limits
+    moving     a vehicle at every place on a bridge
     thickness  the least thickness that stands
     skeleton   the blocks that move as rigid bodies when joints fail
     screen     a quick look at whether they can move at all

@@ -5,6 +5,9 @@ from .collapse import stands as stands
 from .counted import Mechanism as Mechanism
 from .counted import counted_mechanism as counted_mechanism
 from .counted import counted_mechanisms as counted_mechanisms
+from .fill import Fill as Fill
+from .moving import MovingLoad as MovingLoad
+from .moving import moving_load as moving_load
 from .thickness import minimum_thickness as minimum_thickness
 from .verified import VerifiedMechanism as VerifiedMechanism
 from .verified import Verifier as Verifier

@@ -119,5 +119,4 @@ class Fill:
 
 def _flamant(slope: Array) -> Array:
     """θ + sin θ cos θ, which grows as the vertical force between the vertical and a ray."""
-    force: Array = np.arctan(slope) + slope / (1.0 + np.square(slope))
-    return force
+    return np.asarray(np.arctan(slope) + slope / (1.0 + slope**2), dtype=float)

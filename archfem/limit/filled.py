@@ -14,8 +14,8 @@ from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.limit.blocks import rigid_load
 from archfem.limit.fill import Fill
-from archfem.limit.fill_profile import Profile
 from archfem.limit.skeleton import Skeleton, skeleton_of
+from archfem.limit.strips import Profile
 from archfem.masonry.actions import BodyForce, PointLoad
 from archfem.masonry.rigid_motion import first_coordinate, motion_of
 from archfem.masonry.softness import yielding_blocks
