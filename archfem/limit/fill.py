@@ -89,6 +89,11 @@ class Fill:
         """K_p, passive over vertical stress of a fill without cohesion [-]."""
         return tan(radians(45.0 + self.friction_angle / 2.0)) ** 2
 
+    @property
+    def edge(self) -> float:
+        """Slope of the fan's edges, horizontal to vertical [-]."""
+        return tan(radians(self.spread))
+
     def pressures(self, overburden: Array) -> tuple[Array, Array]:
         """Return the least and the greatest horizontal pressure, two arrays as given [Pa].
 
@@ -110,11 +115,10 @@ class Fill:
         Args:
             slope: tan θ of rays at θ from the vertical, positive to the right, any shape.
         """
-        limit = tan(radians(self.spread))
-        inside = np.clip(slope, -limit, limit)
+        inside = np.clip(slope, -self.edge, self.edge)
         if self.dispersal == "uniform":
-            return np.asarray(0.5 + 0.5 * inside / limit)
-        return np.asarray(0.5 + 0.5 * _flamant(inside) / _flamant(np.array(limit)))
+            return np.asarray(0.5 + 0.5 * inside / self.edge)
+        return np.asarray(0.5 + 0.5 * _flamant(inside) / _flamant(np.array(self.edge)))
 
 
 def _flamant(slope: Array) -> Array:

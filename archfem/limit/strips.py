@@ -10,7 +10,7 @@ from archfem.arrays import Array
 from archfem.limit.fill import Fill
 from archfem.masonry.structure import TOUCHING, Structure
 
-FINE = 1 / 500
+FINE = 1 / 2000
 """Width of the pieces on which a fan is summed up, as a fraction of the structure's size."""
 
 
@@ -189,20 +189,29 @@ class Profile:
             Numbers of stones (n,), points where they are met (n, 2) [m], and parts of the load
             (n,), of which several may be of one stone.
         """
+        found = [self._half_fan(point, fill, sense) for sense in (1, -1)]
+        block, points, part = (np.concatenate(each) for each in zip(*found, strict=True))
+        return block, points, part
+
+    def _half_fan(
+        self, point: Array, fill: Fill, sense: int
+    ) -> tuple[NDArray[np.intp], Array, Array]:
+        """What stones to one side of a load get of it, outwards: to the right where sense is 1."""
         block, side, level = self._skyline
-        part = np.zeros(len(block))
-        for sense in (1.0, -1.0):
-            far = sense * (side[:, :: int(sense)] - point[0])
-            beyond = np.flatnonzero(far[:, 1] > self.near)[:: int(sense)]
-            reach = np.maximum(far[beyond], 0.0)
-            depth = point[1] - level[beyond][:, :: int(sense)]
-            slope = np.where(depth > self.near, reach / np.maximum(depth, self.near), np.inf)
-            seen = np.maximum.accumulate(slope.ravel()).reshape(slope.shape)
-            crossed = fill.share(seen[:, 1])
-            part[beyond] += np.diff(crossed, prepend=0.5)
-        met = np.flatnonzero(part > 0.0)
-        points = np.stack([side[met].mean(axis=1), level[met].mean(axis=1)], axis=1)
-        return block[met], points, part[met]
+        far = sense * (side[:, ::sense] - point[0])
+        beyond = np.flatnonzero(far[:, 1] > self.near)[::sense]
+        depth = point[1] - level[beyond, ::sense]
+        slope = far[beyond] / np.maximum(depth, self.near)
+        ahead = np.where(depth > self.near, np.maximum(slope, 0.0), np.inf)
+        seen = np.minimum(np.maximum.accumulate(ahead.ravel()), fill.edge)[1::2]
+        before = np.concatenate([[0.0], seen[:-1]])
+        met = np.flatnonzero(seen > before)
+        first, last = slope[met].T
+        ray = 0.5 * (before + seen)[met]
+        along = np.clip((ray - first) / np.where(last > first, last - first, np.inf), 0.0, 1.0)
+        ends = np.stack([side, level], axis=2)[beyond[met], ::sense]
+        points = ends[:, 0] + along[:, None] * (ends[:, 1] - ends[:, 0])
+        return block[beyond[met]], points, fill.share(seen[met]) - fill.share(before[met])
 
 
 def _level(side: Array, edge: Array, x: Array) -> Array:

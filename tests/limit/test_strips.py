@@ -11,7 +11,7 @@ from archfem.masonry.softness import yielding_blocks
 
 ROUND_OFF = 1e-9
 FINE = 5e-3
-"""Of places within a fan: it is summed over pieces of 1/500 of the structure."""
+"""Of places within a fan: it is summed over pieces of 1/2000 of the structure."""
 
 
 def profile(structure):
