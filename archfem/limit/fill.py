@@ -27,17 +27,19 @@ class Fill:
       so that stones which move into the fill are held back and those which move away are pushed;
     - a load on its surface goes down in a straight fan to the stones that it meets first.
 
-    The vertical stress is that of the weights alone: live loads do not raise the pressures. Shear
-    between fill and stones is neglected.
+    The vertical stress is that of the weights alone: live loads do not raise the pressures, and a
+    body force, which pulls at each column's foot, does not change them as an earthquake would
+    (Mononobe and Okabe). Shear between fill and stones is neglected, and the fill is long enough to bear what it resists: its
+    own balance is not asked for, and what presses on one arch does not press on the next.
 
     Attributes:
         friction_angle: φ of the fill [degrees].
         cohesion: c of the fill [Pa].
         mobilisation: m, the part of the passive pressure that is counted on, from 0 for none to 1
             for all; the whole of it needs more movement than a bridge may have [-].
-        active: a, the part of the active pressure that always acts, from 0 to 1 [-]. The whole is
-            on the safe side of any part; neglecting it is customary for arches, but not for walls
-            that hold a fill back.
+        active: a, the part of the active pressure that always acts, from 0 to 1 [-]. Neglecting it
+            is customary for arches, and wrong for walls that hold a fill back. Where some passive
+            pressure beyond it is counted on, the whole is on the safe side of any part.
         dispersal: how a load spreads within the fan: "boussinesq", as through an elastic half-plane
             under a line load, or "uniform", evenly on each level.
         spread: half the angle of the fan, from the vertical [degrees]. What Boussinesq's stresses
