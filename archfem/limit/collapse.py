@@ -172,6 +172,8 @@ def collapse_factor(
     if friction == "nonassociated":
         found = without_dilatancy(asked, found)
     result = _result(stones, asked, ends[0], scale * found.value, found, support=support)
+    if not isinstance(live, Settlement):
+        stones.warn_of_sliding_fill(loads(live), result.factor)
     if friction == "coulomb" and result.sliding:
         logger.warning(
             "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "

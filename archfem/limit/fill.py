@@ -30,8 +30,8 @@ class Fill:
     The vertical stress is that of the weights alone: live loads do not raise the pressures, and a
     body force, which pulls at each column's foot, does not change them as an earthquake would
     (Mononobe and Okabe). Shear between fill and stones is neglected, and the fill is long enough to
-    bear what it resists: its own balance is not asked for, and what presses on one arch does not
-    press on the next.
+    bear what it resists: its own balance and failure are not asked for, and what presses on one
+    arch does not press on the next.
 
     Attributes:
         friction_angle: φ of the fill [degrees].

@@ -1,9 +1,11 @@
 """Stones under a fill: what the fill lays on them, and what holds them back where they move."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from math import radians, tan
 
 import numpy as np
 import xarray as xr
@@ -20,6 +22,8 @@ from archfem.masonry.actions import BodyForce, PointLoad
 from archfem.masonry.rigid_motion import first_coordinate, motion_of
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
+
+logger = logging.getLogger("archfem")
 
 PIECES = 8
 """Into how many pieces, each pressed on as a whole, the face of a stone in a joint is cut."""
@@ -165,6 +169,28 @@ class Stones:
         block, points, part = self._profile.fan(point, self.fill)
         forces = part[:, None] * np.array(load.force)
         return self._total(self._place[block], points, forces)
+
+    def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
+        """Warn where a fill without cohesion would slide before the stones become a mechanism.
+
+        A column that is pulled sideways rests on the next layer by friction alone: it slides where
+        the pull is more than tan φ of what presses it down.
+
+        Args:
+            actions: live, over self-weight.
+            factor: of these at collapse [-].
+        """
+        pulls = [action for action in actions if isinstance(action, BodyForce)]
+        if self.fill is None or self.fill.cohesion > 0.0:
+            return
+        slope = tan(radians(self.fill.friction_angle))
+        sideways = factor * abs(sum(pull.horizontal for pull in pulls))
+        if sideways > slope * (1.0 - factor * sum(pull.vertical for pull in pulls)):
+            logger.warning(
+                "at a factor of %.4g the fill itself slides, at %.3g g sideways and tan φ = %.3g: "
+                "the factor is that of the stones alone, and no fill would stay to load them so",
+                *(factor, sideways, slope),
+            )
 
     def active(self) -> Array:
         """Return the generalised forces of the active pressure (3 n_free,) [N, N, N m]."""

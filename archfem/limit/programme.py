@@ -100,7 +100,7 @@ class Optimum:
     value: float
     forces: Array
     coordinates: Array
-    extra: Array
+    extra: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -346,6 +346,20 @@ def test_an_arch_too_thin_for_its_fill_does_not_stand():
     assert af.stands(thin, fill=ALL)
 
 
+def test_a_fill_that_slides_first_is_warned_of(caplog):
+    structure = arch_bridge(thickness=0.6)
+    with caplog.at_level("WARNING", "archfem"):
+        loose = replace(GRAVEL, friction_angle=20.0)
+        found = af.collapse_factor(structure, live=SIDEWAYS, friction=None, fill=loose)
+        assert found.factor > np.tan(np.radians(20.0))
+        assert "the fill itself slides" in caplog.text
+        caplog.clear()
+        sticky = replace(loose, cohesion=5e3)
+        af.collapse_factor(structure, live=SIDEWAYS, friction=None, fill=sticky)
+        af.collapse_factor(structure, live=QUARTER, friction=None, fill=loose)
+    assert not caplog.text
+
+
 @pytest.mark.parametrize(
     ("call", "says"),
     [
