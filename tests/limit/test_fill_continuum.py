@@ -12,7 +12,6 @@ import pytest
 from backfilled import SOIL, arch_bridge, fill_of, rectangle, retaining_wall
 
 import archfem as af
-from archfem.limit.fill import Fill
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
@@ -68,7 +67,7 @@ def test_a_wedge_of_triangles_resists_a_wall_as_rankine_has_it():
     bound = af.collapse_factor(cut, live=PUSH).factor
     weight, pressure = 12.0 * af.STONE.unit_weight, 3.0 * SOIL.unit_weight * height**2 / 2.0
     assert bound * 1e3 == pytest.approx(0.3 * weight + pressure, rel=EXACT)
-    fill = Fill(friction_angle=angle, mobilisation=1.0)
+    fill = af.limit.Fill(friction_angle=angle, mobilisation=1.0)
     assert af.collapse_factor(wall, live=PUSH, fill=fill).factor == pytest.approx(bound, rel=EXACT)
 
 
@@ -102,7 +101,7 @@ def test_an_arch_under_a_footing_is_below_the_upper_bound():
         af.collapse_factor(
             structure,
             live=load,
-            fill=Fill(friction_angle=35.0, spread=40.0, mobilisation=part),
+            fill=af.limit.Fill(friction_angle=35.0, spread=40.0, mobilisation=part),
         ).factor
         for part in (1.0 / 3.0, 1.0)
     ]

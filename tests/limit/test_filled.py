@@ -17,8 +17,6 @@ from backfilled import (
 from scipy.optimize import linprog
 
 import archfem as af
-from archfem.limit.collapse import Outcome
-from archfem.limit.fill import Fill
 from archfem.limit.filled import stones_of
 
 EXACT = 1e-6
@@ -30,7 +28,7 @@ SUMMED = 1e-5
 RAYS = 40
 """To each stone."""
 
-GRAVEL = Fill(friction_angle=35.0)
+GRAVEL = af.limit.Fill(friction_angle=35.0)
 ALL = replace(GRAVEL, mobilisation=1.0)
 NONE = replace(GRAVEL, mobilisation=0.0, active=0.0)
 
@@ -47,7 +45,7 @@ def earth_pressure(height, coefficient):
 def test_a_wall_pushed_into_its_fill_meets_rankine(friction, part):
     """Slides where λ W = μ W + E_p, tilts where λ W h/2 = W b/2 + E_p h/3."""
     breadth, height = 1.5, 2.0
-    fill = Fill(friction_angle=30.0, mobilisation=part, active=0.0)
+    fill = af.limit.Fill(friction_angle=30.0, mobilisation=part, active=0.0)
     wall = retaining_wall(breadth, height, friction)
     weight, push = breadth * height * af.STONE.unit_weight, earth_pressure(height, 3.0 * part)
     slide = friction + push / weight
@@ -64,13 +62,15 @@ def test_a_wall_pulled_from_its_fill_is_pushed_by_it(friction):
     weight, push = breadth * height * af.STONE.unit_weight, earth_pressure(height, 1.0 / 3.0)
     slide = friction - push / weight
     tilt = breadth / height - push / weight * 2.0 / 3.0
-    found = af.collapse_factor(wall, live=af.BodyForce(-1.0), fill=Fill(friction_angle=30.0))
+    found = af.collapse_factor(
+        wall, live=af.BodyForce(-1.0), fill=af.limit.Fill(friction_angle=30.0)
+    )
     assert found.factor == pytest.approx(min(slide, tilt), rel=EXACT)
 
 
 def test_a_wall_stands_from_the_breadth_at_which_the_fill_does_not_tip_it():
     """W b/2 = K_a γ h²/2 h/3 with W = γ_s b h: b² = K_a γ h² / (3 γ_s)."""
-    height, fill = 2.0, Fill(friction_angle=30.0)
+    height, fill = 2.0, af.limit.Fill(friction_angle=30.0)
     least = height * np.sqrt(SOIL.unit_weight / (9.0 * af.STONE.unit_weight))
     assert af.stands(retaining_wall(1.001 * least, height, 2.0), fill=fill)
     assert not af.stands(retaining_wall(0.999 * least, height, 2.0), fill=fill)
@@ -83,7 +83,7 @@ def test_a_wall_stands_from_the_breadth_at_which_the_fill_does_not_tip_it():
 
 def test_cohesion_holds_a_wall_back():
     """E_p = K_p γ h²/2 + 2 c h √K_p, at h/3 and at h/2."""
-    fill = Fill(friction_angle=30.0, cohesion=4e3, mobilisation=1.0, active=0.0)
+    fill = af.limit.Fill(friction_angle=30.0, cohesion=4e3, mobilisation=1.0, active=0.0)
     weight = 1.5 * 2.0 * af.STONE.unit_weight
     first, second = earth_pressure(2.0, 3.0), 2.0 * 4e3 * 2.0 * np.sqrt(3.0)
     found = af.collapse_factor(retaining_wall(1.5, 2.0, 9.0), live=SIDEWAYS, fill=fill)
@@ -100,7 +100,7 @@ def test_paving_on_the_fill_presses_through_it():
         lambda a, b: af.masonry.SOIL_TO_STONE if "soil" in (a.name, b.name) else rough,
     )
     q, weight = 0.3 * af.STONE.unit_weight, 1.5 * 2.0 * af.STONE.unit_weight
-    fill = Fill(friction_angle=30.0)
+    fill = af.limit.Fill(friction_angle=30.0)
     expected = 0.75 - (earth_pressure(2.0, 1 / 3) * 2.0 / 3.0 + q * 2.0 / 3.0) / weight
     found = af.collapse_factor(paved, live=af.BodyForce(-1.0), fill=fill)
     assert found.factor == pytest.approx(expected, rel=EXACT)
@@ -222,7 +222,7 @@ def test_static_and_kinematic_factors_are_equal(live):
 
 def test_a_fill_without_weight_strength_or_spread_is_not_there():
     nothing = replace(SOIL, unit_weight=1e-3)
-    fill = Fill(friction_angle=0.0, mobilisation=1.0, spread=0.1)
+    fill = af.limit.Fill(friction_angle=0.0, mobilisation=1.0, spread=0.1)
     for live in (QUARTER, SIDEWAYS):
         bare = af.collapse_factor(arch_bridge(cover=None), live=live).factor
         found = af.collapse_factor(arch_bridge(0.02, nothing), live=live, fill=fill)
@@ -315,7 +315,7 @@ def test_a_spreading_support_finds_the_least_thrust():
     for sense in (-1.0, 1.0):
         move = af.Settlement(support, (sense, 0.0, 0.0))
         found = af.collapse_factor(structure, live=move, fill=GRAVEL)
-        assert found.outcome is Outcome.SETTLES
+        assert found.outcome is af.limit.Outcome.SETTLES
         k = structure.joints.index(springing)
         normal = structure.normals[k] * (1.0 if support == springing.lower else -1.0)
         n, v = float(found.joints["N"][k]), float(found.joints["V"][k])
@@ -340,7 +340,7 @@ def test_crushing_and_sliding_go_with_a_fill():
 def test_an_arch_too_thin_for_its_fill_does_not_stand():
     thin = arch_bridge(rise=2.4, thickness=0.12)
     found = af.collapse_factor(thin, live=QUARTER, fill=NONE)
-    assert found.outcome is Outcome.INFEASIBLE
+    assert found.outcome is af.limit.Outcome.INFEASIBLE
     assert np.isnan(found.soil["pressure"]).all()
     assert not af.stands(thin, fill=NONE)
     assert af.stands(thin, fill=ALL)

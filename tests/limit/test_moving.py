@@ -5,13 +5,11 @@ import pytest
 from backfilled import SOIL, arch_bridge, fill_of
 
 import archfem as af
-from archfem.limit.collapse import Outcome
-from archfem.limit.fill import Fill
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
 
-GRAVEL = Fill(friction_angle=35.0)
+GRAVEL = af.limit.Fill(friction_angle=35.0)
 LORRY = ([60e3, 115e3, 80e3], [3.2, 1.3])
 FEW = np.linspace(-1.0, 10.0, 23)
 
@@ -64,7 +62,7 @@ def test_the_worst_place_is_that_of_the_least_factor():
     least = float(found.factors["factor"].min())
     here = found.factors["factor"].sel(direction=found.direction, position=found.position)
     assert float(here) == least == pytest.approx(found.worst.factor, rel=EXACT)
-    assert found.worst.outcome is Outcome.COLLAPSES
+    assert found.worst.outcome is af.limit.Outcome.COLLAPSES
     assert found.factors.sizes == {"direction": 2, "position": 101}
     assert f"driving {found.direction}" in str(found)
     assert len(found.worst.hinges) == 4
@@ -126,7 +124,7 @@ def descent(structure, motion, x):
 def test_more_cover_spreads_axles_and_carries_more():
     """Of a weightless fill without strength, only the spreading is left."""
     soil = af.Material(SOIL.young, SOIL.poisson, 1e-3, None, "light")
-    fill = Fill(friction_angle=0.0, mobilisation=0.0, active=0.0, spread=40.0)
+    fill = af.limit.Fill(friction_angle=0.0, mobilisation=0.0, active=0.0, spread=40.0)
     worst = [over(arch_bridge(c, soil), 1e5, fill=fill).worst.factor for c in (0.05, 0.4, 0.9)]
     assert (np.diff(worst) > 0.0).all()
 
@@ -143,16 +141,16 @@ def test_options_are_those_of_collapse_factor(friction):
 
 def test_a_bridge_that_does_not_stand_has_no_factor():
     thin = arch_bridge(rise=2.4, thickness=0.12)
-    nothing = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
+    nothing = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
     found = over(thin, *LORRY, positions=FEW, fill=nothing)
     assert found.factors["factor"].isnull().all()
-    assert found.worst.outcome is Outcome.INFEASIBLE
+    assert found.worst.outcome is af.limit.Outcome.INFEASIBLE
 
 
 def test_a_bridge_that_no_vehicle_breaks():
     thick = ring(thickness=1.9)
     found = over(thick, 1e5, positions=[-0.5, 0.0, 0.5], friction=None)
-    assert found.worst.outcome is Outcome.UNBOUNDED
+    assert found.worst.outcome is af.limit.Outcome.UNBOUNDED
     assert (found.factors["factor"] == np.inf).all()
 
 

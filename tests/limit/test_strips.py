@@ -5,7 +5,6 @@ import pytest
 from backfilled import arch_bridge, column_above, fill_of, row_of_stones
 
 import archfem as af
-from archfem.limit.fill import Fill
 from archfem.limit.strips import Profile, sliced
 from archfem.masonry.softness import yielding_blocks
 
@@ -46,6 +45,32 @@ def test_every_stone_carries_the_column_above_it():
     assert weight.sum() == pytest.approx(3.0 * whole.area * whole.material.unit_weight, rel=1e-9)
 
 
+def test_nothing_of_an_eroded_fill_under_paving_is_lost_between_two_rings():
+    arches = [
+        af.shapes.Arch(span=4.7, embrace=157.0, thickness=0.5, voussoirs=14, name="west arch"),
+        af.shapes.Arch(span=5.8, embrace=159.0, thickness=0.6, voussoirs=17, name="east arch"),
+    ]
+    walls = [
+        af.shapes.Sidewall(length=2.8, height=2.0, above=above, name=f"{side} wall")
+        for side, above in (("west", 0.0), ("east", 0.8))
+    ]
+    structure = af.bridge(
+        arches=arches,
+        piers=[af.shapes.Pier(gap=1.0, height=2.0)],
+        sidewalls=walls,
+        backfill=af.shapes.Backfill(cover=0.5, erosion=0.4),
+        paving=af.shapes.Paving(thickness=0.2),
+        width=4.7,
+    )
+    found = profile(structure)
+    resting = [b for b, stone in zip(structure.blocks, found.stones, strict=True) if not stone]
+    weight = 4.7 * sum(block.area * block.material.unit_weight for block in resting)
+    carrier, _, weights = found.columns()
+    assert weights.sum() == pytest.approx(weight, rel=ROUND_OFF)
+    parts = {structure.blocks[number].part for number in carrier}
+    assert parts >= {"west arch", "east arch", "pier", "west wall", "east wall"}
+
+
 def test_paving_rests_on_what_is_under_the_fill():
     bare, paved = (profile(row_of_stones(paving=paving)).columns() for paving in (0.0, 0.2))
     each = 0.5 * 0.2 * af.STONE.unit_weight
@@ -64,7 +89,7 @@ def test_overburden_is_unit_weight_times_depth():
 @pytest.mark.parametrize("dispersal", ["boussinesq", "uniform"])
 @pytest.mark.parametrize("x", [3.0, 2.83, 3.31])
 def test_a_fan_on_a_level_row(dispersal, x):
-    cover, fill = 1.2, Fill(friction_angle=35.0, dispersal=dispersal, spread=45.0)
+    cover, fill = 1.2, af.limit.Fill(friction_angle=35.0, dispersal=dispersal, spread=45.0)
     block, points, part = profile(row_of_stones(cover)).fan(np.array([x, 0.5 + cover]), fill)
     assert part.sum() == pytest.approx(1.0, rel=ROUND_OFF)
     assert part @ points[:, 0] == pytest.approx(x, abs=FINE * cover)
@@ -79,7 +104,7 @@ def test_a_fan_on_an_arch_brings_all_of_the_load_straight_down():
 
     The moment about the load vanishes only on a level face, so the part of each stone is compared.
     """
-    structure, fill = arch_bridge(), Fill(friction_angle=35.0)
+    structure, fill = arch_bridge(), af.limit.Fill(friction_angle=35.0)
     top = max(block.points[:, 1].max() for block in structure.blocks)
     x = 3.4
     block, _, part = profile(structure).fan(np.array([x, top]), fill)
@@ -93,7 +118,7 @@ def test_a_fan_on_an_arch_brings_all_of_the_load_straight_down():
 
 
 def test_more_cover_spreads_a_load_wider():
-    fill = Fill(friction_angle=35.0)
+    fill = af.limit.Fill(friction_angle=35.0)
     spread, peak = [], []
     for cover in (0.3, 0.8, 1.5, 2.5):
         block, points, part = profile(row_of_stones(cover)).fan(np.array([2.75, 0.5 + cover]), fill)
@@ -136,7 +161,7 @@ def test_a_stone_that_stands_up_shades_what_is_behind_it():
         role="other",
     )
     structure = af.masonry.assembled([*tall, soil], af.masonry.SOIL_TO_STONE)
-    fill = Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
+    fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
     block, _, part = profile(structure).fan(np.array([3.4, 1.5]), fill)
     # Rays to the right reach the foot of stone 7 at slope 0.1, and its top's far end at 3.
     assert part[block == 8].sum() == pytest.approx(0.5 - 0.05, rel=1e-6)
@@ -145,6 +170,6 @@ def test_a_stone_that_stands_up_shades_what_is_behind_it():
 
 
 def test_what_misses_the_structure_goes_into_the_ground():
-    fill = Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
+    fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
     _, _, part = profile(row_of_stones(1.0)).fan(np.array([0.0, 1.5]), fill)
     assert part.sum() == pytest.approx(0.5, rel=1e-6)
