@@ -2,6 +2,7 @@
 
     blocks     rigid blocks in equilibrium
     programme  the linear programme and its limits
+    weight     self-weight, to which all else is added
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
     fill       strength of a fill, earth pressure, how it spreads loads

@@ -7,28 +7,18 @@ from enum import StrEnum
 
 import numpy as np
 import xarray as xr
-from scipy import sparse
 
-from archfem.arguments import instance, real
 from archfem.arrays import Array
-from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.blocks import RigidBlocks
 from archfem.limit.fill import Fill
-from archfem.limit.filled import Stones, stones_of
-from archfem.limit.programme import Optimum, Programme, friction_limits, no_limits
+from archfem.limit.filled import Stones
+from archfem.limit.programme import Optimum, Programme
 from archfem.limit.sliding import without_dilatancy
+from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.structure import Structure
 
 logger = logging.getLogger("archfem")
-
-SELF_WEIGHT = BodyForce(0.0, -1.0)
-
-FRICTION = ("coulomb", "nonassociated", None)
-
-UNBALANCED = 1e-8
-"""Force missing for equilibrium, per weight of the free blocks, above which they do not stand."""
 
 MOVING = 1e-6
 """Least movement in a joint, relative to that of the fastest corner, that counts as movement."""
@@ -154,7 +144,7 @@ def collapse_factor(
     stones, dead = self_weight(structure, friction, strength, fill)
     fall = dead.unbalanced()
     if not balanced(fall, dead):
-        nothing = replace(fall, forces=np.nan * fall.forces, extra=np.nan * fall.extra)
+        nothing = replace(fall, forces=np.nan * fall.forces, unknowns=np.nan * fall.unknowns)
         return _result(stones, dead, Outcome.INFEASIBLE, np.nan, nothing)
     support = None
     if isinstance(live, Settlement):
@@ -221,61 +211,10 @@ def stands(
     return balanced(dead.unbalanced(), dead)
 
 
-def _checked(friction: str | None, strength: float | None) -> None:
-    """Refuse options that mean nothing."""
-    if friction not in FRICTION:
-        raise InvalidInput(f"friction {friction!r} is not known: use one of {FRICTION}")
-    if strength is not None and not real(strength, "strength [Pa]") > 0.0:
-        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
-
-
-def self_weight(
-    structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
-) -> tuple[Stones, Programme]:
-    """Return what stands, and the programme of its self-weight with nothing asked of it.
-
-    Args:
-        structure: supports are its fixed blocks.
-        friction: as for `collapse_factor`.
-        strength: as for `collapse_factor` [Pa].
-        fill: as for `collapse_factor`.
-
-    Raises:
-        InvalidInput: as for `collapse_factor`.
-    """
-    instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    _checked(friction, strength)
-    stones = stones_of(structure, fill)
-    left = stones.skeleton.structure
-    blocks = RigidBlocks(left)
-    limits = no_limits(len(left.joints))
-    if friction is not None:
-        limits = friction_limits(left.friction, np.zeros(len(left.joints)))
-    crushing = None
-    if strength is not None:
-        crushing = strength * left.width * left.depths / blocks.force
-    weight = blocks.scaled(stones.load([SELF_WEIGHT]) + stones.active())
-    dead = Programme(blocks, weight, limits, crushing)
-    if fill is None:
-        return stones, dead
-    pressures = sparse.diags(-blocks.coordinates / blocks.force) @ stones.passive()
-    return stones, dead.also(pressures, np.zeros(pressures.shape[1]), 1.0)
-
-
 def _settled(dead: Programme, support: Array) -> Programme:
     """Ask for the least work on a motion of the supports."""
     gaps = dead.blocks.gaps(support)
     return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
-
-
-def balanced(fall: Optimum, dead: Programme) -> bool:
-    """Return whether the forces missing for equilibrium are nothing.
-
-    Args:
-        fall: as `dead.unbalanced()` found it.
-        dead: programme of the self-weight.
-    """
-    return fall.value <= UNBALANCED * len(dead.blocks.structure.free)
 
 
 def _result(
@@ -308,5 +247,5 @@ def _result(
     resultants = np.full((len(stones.whole.joints), 3), np.nan)
     resultants[list(skeleton.joints)] = asked.blocks.resultants(found.forces)
     joints = joint_dataset(stones.whole, resultants)
-    moved, soil = skeleton.in_whole(motion), stones.soil(found.extra)
+    moved, soil = skeleton.in_whole(motion), stones.soil(found.unknowns)
     return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil)

@@ -216,13 +216,13 @@ class Stones:
         """Return the pressures of the fill, or None where there is none.
 
         Args:
-            share: first, of each contact, from 0 for active to 1 for mobilised passive pressure
-                (n or more,) [-].
+            share: of each contact, from 0 for active to 1 for mobilised passive pressure, behind
+                whatever else (n or more,) [-].
         """
         if self.fill is None:
             return None
         each = self.contacts
-        share = share[: len(each.block)]
+        share = share[len(share) - len(each.block) :]
         least, most = each.least.mean(axis=1), each.most.mean(axis=1)
         variables = {
             "pressure": ("contact", least + share * (most - least), {"units": "Pa"}),

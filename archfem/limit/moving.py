@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,11 +12,11 @@ from numpy.typing import NDArray
 from archfem.arguments import reals
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.limit.collapse import Collapse, balanced, collapse_factor, self_weight
+from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.fill import Fill
 from archfem.limit.filled import Stones
 from archfem.limit.programme import Programme
-from archfem.limit.sliding import without_dilatancy
+from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import PointLoad
 from archfem.masonry.structure import Structure
 
@@ -64,8 +66,8 @@ def moving_load(
 
     At each place the vehicle is a row of vertical point loads on the road, which grow together
     over self-weight (`collapse_factor`): through a fill they spread in fans, elsewhere they stand
-    on the stones. Axles before and behind the structure do nothing. The programme is made once;
-    only its live load moves.
+    on the stones. Axles before and behind the structure do nothing. The programme is made once,
+    and only its live load moves; sliding without dilatancy is searched anew at each place.
 
     Args:
         structure: the bridge.
@@ -99,24 +101,24 @@ def moving_load(
             f"the vehicle is nowhere on the structure: positions are from {places.min():.4g} to "
             f"{places.max():.4g} m; move them onto it"
         )
+    options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
+    factors = np.full(count.shape, np.nan)
     if balanced(dead.unbalanced(), dead):
-        found: dict[tuple[PointLoad, ...], float] = {}
-        for row in (*rows["right"], *rows["left"]):
-            if row not in found:
-                found[row] = _factor(stones, dead, row, friction)
-        factors = np.array([[found[row] for row in rows[sense]] for sense in DIRECTIONS])
-    else:
-        factors = np.full(count.shape, np.nan)
+        found = {
+            row: _factor(stones, dead, row, options)
+            for row in dict.fromkeys((*rows["right"], *rows["left"]))
+        }
+        factors[:] = [[found[row] for row in rows[sense]] for sense in DIRECTIONS]
     way, place = _worst(factors, count)
     direction = DIRECTIONS[way]
     live = list(rows[direction][place])
-    worst = collapse_factor(structure, live=live, friction=friction, strength=strength, fill=fill)
+    worst = collapse_factor(structure, live=live, **options)
     return MovingLoad(_dataset(places, factors, count), worst, direction, float(places[place]))
 
 
 def _vehicle(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
     """Weight of each axle, and its place before the vehicle's middle (n_axles, 2) [N, m]."""
-    one = isinstance(axles, float | int)
+    one = isinstance(axles, Real)
     weights = np.array(reals([axles] if one else axles, "axles [N]"))
     gaps = np.array(reals(spacings, "spacings [m]"))
     if not len(weights) or (weights <= 0.0).any() or (gaps <= 0.0).any():
@@ -162,19 +164,16 @@ def _under(structure: Structure, x: float) -> bool:
 
 
 def _factor(
-    stones: Stones, dead: Programme, row: tuple[PointLoad, ...], friction: str | None
+    stones: Stones, dead: Programme, row: tuple[PointLoad, ...], options: dict[str, Any]
 ) -> float:
-    """Collapse factor of the axles at one place."""
+    """Collapse factor of the axles at one place, by the programme made once where that can be."""
     load = stones.load(row)
-    if not row or np.abs(load).max() <= UNFELT * sum(-axle.force[1] for axle in row):
+    if np.abs(load).max() <= UNFELT * -sum(axle.force[1] for axle in row):
         return np.inf
-    asked = dead.growing(load)
-    found = asked.solve()
-    if found is None:
-        return np.inf
-    if friction == "nonassociated":
-        found = without_dilatancy(asked, found)
-    return -found.value
+    if options["friction"] == "nonassociated":
+        return collapse_factor(stones.whole, live=list(row), **options).factor
+    found = dead.growing(load).solve()
+    return np.inf if found is None else -found.value
 
 
 def _worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:

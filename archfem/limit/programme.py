@@ -94,13 +94,13 @@ class Optimum:
         value: the least value of the objective.
         forces: F_i, F_e and V of all joints (3 n_joints,) [mean block weights].
         coordinates: multipliers of the balance, the motion of the free blocks (3 n_free,).
-        extra: the further unknowns z (k,).
+        unknowns: z, the unknowns beside the forces (k,).
     """
 
     value: float
     forces: Array
     coordinates: Array
-    extra: Array = field(default_factory=lambda: np.zeros(0))
+    unknowns: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ class Programme:
     most: Array = field(default_factory=lambda: np.zeros(0))
 
     def also(self, columns: sparse.csr_matrix, prices: Array, most: float = np.inf) -> "Programme":
-        """Return the programme with further unknowns behind those it has.
+        """Return the programme with further unknowns before those it has.
 
         Args:
             columns: of D (3 n_free, m).
@@ -139,13 +139,13 @@ class Programme:
         """
         return replace(
             self,
-            columns=columns if self.columns is None else sparse.hstack([self.columns, columns]),
-            prices=np.concatenate([self.prices, prices]),
-            most=np.concatenate([self.most, np.full(len(prices), most)]),
+            columns=columns if self.columns is None else sparse.hstack([columns, self.columns]),
+            prices=np.concatenate([prices, self.prices]),
+            most=np.concatenate([np.full(len(prices), most), self.most]),
         )
 
     def growing(self, load: Array) -> "Programme":
-        """Return the programme that asks for the largest factor of a load beside f.
+        """Return the programme whose first unknown is the largest factor of a load beside f.
 
         Args:
             load: generalised forces (3 n_free,) [N, N, N m].

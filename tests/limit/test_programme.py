@@ -6,7 +6,7 @@ from scipy import sparse
 
 import archfem as af
 from archfem.limit.blocks import rigid_load
-from archfem.limit.collapse import self_weight
+from archfem.limit.weight import self_weight
 
 SIDEWAYS = af.BodyForce(1.0)
 
@@ -56,4 +56,4 @@ def test_further_unknowns_keep_within_their_limit():
         column = sparse.csr_matrix(-dead.blocks.scaled(pull)[:, None])
         found = sideways.also(column, np.zeros(1), limit).solve()
         assert -found.value == pytest.approx(0.25 + 2.0 * limit, rel=1e-6)
-        assert found.extra[-1] == pytest.approx(limit, abs=1e-9)
+        assert found.unknowns[0] == pytest.approx(limit, abs=1e-9)
