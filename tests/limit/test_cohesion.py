@@ -8,6 +8,7 @@ from kinematics import gaps
 
 import archfem as af
 from archfem.limit.collapse import Outcome
+from archfem.limit.movement import End
 from archfem.units import kPa
 
 EXACT = 1e-7
@@ -116,3 +117,18 @@ def test_joints_that_never_slide_are_left_out_without_dilatancy():
     for friction in SLIDING:
         found = af.collapse_factor(structure, live=SIDEWAYS, friction=friction)
         assert found.factor == pytest.approx(0.25, rel=EXACT)
+
+
+def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
+    def spread(cohesion, friction="coulomb"):
+        contact = glued(cohesion, 0.45)
+        structure = af.circular_arch(
+            radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7, contact=contact
+        )
+        apart = af.Settlement("left abutment", (-4.0, 0.0, 0.0))
+        return af.largest_movement(structure, apart, friction=friction, tolerance=1e-3)
+
+    dry, held, never = spread(0.0), spread(20.0 * kPa), spread(0.0, None)
+    assert dry.end is End.SLIDES
+    assert dry.largest < held.largest == never.largest
+    assert held.end is never.end is End.FALLS
