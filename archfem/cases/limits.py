@@ -7,11 +7,20 @@ from typing import Any
 from archfem.cases.settings import checked, chosen
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.limit.fill import Fill
 from archfem.masonry.actions import Action, BodyForce, PointLoad
 from archfem.masonry.structure import Structure
 
-LIMIT = {"horizontal": "1", "vertical": "1", "point": dict, "friction": str}
+LIMIT = {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict}
 POINT = {"x": "m", "force": ["N"]}
+FILL = {
+    "friction_angle": "degree",
+    "cohesion": "Pa",
+    "mobilisation": "1",
+    "active": "1",
+    "dispersal": str,
+    "spread": "degree",
+}
 FRICTION = {"coulomb": "coulomb", "nonassociated": "nonassociated", "none": None}
 """How joints slide, by the word in a case file."""
 
@@ -23,10 +32,12 @@ class Limit:
     Attributes:
         live: loads that grow together; the collapse factor multiplies them.
         friction: as `collapse_factor` takes it.
+        fill: strength of the fill, or None.
     """
 
     live: Sequence[Action]
     friction: str | None
+    fill: Fill | None = None
 
     def of(self, structure: Structure) -> Collapse:
         """Find the factor at which a structure of rigid blocks becomes a mechanism.
@@ -38,9 +49,10 @@ class Limit:
             As `collapse_factor`.
 
         Raises:
-            InvalidInput: a load misses the structure, or blocks are too soft to be taken as rigid.
+            InvalidInput: a load misses the structure, or blocks are too soft to be taken as rigid
+                and the case does not tell the strength of a fill.
         """
-        return collapse_factor(structure, live=self.live, friction=self.friction)
+        return collapse_factor(structure, live=self.live, friction=self.friction, fill=self.fill)
 
 
 def limit_asked(given: Any) -> Limit:
@@ -48,7 +60,8 @@ def limit_asked(given: Any) -> Limit:
 
     Args:
         given: the table [limit] as read: `horizontal` and `vertical`, a force on every block in
-            multiples of its weight, or `point`, a force on the extrados at x, or both; `friction`.
+            multiples of its weight, or `point`, a force on the extrados at x, or both;
+            `friction`; `fill`, the strength of the backfill.
 
     Raises:
         InvalidInput: a key or value cannot be meant, or there is no load.
@@ -65,7 +78,17 @@ def limit_asked(given: Any) -> Limit:
             'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
     word = chosen(values.get("friction", "coulomb"), FRICTION, "limit.friction")
-    return Limit(tuple(live), FRICTION[word])
+    return Limit(tuple(live), FRICTION[word], _fill(values["fill"]) if "fill" in values else None)
+
+
+def _fill(given: Any) -> Fill:
+    fill = checked(given, FILL, "limit.fill")
+    if "friction_angle" not in fill:
+        raise InvalidInput(
+            f"limit.fill = {given} lacks its angle of friction: give friction_angle = "
+            '"35 degree", which well-packed gravel has'
+        )
+    return Fill(**fill)
 
 
 def _point(given: Any) -> PointLoad:

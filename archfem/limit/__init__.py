@@ -2,10 +2,15 @@
 
     blocks     rigid blocks in equilibrium
     programme  the linear programme and its limits
+    weight     self-weight, to which all else is added
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
     displaced  rigid blocks that have moved far
     movement   the largest movement of a support that is survived
+    fill       strength of a fill, earth pressure, how it spreads loads
+    strips     what lies above which stone, and what a fan of load meets first
+    filled     stones under a fill: its weight and its pressures as loads and limits
+    moving     a vehicle at every place on a bridge
     thickness  the least thickness that stands
     skeleton   the blocks that move as rigid bodies when joints fail
     screen     a quick look at whether they can move at all

@@ -8,10 +8,13 @@ from .counted import counted_mechanisms as counted_mechanisms
 from .counted import demirel_aldemir_mechanism as demirel_aldemir_mechanism
 from .episodes import Episode as Episode
 from .episodes import episode as episode
+from .fill import Fill as Fill
 from .movement import End as End
 from .movement import Movement as Movement
 from .movement import Stage as Stage
 from .movement import largest_movement as largest_movement
+from .moving import MovingLoad as MovingLoad
+from .moving import moving_load as moving_load
 from .sliding import WithoutDilatancy as WithoutDilatancy
 from .thickness import minimum_thickness as minimum_thickness
 from .verified import VerifiedMechanism as VerifiedMechanism

@@ -76,6 +76,13 @@ class RigidBlocks:
         return np.tile([1.0, 1.0, 1.0 / self.length], len(self.structure.free))
 
     @cached_property
+    def cohesion(self) -> Array:
+        """Shear that cohesion carries, c A of each whole joint (n_joints,) [mean block weights]."""
+        stress = np.array([joint.contact.cohesion for joint in self.structure.joints])
+        cohesion: Array = stress * self.structure.depths * self.structure.width / self.force
+        return cohesion
+
+    @cached_property
     def kinematics(self) -> sparse.csr_matrix:
         """Openings of all intrados ends, of all extrados ends, and slips, of the free blocks.
 

@@ -7,27 +7,18 @@ from enum import StrEnum
 
 import numpy as np
 import xarray as xr
-from scipy import sparse
 
-from archfem.arguments import instance, real
 from archfem.arrays import Array
-from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.blocks import RigidBlocks, rigid_load
-from archfem.limit.programme import Optimum, Programme, friction_limits, no_limits
+from archfem.limit.fill import Fill
+from archfem.limit.filled import Stones
+from archfem.limit.programme import Optimum, Programme
 from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
+from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
-from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
 logger = logging.getLogger("archfem")
-
-SELF_WEIGHT = BodyForce(0.0, -1.0)
-
-FRICTION = ("coulomb", "nonassociated", None)
-
-UNBALANCED = 1e-8
-"""Force missing for equilibrium, per weight of the free blocks, above which they do not stand."""
 
 MOVING = 1e-6
 """Least movement in a joint, relative to that of the fastest corner, that counts as movement."""
@@ -76,6 +67,9 @@ class Collapse:
             the fastest corner has 1 m/s, or those that follow a settlement. Zero where nothing
             moves. Where it does not stand: how it falls under its own weight.
         solutions: with sliding without dilatancy, what is known of all its solutions.
+        soil: where there is a fill, its pressure on each piece of a stone's face, between the least
+            and the most that it can be [Pa], with the number of the block, the piece's ends and the
+            sense of the pressure along x; else None.
     """
 
     factor: float
@@ -85,6 +79,7 @@ class Collapse:
     joints: xr.Dataset
     motion: Array
     solutions: WithoutDilatancy | None = None
+    soil: xr.Dataset | None = None
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
@@ -113,23 +108,27 @@ def collapse_factor(
     live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
     friction: str | None = "coulomb",
     strength: float | None = None,
+    fill: Fill | None = None,
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
     Static theorem: the largest factor for which equilibrium and the joint criteria can both hold,
 
-        max λ   subject to   -G_oᵀ F + G_sᵀ V = f_dead + λ f_live,   F >= 0,   |V| <= μ N,
+        max λ   subject to   -G_oᵀ F + G_sᵀ V = f_dead + λ f_live,   F >= 0,   |V| <= c A + μ N,
 
     with F the compressions at both ends of each joint, F >= 0 the same as |M| <= N h/2. Its dual
     is the mechanism of least work: velocities v with f_live·v = 1 and joints that nowhere close,
 
-        min -f_dead·v   subject to   G_o v >= μ |G_s v|.
+        min c A·|G_s v| - f_dead·v   subject to   G_o v >= μ |G_s v|.
+
+    Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
+    not only on its closed part: the factor is an upper estimate where a joint with cohesion opens.
 
     A *settlement* s asks another question: of all states of equilibrium under self-weight, the
     movement of a support selects the one that resists it least, and the factor is the work of the
     weights on it,
 
-        min F·o_s - V·s_s   subject to   -G_oᵀ F + G_sᵀ V = f_dead,   F >= 0,   |V| <= μ N,
+        min F·o_s - V·s_s   subject to   -G_oᵀ F + G_sᵀ V = f_dead,   F >= 0,   |V| <= c A + μ N,
 
     with o_s, s_s the openings and slips that the settlement alone would cause. Spreading supports
     give the least thrust of an arch and closing supports the greatest.
@@ -137,19 +136,21 @@ def collapse_factor(
     Args:
         structure: supports are its fixed blocks.
         live: one action, or several that grow together; a `Settlement` comes alone.
-        friction: "coulomb" holds |V| <= μ N with sliding that dilates (associated), so that with
-            sliding joints the factor is an upper estimate and a warning is logged; "nonassociated"
-            searches states whose joints slide without dilating for the weakest; None forbids
-            sliding.
+        friction: "coulomb" holds |V| <= c A + μ N with sliding that dilates (associated), so that
+            with sliding joints the factor is an upper estimate and a warning is logged;
+            "nonassociated" searches states whose joints slide without dilating for the weakest;
+            None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
+        fill: strength of blocks softer than their joints, which become weight and pressures on the
+            stones (`Fill`), with those that rest on them; None where there are none.
 
     Returns:
         The factor, how it was found, and the mechanism.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure, or bodies such as a
-            fill cannot be taken as rigid.
+        InvalidInput: an option is unknown, an action misses the structure, or bodies too soft to
+            be rigid are without the strength of a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
     Note:
@@ -162,18 +163,19 @@ def collapse_factor(
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
         (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
-    dead = _self_weight(structure, friction, strength)
-    fall = _unbalanced(dead)
-    if not _balanced(fall, dead):
-        return _result(dead, Outcome.INFEASIBLE, np.nan, replace(fall, forces=np.nan * fall.forces))
+    stones, dead = self_weight(structure, friction, strength, fill)
+    fall = dead.unbalanced()
+    if not balanced(fall, dead):
+        nothing = replace(fall, forces=np.nan * fall.forces, unknowns=np.nan * fall.unknowns)
+        return _result(stones, dead, Outcome.INFEASIBLE, np.nan, nothing)
     support = None
     if isinstance(live, Settlement):
-        support = np.zeros((len(structure.blocks), 3))
-        support[live.place(structure)] = live.motion
+        support = np.zeros((len(stones.skeleton.blocks), 3))
+        support[stones.skeleton.blocks.index(live.place(structure))] = live.motion
         asked, scale = _settled(dead, support), dead.blocks.force
         ends = Outcome.SETTLES, Outcome.LOCKS
     else:
-        asked, scale = _loaded(dead, loads(live)), -1.0
+        asked, scale = dead.growing(stones.load(loads(live))), -1.0
         ends = Outcome.COLLAPSES, Outcome.UNBOUNDED
     found = associated = asked.solve()
     known = None
@@ -182,10 +184,12 @@ def collapse_factor(
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
         if known is None or associated is None:
-            return replace(_result(dead, ends[1], np.inf, rest), solutions=known)
-        return _bracketed(dead, rest, known, support is None)
-    result = _result(asked, ends[0], scale * found.value, found, support=support)
+            return replace(_result(stones, dead, ends[1], np.inf, rest), solutions=known)
+        return _bracketed(stones, dead, rest, known, support is None)
+    result = _result(stones, asked, ends[0], scale * found.value, found, support=support)
     result = replace(result, solutions=known)
+    if not isinstance(live, Settlement):
+        stones.warn_of_sliding_fill(loads(live), result.factor)
     if friction == "coulomb" and result.sliding:
         logger.warning(
             "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
@@ -198,85 +202,40 @@ def collapse_factor(
 
 
 def stands(
-    structure: Structure, *, friction: str | None = "coulomb", strength: float | None = None
+    structure: Structure,
+    *,
+    friction: str | None = "coulomb",
+    strength: float | None = None,
+    fill: Fill | None = None,
 ) -> bool:
     """Tell whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
 
     The programme finds the least forces that would have to be added to the blocks' weights,
 
-        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= μ N,
+        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N,
 
     and the structure stands where that is nothing.
 
     Args:
         structure: supports are its fixed blocks.
-        friction: "coulomb" or "nonassociated", here the same, holds |V| <= μ N; None forbids
-            sliding.
+        friction: "coulomb" or "nonassociated", here the same, holds |V| <= c A + μ N; None
+            forbids sliding.
         strength: compressive strength of the blocks [Pa], as for `collapse_factor`; None for no
             limit.
+        fill: strength of the fill, as for `collapse_factor`; None where there is none.
 
     Returns:
         Whether it stands.
 
     Raises:
-        InvalidInput: an option is unknown, or bodies such as a fill cannot be taken as rigid.
+        InvalidInput: an option is unknown, or bodies too soft to be rigid are without the strength
+            of a fill.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
     """
-    dead = _self_weight(structure, friction, strength)
-    return _balanced(_unbalanced(dead), dead)
-
-
-def _checked(friction: str | None, strength: float | None) -> None:
-    """Refuse options that mean nothing."""
-    if friction not in FRICTION:
-        raise InvalidInput(f"friction {friction!r} is not known: use one of {FRICTION}")
-    if strength is not None and not real(strength, "strength [Pa]") > 0.0:
-        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
-
-
-def _check_stiff(structure: Structure) -> None:
-    """Refuse bodies that cannot be taken as rigid: they would hold what lies under them."""
-    names = [structure.blocks[number].name for number in yielding_blocks(structure)]
-    if names:
-        raise InvalidInput(
-            f"blocks {names} are softer than the joints around them: rigid, they would hold every "
-            "ring below; build the structure without them, with their weight as point loads, or "
-            "push a finite-element model over, in which they deform"
-        )
-
-
-def _self_weight(structure: Structure, friction: str | None, strength: float | None) -> Programme:
-    """Programme whose load is the self-weight, with nothing asked of it."""
-    instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    _checked(friction, strength)
-    _check_stiff(structure)
-    blocks = RigidBlocks(structure)
-    count = len(structure.joints)
-    limits = no_limits(count)
-    if friction is not None:
-        limits = friction_limits(structure.friction, np.zeros(count))
-    crushing = None
-    if strength is not None:
-        crushing = strength * structure.width * structure.depths / blocks.force
-    return Programme(blocks, blocks.scaled(rigid_load(structure, [SELF_WEIGHT])), limits, crushing)
-
-
-def _unbalanced(dead: Programme) -> Optimum:
-    """Least forces to be added for equilibrium; their multipliers are the fall of the blocks."""
-    size = len(dead.load)
-    either = sparse.identity(size)
-    columns = sparse.hstack([either, -either], format="csr")
-    found = replace(dead, columns=columns, prices=np.ones(2 * size)).solve()
-    assert found is not None  # no sum of magnitudes is below zero
-    return found
-
-
-def _loaded(dead: Programme, live: Sequence[BodyForce | PointLoad]) -> Programme:
-    """Ask for the largest factor of live actions."""
-    load = dead.blocks.scaled(rigid_load(dead.blocks.structure, live))
-    return replace(dead, columns=sparse.csr_matrix(-load[:, None]), prices=np.array([-1.0]))
+    _, dead = self_weight(structure, friction, strength, fill)
+    return balanced(dead.unbalanced(), dead)
 
 
 def _settled(dead: Programme, support: Array) -> Programme:
@@ -285,27 +244,29 @@ def _settled(dead: Programme, support: Array) -> Programme:
     return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
 
 
-def _bracketed(dead: Programme, rest: Optimum, known: WithoutDilatancy, least: bool) -> Collapse:
+def _bracketed(
+    stones: Stones, dead: Programme, rest: Optimum, known: WithoutDilatancy, least: bool
+) -> Collapse:
     """Return the safe end of the bracket, where no solution without dilatancy was found."""
     logger.warning("no state without dilatancy was found; the factor is only a bound: %s", known)
     bound = known.bracket[0 if least else 1]
-    state = replace(rest, forces=np.nan * rest.forces)
-    return replace(_result(dead, Outcome.BRACKETED, bound, state), solutions=known)
-
-
-def _balanced(fall: Optimum, dead: Programme) -> bool:
-    """Whether the forces missing for equilibrium are nothing."""
-    return fall.value <= UNBALANCED * len(dead.blocks.structure.free)
+    state = replace(rest, forces=np.nan * rest.forces, unknowns=np.nan * rest.unknowns)
+    return replace(_result(stones, dead, Outcome.BRACKETED, bound, state), solutions=known)
 
 
 def _result(
-    asked: Programme, outcome: Outcome, factor: float, found: Optimum, support: Array | None = None
+    stones: Stones,
+    asked: Programme,
+    outcome: Outcome,
+    factor: float,
+    found: Optimum,
+    support: Array | None = None,
 ) -> Collapse:
-    """Return the optimum read as joint resultants and as a motion of blocks.
+    """Return the optimum read as joint resultants and as a motion of the whole's blocks.
 
     A motion that follows a moving support keeps its size, any other is scaled.
     """
-    structure = asked.blocks.structure
+    structure, skeleton = asked.blocks.structure, stones.skeleton
     motion = asked.blocks.motion(found.coordinates)
     if support is not None:
         motion = motion + support
@@ -317,9 +278,12 @@ def _result(
     apart = np.minimum(intrados, extrados) - slid > least
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
-        (int(j), "intrados" if intrados[j] < extrados[j] else "extrados")
+        (skeleton.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")
         for j in np.flatnonzero(turning)
     )
-    slides = tuple(int(j) for j in np.flatnonzero((abs(slip) > least) & ~apart))
-    joints = joint_dataset(structure, asked.blocks.resultants(found.forces))
-    return Collapse(float(factor), outcome, hinges, slides, joints, motion)
+    slides = tuple(skeleton.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
+    resultants = np.full((len(stones.whole.joints), 3), np.nan)
+    resultants[list(skeleton.joints)] = asked.blocks.resultants(found.forces)
+    joints = joint_dataset(stones.whole, resultants)
+    moved, soil = skeleton.in_whole(motion), stones.soil(found.unknowns)
+    return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)

@@ -21,9 +21,10 @@ from archfem.arguments import instance, real
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.blocks import rigid_load
-from archfem.limit.collapse import SELF_WEIGHT, stands
+from archfem.limit.collapse import stands
 from archfem.limit.displaced import DisplacedBlocks
 from archfem.limit.programme import NoState, Optimum, Programme, friction_limits, no_limits
+from archfem.limit.weight import SELF_WEIGHT
 from archfem.masonry.actions import Settlement
 from archfem.masonry.structure import Structure
 
@@ -158,7 +159,8 @@ def largest_movement(
     Args:
         structure: supports are its fixed blocks.
         settlement: of a support; its motion is the direction, and the farthest that is looked at.
-        friction: "coulomb" ends where equilibrium needs |V| > μ N in a joint; None never slides.
+        friction: "coulomb" ends where equilibrium needs |V| > c A + μ N in a joint, as for
+            `collapse_factor`; None never slides.
         tolerance: width of the last step, as a share of the movement [-].
 
     Returns:
@@ -264,7 +266,7 @@ class _Path:
         """Look for a state at the same places that friction permits too."""
         if not self.rough:
             return
-        limits = friction_limits(self.structure.friction, np.zeros(len(self.structure.joints)))
+        limits = friction_limits(self.structure.friction, blocks.cohesion)
         try:
             state = replace(self._programme(blocks), limits=limits).solve()
         except DidNotConverge as error:

@@ -1,6 +1,6 @@
 """Linear programmes over the forces at the joints of rigid blocks, and what joints can carry."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,9 +113,9 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """A linear programme over joint forces x and further unknowns z >= 0.
+    """A linear programme over joint forces x and further unknowns z.
 
-        min  a·x + b·z   subject to   A x + D z = f,   limits on x,   F_i, F_e >= 0
+        min  a·x + b·z   subject to   A x + D z = f,   limits on x,   F_i, F_e >= 0,   0 <= z <= c
 
     Attributes:
         blocks: which give A.
@@ -125,6 +125,7 @@ class Programme:
         cost: a (3 n_joints,), or None for nothing.
         columns: D (3 n_free, k), or None for no unknowns but the forces.
         prices: b (k,).
+        most: c (k,), infinite where z has no upper limit.
     """
 
     blocks: RigidBlocks
@@ -134,6 +135,41 @@ class Programme:
     cost: Array | None = None
     columns: sparse.csr_matrix | None = None
     prices: Array = field(default_factory=lambda: np.zeros(0))
+    most: Array = field(default_factory=lambda: np.zeros(0))
+
+    def also(self, columns: sparse.csr_matrix, prices: Array, most: float = np.inf) -> "Programme":
+        """Return the programme with further unknowns before those it has.
+
+        Args:
+            columns: of D (3 n_free, m).
+            prices: of b (m,).
+            most: upper limit of all of them.
+        """
+        return replace(
+            self,
+            columns=columns
+            if self.columns is None
+            else sparse.hstack([columns, self.columns], format="csr"),
+            prices=np.concatenate([prices, self.prices]),
+            most=np.concatenate([np.full(len(prices), most), self.most]),
+        )
+
+    def growing(self, load: Array) -> "Programme":
+        """Return the programme whose first unknown is the largest factor of a load beside f.
+
+        Args:
+            load: generalised forces (3 n_free,) [N, N, N m].
+        """
+        column = sparse.csr_matrix(-self.blocks.scaled(load)[:, None])
+        return self.also(column, np.array([-1.0]))
+
+    def unbalanced(self) -> Optimum:
+        """Return the least forces to be added for equilibrium; their multipliers are a fall."""
+        either = sparse.identity(len(self.load))
+        columns = sparse.hstack([either, -either], format="csr")
+        found = self.also(columns, np.ones(2 * len(self.load))).solve()
+        assert found is not None  # no sum of magnitudes is below zero
+        return found
 
     def objective(self, state: Optimum) -> float:
         """Return a·x + b·z of a state that another programme over the same unknowns found.
@@ -185,6 +221,7 @@ class Programme:
         beside = sparse.csr_matrix((len(limits.bounds), extra))
         bounds = np.tile([0.0, np.inf], (size + extra, 1))
         bounds[2 * joints : size, 0] = -np.inf
+        bounds[size:, 1] = self.most
         for presolve in (False, True):  # the second where round-off stopped the first
             found = linprog(
                 cost,

@@ -1,11 +1,11 @@
 """Sliding without dilatancy in limit analysis: states of equilibrium that slide without opening.
 
-Let φ(c) be the optimum of the linear programme whose joints carry |V| <= c. A state with normal
-forces N is a solution without dilatancy where it is itself an optimum for c = μ N: its mechanism
-slides where |V| = μ N, opens only ends that carry nothing, and dissipates μ N |slip|. With y the
-mechanism that is dual to φ, and t(y) its slips, the gap
+Let φ(R) be the optimum of the linear programme whose joints carry |V| <= R. A state with normal
+forces N is a solution without dilatancy where it is itself an optimum for R = c A + μ N: its
+mechanism slides where |V| = R, opens only ends that carry nothing, and dissipates R |slip|. With y
+the mechanism that is dual to φ, and t(y) its slips, the gap
 
-    value(x) + μ N(x)·t(y) - [φ(c) + c·t(y)]  >=  0
+    value(x) + [c A + μ N(x)]·t(y) - [φ(R) + R·t(y)]  >=  0
 
 is zero for such a pair, and is linear in the forces x for a given mechanism and in the mechanism
 for given forces: a bilinear programme over two separate polyhedra, searched from many starts by
@@ -33,7 +33,7 @@ PREFERRED = 1e-4
 """Share of the objective by which, among states of one gap, the weakest is taken."""
 
 ROOM = 1e-8
-"""Cohesion beside μ N, without which round-off makes the programme infeasible [block weights]."""
+"""Resistance added to c A + μ N, lest round-off make the programme infeasible [block weights]."""
 
 CLOSED = 1e-7
 """Gap, relative to the objective, that counts as none: programmes are solved to 1e-9."""
@@ -51,7 +51,7 @@ class WithoutDilatancy:
         starts: from how many states the search started, and how many of them it led to a
             solution.
         unbalanced: largest residual of the balance of the solution returned [mean block weights].
-        excess: largest |V| - μ N, relative to the largest N.
+        excess: largest |V| - c A - μ N, relative to the largest N.
         opening: largest opening of an end that carries force, relative to the largest gap;
             undefined (NaN) with a strength, at which ends that carry force give way.
         gap: complementarity left: by how much friction dissipates more than loads do work,
@@ -136,22 +136,25 @@ def _vertex(
         size = _largest(programme.cost)
         return replace(programme, cost=cost + chance.uniform(-1, 1) * programme.cost / size).solve()
     assert programme.columns is not None
+    live, others = programme.columns[:, :1], programme.columns[:, 1:]
     if start is None:
-        column = float(abs(programme.columns).sum())
+        column = float(abs(live).sum())
         size = 10.0 ** chance.uniform(-1, 1) * float(np.abs(programme.load).sum()) / column
     else:
         size = float(chance.random() * start.unknowns[0])
-    load = programme.load - programme.columns @ np.array([size])
-    return replace(programme, cost=cost, load=load, columns=None, prices=np.zeros(0)).solve()
+    load = programme.load - live @ np.array([size])
+    prices, most = programme.prices[1:], programme.most[1:]
+    given = replace(programme, cost=cost, load=load, columns=others, prices=prices, most=most)
+    return given.solve()
 
 
 def _solution(programme: Programme, forces: Array) -> tuple[Optimum, float] | None:
     """State and gap of a solution without dilatancy near given forces, or None."""
     least = np.inf
     for _ in range(ROUNDS):
-        cohesion = programme.blocks.structure.friction * _thrust(forces) + ROOM
+        held = _resistance(programme, _thrust(forces)) + ROOM
         try:
-            mechanism = replace(programme, limits=_cohesive(cohesion)).solve()
+            mechanism = replace(programme, limits=_fixed(programme, held)).solve()
             if mechanism is None:
                 return None
             slips = _slips(programme, mechanism.coordinates)
@@ -161,8 +164,9 @@ def _solution(programme: Programme, forces: Array) -> tuple[Optimum, float] | No
         if state is None:
             return None
         forces = state.forces
-        value, lost = programme.objective(state), _dissipated(programme, slips, forces)
-        gap = value + lost - mechanism.value - float(cohesion @ slips)
+        value = programme.objective(state)
+        lost = float((_resistance(programme, _thrust(forces)) - held) @ slips)
+        gap = value + lost - mechanism.value
         if gap <= CLOSED * max(abs(value), abs(mechanism.value)) + ROOM * float(slips.sum()):
             return Optimum(value, forces, mechanism.coordinates, state.unknowns), gap
         if gap > (1.0 - CLOSED) * least:
@@ -173,7 +177,7 @@ def _solution(programme: Programme, forces: Array) -> tuple[Optimum, float] | No
 
 def _weakest(programme: Programme, slips: Array) -> Optimum | None:
     """Forces of least gap to a mechanism of given slips, and of these the weakest."""
-    friction = programme.blocks.structure.friction * slips
+    friction = _friction(programme) * slips
     cost = np.concatenate([friction, friction, np.zeros(len(friction))])
     if programme.cost is not None:
         cost += (1.0 - PREFERRED) * programme.cost
@@ -184,8 +188,8 @@ def _bound(programme: Programme, seen: Array) -> float:
     """Bound the objective of every solution without dilatancy from above.
 
     A solution's N is at least the least N of any state of equilibrium, so that a state with |V| <=
-    μ min N is admissible in the programme of which the solution is an optimum. In joints of which
-    a state was seen that leaves them without N there is nothing to look for.
+    c A + μ min N is admissible in the programme of which the solution is an optimum. In joints of
+    which a state was seen that leaves them without N there is nothing to look for.
 
     Returns:
         The bound; -inf where no solution can exist.
@@ -199,7 +203,7 @@ def _bound(programme: Programme, seen: Array) -> float:
         least[joint] = max(found - ROOM, 0.0)
     negated = None if programme.cost is None else -programme.cost
     highest = -_least(replace(programme, cost=negated, prices=-programme.prices))
-    limits = _cohesive(programme.blocks.structure.friction * least)
+    limits = _fixed(programme, _resistance(programme, least))
     try:
         safe = replace(programme, limits=limits).solve()
     except DidNotConverge:  # no equilibrium with so little friction
@@ -226,7 +230,8 @@ def _checked(
         left = left + programme.columns @ state.unknowns
     gaps = _gaps(programme, state.coordinates)
     carries = state.forces[: 2 * len(thrust)] > CLOSED * max(float(thrust.max()), 1.0)
-    excess = np.max(shear - programme.blocks.structure.friction * thrust)
+    slides = np.isfinite(programme.blocks.structure.friction)
+    excess = np.max((shear - _resistance(programme, thrust))[slides], initial=0.0)
     opening = np.max(gaps[: len(carries)][carries], initial=0.0)
     if programme.crushing is not None:
         opening = np.nan
@@ -244,9 +249,22 @@ def _largest(values: Array) -> float:
     return float(np.abs(values).max(initial=np.finfo(float).tiny))
 
 
-def _cohesive(cohesion: Array) -> Limits:
-    """Limits |V| <= c."""
-    return friction_limits(np.zeros_like(cohesion), cohesion)
+def _friction(programme: Programme) -> Array:
+    """Coulomb's μ, zero where a joint never slides and nothing is dissipated (n_joints,)."""
+    friction = programme.blocks.structure.friction
+    return np.where(np.isfinite(friction), friction, 0.0)
+
+
+def _resistance(programme: Programme, thrust: Array) -> Array:
+    """Shear c A + μ N at which joints slide under given N (n_joints,) [block weights]."""
+    resistance: Array = programme.blocks.cohesion + _friction(programme) * thrust
+    return resistance
+
+
+def _fixed(programme: Programme, resistance: Array) -> Limits:
+    """Limits |V| <= R that do not depend on N, none where a joint never slides."""
+    slides = np.isfinite(programme.blocks.structure.friction)
+    return friction_limits(np.where(slides, 0.0, np.inf), resistance)
 
 
 def _gaps(programme: Programme, coordinates: Array) -> Array:
@@ -265,8 +283,3 @@ def _thrust(forces: Array) -> Array:
     """Normal force of each joint (n_joints,) [block weights]."""
     thrust: Array = forces.reshape(3, -1)[:2].sum(axis=0)
     return thrust
-
-
-def _dissipated(programme: Programme, slips: Array, forces: Array) -> float:
-    """Work of friction on slips of given size."""
-    return float(programme.blocks.structure.friction * slips @ _thrust(forces))

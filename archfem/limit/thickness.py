@@ -6,6 +6,7 @@ import numpy as np
 
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
+from archfem.limit.fill import Fill
 from archfem.masonry.structure import Structure
 
 THINNEST = 1e-4
@@ -17,6 +18,7 @@ def minimum_thickness(
     *,
     friction: str | None = "coulomb",
     strength: float | None = None,
+    fill: Fill | None = None,
     tolerance: float = 1e-6,
 ) -> float:
     """Find the least thickness at which a family of structures stands, by bisection [m].
@@ -27,6 +29,7 @@ def minimum_thickness(
         build: makes the structure of a given thickness [m].
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
+        fill: as for `collapse_factor`.
         tolerance: relative width of the last bracket [-].
 
     Returns:
@@ -42,7 +45,7 @@ def minimum_thickness(
         raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")
 
     def holds(thickness: float) -> bool:
-        return stands(build(thickness), friction=friction, strength=strength)
+        return stands(build(thickness), friction=friction, strength=strength, fill=fill)
 
     low, high = _bracket(build, holds)
     while high - low > tolerance * high:

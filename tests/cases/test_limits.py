@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from backfilled import arch_bridge
 
 import archfem as af
 from archfem.cases.limits import limit_asked
@@ -29,9 +30,29 @@ def test_a_table_means_the_same_as_its_call(ring, given, live, friction):
     assert found.hinges == expected.hinges
 
 
+def test_a_fill_means_the_same_as_its_call():
+    structure = arch_bridge()
+    table = {
+        "friction_angle": "35 degree",
+        "cohesion": "2 kPa",
+        "mobilisation": 0.5,
+        "active": 0.8,
+        "dispersal": "uniform",
+        "spread": 26.6,
+    }
+    point = {"x": "3.2 m", "force": ["0 kN", "-1 kN"]}
+    found = limit_asked({"point": point, "fill": table}).of(structure)
+    fill = af.limit.Fill(**table | {"friction_angle": 35.0, "cohesion": 2e3})
+    live = af.PointLoad(3.2, (0.0, -1e3))
+    assert found.factor == af.collapse_factor(structure, live=live, fill=fill).factor
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [
+        ({"horizontal": 1.0, "fill": {}}, "lacks its angle of friction"),
+        ({"horizontal": 1.0, "fill": {"angle": 35}}, "unknown key 'limit.fill.angle'"),
+        ({"horizontal": 1.0, "fill": {"friction_angle": "0.6 rad", "spread": 85}}, "not between"),
         ({}, "limit has no load: give horizontal"),
         ({"friction": "none"}, "limit has no load"),
         ({"horizontl": 1.0}, "unknown key 'limit.horizontl': did you mean 'horizontal'"),

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
+from archfem.limit.blocks import rigid_load
+from archfem.limit.weight import self_weight
 
 SIDEWAYS = af.BodyForce(1.0)
 
@@ -41,3 +44,16 @@ def test_strong_joints_respect_the_stress_block():
     most = joints["N"] * joints["depth"] / 2 - joints["N"] ** 2 / (2 * strength * structure.width)
     crushing = strength * structure.width * joints["depth"]
     assert float((abs(joints["M"]) - most).max()) < 1e-6 * float((crushing * joints["depth"]).max())
+
+
+def test_further_unknowns_keep_within_their_limit():
+    """Of a stay that holds a column back with up to T at its top, λ W h/2 = W b/2 + T h."""
+    block = af.column(breadth=0.6, heights=[2.4])
+    _, dead = self_weight(block, "coulomb", None, None)
+    sideways = dead.growing(rigid_load(block, [SIDEWAYS]))
+    for limit in (0.0, 0.05, 0.1):
+        pull = rigid_load(block, [af.PointLoad(0.0, (-block.weight, 0.0))])
+        column = sparse.csr_matrix(-dead.blocks.scaled(pull)[:, None])
+        found = sideways.also(column, np.zeros(1), limit).solve()
+        assert -found.value == pytest.approx(0.25 + 2.0 * limit, rel=1e-6)
+        assert found.unknowns[0] == pytest.approx(limit, abs=1e-9)

@@ -1,0 +1,134 @@
+"""Cohesion of joints in limit analysis, on single blocks whose forces statics alone gives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kinematics import gaps
+
+import archfem as af
+from archfem.limit.collapse import Outcome
+from archfem.limit.movement import End
+from archfem.units import kPa
+
+EXACT = 1e-7
+"""Relative: the programme is solved to 1e-9 block weights."""
+
+SIDEWAYS = af.BodyForce(1.0)
+SLIDING = ["coulomb", "nonassociated"]
+
+
+def glued(cohesion, friction=0.4):
+    return replace(af.masonry.STONE_TO_STONE, friction=friction, cohesion=cohesion)
+
+
+def block_on_incline(slope, contact, breadth=1.2, height=0.3, width=0.7):
+    """A block on a fixed one whose face rises to the right by `slope` radians."""
+    turn = np.array([[np.cos(slope), np.sin(slope)], [-np.sin(slope), np.cos(slope)]])
+    corners = np.array([[0.0, 0.0], [breadth, 0.0], [breadth, height], [0.0, height]])
+    blocks = [
+        af.Block(
+            tuple(map(tuple, (corners + np.array([0.0, y])) @ turn)), af.STONE, name, fixed=y < 0.0
+        )
+        for name, y in (("bed", -height), ("block", 0.0))
+    ]
+    return replace(af.masonry.assembled(blocks, contact), width=width)
+
+
+@pytest.mark.parametrize("friction", SLIDING)
+@pytest.mark.parametrize("cohesion", [0.0, 0.5 * kPa, 1.0 * kPa])
+def test_a_pushed_block_slides_at_its_friction_and_cohesion(friction, cohesion):
+    """λ W = μ W + c A, well before it overturns at breadth over height, 4."""
+    structure = block_on_incline(0.0, glued(cohesion))
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction=friction)
+    area = 1.2 * 0.7
+    assert found.factor == pytest.approx(0.4 + cohesion * area / structure.weight, rel=EXACT)
+    assert found.sliding == (0,)
+    assert found.hinges == ()
+
+
+@pytest.mark.parametrize("friction", SLIDING)
+@pytest.mark.parametrize("downhill", [True, False])
+def test_a_block_pushed_along_an_incline(friction, downhill):
+    """Along the face ±W sin α + λ W cos α = c A + μ (W cos α ∓ λ W sin α), downhill above."""
+    slope, cohesion, mu = 0.2, 0.8 * kPa, 0.4
+    structure = block_on_incline(slope, glued(cohesion, mu))
+    push = af.BodyForce(-1.0 if downhill else 1.0)
+    found = af.collapse_factor(structure, live=push, friction=friction)
+    held = cohesion * 1.2 * 0.7 / structure.weight
+    sense = 1.0 if downhill else -1.0
+    sine, cosine = sense * np.sin(slope), np.cos(slope)
+    by_hand = (held + mu * cosine - sine) / (cosine + mu * sine)
+    assert found.factor == pytest.approx(by_hand, rel=EXACT)
+    assert found.sliding == (0,)
+
+
+def test_cohesion_holds_a_block_on_a_steep_incline():
+    """It stands where W sin α <= μ W cos α + c A."""
+    slope, mu = 0.6, 0.4
+    weight = block_on_incline(slope, glued(0.0)).weight
+    needed = weight * (np.sin(slope) - mu * np.cos(slope)) / (1.2 * 0.7)
+    assert not af.stands(block_on_incline(slope, glued(0.0, mu)))
+    assert not af.stands(block_on_incline(slope, glued(0.999 * needed, mu)))
+    assert af.stands(block_on_incline(slope, glued(1.001 * needed, mu)))
+
+
+def test_a_block_glued_between_walls_lifts_at_its_weight_and_both_faces():
+    """Walls that do not press hold it by cohesion alone, without dilatancy: W + 2 c A."""
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    blocks = [
+        af.Block(tuple(map(tuple, square + np.array([x, 0.0]))), af.STONE, name, fixed=x != 0.0)
+        for x, name in ((0.0, "block"), (-1.0, "left"), (1.0, "right"))
+    ]
+    cohesion = 3.0 * kPa
+    structure = af.masonry.assembled(blocks, glued(cohesion))
+    lift = af.PointLoad(0.5, (0.0, 1.0))
+    assert af.collapse_factor(structure, live=lift).outcome is Outcome.UNBOUNDED
+    found = af.collapse_factor(structure, live=lift, friction="nonassociated")
+    assert found.outcome is Outcome.COLLAPSES
+    assert found.factor == pytest.approx(structure.weight + 2.0 * cohesion, rel=1e-6)
+
+
+def test_the_mechanism_pays_for_cohesion():
+    """Upper theorem: live work is that of the weights, and c A on every slip."""
+    contact = glued(2.0 * kPa, 0.35)
+    structure = af.circular_arch(
+        radius=3.0, thickness=0.8, embrace=120.0, voussoirs=9, contact=contact
+    )
+    push = af.PointLoad(0.0, (-1e3, 0.0))
+    dry = af.circular_arch(
+        radius=3.0, thickness=0.8, embrace=120.0, voussoirs=9, contact=replace(contact, cohesion=0)
+    )
+    found = af.collapse_factor(structure, live=push)
+    assert found.sliding
+    assert found.factor > 1.05 * af.collapse_factor(dry, live=push).factor
+    number, point = push.place(structure)
+    arm = point - structure.blocks[number].centroid
+    work = push.force[0] * (found.motion[number, 0] - found.motion[number, 2] * arm[1])
+    weights = [b.area * b.material.unit_weight * structure.width for b in structure.blocks]
+    slips = np.abs(gaps(structure, found.motion)[:, 2])
+    lost = 2.0 * kPa * structure.width * structure.depths @ slips
+    assert found.factor * work == pytest.approx(weights @ found.motion[:, 1] + lost, rel=1e-6)
+
+
+def test_joints_that_never_slide_are_left_out_without_dilatancy():
+    """A block that cannot slide overturns, at breadth over height."""
+    structure = block_on_incline(0.0, glued(0.0, None), breadth=0.3, height=1.2)
+    for friction in SLIDING:
+        found = af.collapse_factor(structure, live=SIDEWAYS, friction=friction)
+        assert found.factor == pytest.approx(0.25, rel=EXACT)
+
+
+def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
+    def spread(cohesion, friction="coulomb"):
+        contact = glued(cohesion, 0.45)
+        structure = af.circular_arch(
+            radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7, contact=contact
+        )
+        apart = af.Settlement("left abutment", (-4.0, 0.0, 0.0))
+        return af.largest_movement(structure, apart, friction=friction, tolerance=1e-3)
+
+    dry, held, never = spread(0.0), spread(20.0 * kPa), spread(0.0, None)
+    assert dry.end is End.SLIDES
+    assert dry.largest < held.largest == never.largest
+    assert held.end is never.end is End.FALLS
