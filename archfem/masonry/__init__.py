@@ -7,6 +7,7 @@
     actions       what acts besides self-weight: body forces, point loads, settlements
     assembly      from blocks to a structure: joints wherever they touch
     direction     which way a ring or a pier runs
+    fill          soft bodies cut into pieces with joints of their own
     geometry      areas, centroids and sides of outlines in the plane
     naming        things found by name or by number
     overlaps      what outlines must not do

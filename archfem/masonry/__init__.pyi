@@ -4,6 +4,7 @@ from .actions import PointLoad as PointLoad
 from .actions import Settlement as Settlement
 from .assembly import assembled as assembled
 from .block import Block as Block
+from .fill import jointed_fill as jointed_fill
 from .materials import BACKFILL as BACKFILL
 from .materials import SOIL_TO_STONE as SOIL_TO_STONE
 from .materials import STONE as STONE

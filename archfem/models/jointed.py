@@ -89,6 +89,17 @@ class Jointed:
         other._last = None
         return other
 
+    def between(self, operator: JointOperator) -> "Jointed":
+        """Return the same model between joints at the same points, which answer in another way.
+
+        Args:
+            operator: with the same opening and slip.
+        """
+        other = copy(self)
+        other.operator = operator
+        other._last = None
+        return other
+
     @property
     def memory(self) -> Array:
         """How far each joint point has slid for good (p,) [m]."""

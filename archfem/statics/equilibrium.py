@@ -14,6 +14,7 @@ from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce
 from archfem.models.model import Model, check_model
 from archfem.statics.newton import Newton, Solved, Solver, magnitude
+from archfem.statics.relaxation import relaxed
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -118,16 +119,20 @@ def _grown(
     at: Callable[[float], tuple[Model, Array]],
     what: str,
 ) -> Equilibrium:
-    """Follow an equilibrium while something grows, which gives a model and a load for each part."""
-    factor, step = 0.0, 1.0
+    """Follow an equilibrium while something grows, which gives a model and a load for each part.
+
+    Where Newton's method fails the structure may creep there, once; after that, and where it does
+    not come to rest, steps are halved.
+    """
+    factor, step, find = 0.0, 1.0, _found_or_crept
     while factor < 1.0:
         target = min(1.0, factor + step)
         model, load = at(target)
         model = model.remembering(found.model.memory)
         try:
-            solved = _solve(solver, model, load, found.q)
+            model, solved = find(solver, model, load, found.q)
         except DidNotConverge as error:
-            step /= 2.0
+            step, find = step / 2.0, _found
             if step >= SMALLEST_STEP:
                 continue
             raise DidNotConverge(
@@ -135,11 +140,22 @@ def _grown(
                 "carry it; make it thicker, or check the outline, the supports and the load",
                 last=found,
             ) from error
-        model = model.remembering(model.remembered(solved.q))
         found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
         factor = target
     return found
 
 
-def _solve(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
-    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
+def _found(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
+    """An equilibrium by Newton's method, and the model with what its joints then remember."""
+    solved = solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
+    return model.remembering(model.remembered(solved.q)), solved
+
+
+def _found_or_crept(
+    solver: Solver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solved]:
+    """The same; where Newton's method fails, the structure creeps there."""
+    try:
+        return _found(solver, model, load, start)
+    except DidNotConverge:
+        return relaxed(solver, model, load, start)
