@@ -12,6 +12,7 @@
     naming        things found by name or by number
     overlaps      what outlines must not do
     rigid_motion  how points of a block move with it
+    stages        in which a structure was built
     softness      how soft a block is beside its joints
     shapes        structures from a few lengths: rings, columns, bridges
     survey        structures from drawings: GeoJSON and DXF outlines

@@ -11,6 +11,8 @@ from .materials import STONE as STONE
 from .materials import STONE_TO_STONE as STONE_TO_STONE
 from .materials import Contact as Contact
 from .materials import Material as Material
+from .stages import Stage as Stage
+from .stages import usual_stages as usual_stages
 from .structure import Joint as Joint
 from .structure import Structure as Structure
 from .survey.survey import Layer as Layer

@@ -182,12 +182,13 @@ def _merged(pieces: list[_Piece], least: float, grid: float) -> list[_Piece]:
             break
         pieces.remove(smallest)
         rim = smallest.polygon.boundary
-        shared = [shapely.intersection(rim, p.polygon.boundary, grid).length for p in pieces]
-        if not shared or max(shared) <= grid:
+        others = shapely.boundary([piece.polygon for piece in pieces])
+        shared = shapely.length(shapely.intersection(rim, others, grid_size=grid))
+        if not len(shared) or shared.max() <= grid:
             alone.append(smallest)
             continue
         host = pieces[int(np.argmax(shared))]
-        both = shapely.union(host.polygon, smallest.polygon, grid)
+        both = shapely.union(host.polygon, smallest.polygon, grid_size=grid)
         pieces[pieces.index(host)] = _Piece(both, host.centre)
     return [*pieces, *alone]
 
