@@ -9,6 +9,9 @@ from archfem.masonry.naming import did_you_mean
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
+LAYERS = 4
+"""In which a fill is placed, unless said otherwise."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
@@ -39,7 +42,7 @@ class Stage:
             raise InvalidInput(f"'{self.name}' has centring, and no block that stands on it")
 
 
-def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
+def usual_stages(structure: Structure, layers: int = LAYERS) -> tuple[Stage, ...]:
     """Return the stages in which a bridge is usually built.
 
     First what stands without rings and fill: piers and walls; then the rings on centring, which

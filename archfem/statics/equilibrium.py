@@ -39,6 +39,25 @@ class Equilibrium:
     iterations: int
     steps: int
 
+    def continued(self, model: Model) -> Model:
+        """Return a model with what the joints of this equilibrium know of how it came about.
+
+        Args:
+            model: the same rung of the same structure.
+
+        Raises:
+            InvalidInput: it is another one.
+        """
+        if model.size != self.model.size or len(model.memory) != len(self.model.memory):
+            raise InvalidInput(
+                f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
+                f"points, the model {model.size} and {len(model.memory)}: give the same model's"
+            )
+        built = self.model.built if isinstance(self.model, Jointed) else None
+        if built is not None and isinstance(model, Jointed):
+            model = model.begun(built)
+        return model.remembering(self.model.memory)
+
     @cached_property
     def joints(self) -> xr.Dataset:
         """N, V, M, eccentricity and friction over joint."""
