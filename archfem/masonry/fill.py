@@ -126,6 +126,15 @@ def _tiling(low: Array, high: Array, middle: float, size: float) -> Iterator[Arr
     """Pieces of the tiling that may lie in a box (3, 2) [m].
 
     A line of joints runs along the lower side of the box, one upright through its middle.
+
+    Args:
+        low: its lower left corner (2,) [m].
+        high: its upper right corner (2,) [m].
+        middle: x of its middle [m].
+        size: longest side of a piece [m].
+
+    Yields:
+        The three corners of each piece.
     """
     side, rise = size * sqrt(3.0), 1.5 * size
     reach = int(np.ceil(0.5 * (high[0] - low[0]) / side)) + 2

@@ -95,7 +95,8 @@ def dead_load(
 
     Built in one go, the structure gets its weight as a whole. Built in stages, blocks come
     without stress onto what has been displaced already, and centring holds some until it is
-    struck. What follows must then take `model` of the result, whose joints know how they began.
+    struck. Joints of the result's `model` know how they began; whatever takes the result as its
+    start goes on with them, and a run that goes on from a `last_state` needs that model.
 
     Args:
         model: any rung of the ladder; in stages not "monolithic".
@@ -190,11 +191,8 @@ def _grown(
     at: Callable[[float], tuple[Model, Array]],
     what: str,
 ) -> Equilibrium:
-    """Follow an equilibrium while something grows, which gives a model and a load for each part.
-
-    Where Newton's method fails the structure may creep there, once; after that, and where it does
-    not come to rest, steps are halved.
-    """
+    """Follow an equilibrium while something grows, which gives a model and a load for each part."""
+    # Where Newton's method fails the structure may creep there, once; then steps are halved.
     factor, step, find = 0.0, 1.0, _found_or_crept
     while factor < 1.0:
         target = min(1.0, factor + step)

@@ -1,16 +1,14 @@
 """Equilibria that Newton's method alone does not find: a structure that creeps to rest.
 
 Where blocks slide, or hang from joints that open in the first iteration, tangents are singular on
-the way although the structure stands. A drag on every motion, µ K (q - q_0) with K the stiffness of
-the closed structure, keeps them regular: steps of creep follow one another, joints remembering each,
-and the drag fades as the structure comes to rest. It is pseudo-transient continuation: Kelley and
-Keyes, SIAM Journal on Numerical Analysis 35 (1998) 508-523.
+the way although the structure stands. A drag on every motion, µ K (q - q_0) with K the stiffness
+of the closed structure, keeps them regular: steps of creep follow one another, joints remembering
+each, and the drag fades as the structure comes to rest. It is pseudo-transient continuation:
+Kelley and Keyes, SIAM Journal on Numerical Analysis 35 (1998) 508-523.
 
-A step whose Newton iterations cycle is made with limits of friction that are given: first those that no
-then those that follow from the solution before.
+A step whose Newton iterations cycle is made with limits of friction that are given: first those
+that no shear reaches, then those that follow from the solution before.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from scipy import sparse
@@ -40,8 +38,6 @@ WAIT = 12
 
 ROUNDS = 6
 """In which limits of friction are taken from the solution before, within a step."""
-
-Step = Callable[[Solver, Model, Array, Array, sparse.csr_matrix], Solved]
 
 
 def relaxed(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:

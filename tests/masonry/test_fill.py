@@ -33,9 +33,7 @@ def box(length, floor, side, height=HEIGHT):
         rectangle((-0.5, 0.0), (0.0, height), "back"),
         rectangle((length, far), (0.0, height), "wall"),
     )
-    return af.masonry.assembled(
-        blocks, lambda a, b: floor if "floor" in (a.name, b.name) else side
-    )
+    return af.masonry.assembled(blocks, lambda a, b: floor if "floor" in (a.name, b.name) else side)
 
 
 def smooth_box(angle, rows, *, passive=False, shift=0.0):
@@ -100,9 +98,7 @@ def test_an_oedometer_is_as_compliant_as_a_bar(rows):
     fill = jointed_fill(box(2.0 * size * sqrt(3.0), held, slick), size, angle=45.0, cohesion=1e9)
     model = af.build(fill, fidelity="rigid", cells=(1, 1))
     q = af.dead_load(model).q.reshape(-1, 3)
-    work = sum(
-        fill.blocks[n].area * 18e3 * -q[k, 1] for k, n in enumerate(fill.free)
-    )
+    work = sum(fill.blocks[n].area * 18e3 * -q[k, 1] for k, n in enumerate(fill.free))
     area = sum(fill.blocks[n].area for n in fill.free)
     exact = area * 18e3**2 * HEIGHT**2 / 3.0 / 6.25e6  # ∫ γ u dA, u = γ (H y - y²/2) / E
     assert work == pytest.approx(exact, rel=0.3 / rows**2)
