@@ -2,7 +2,8 @@
 
 The joints run straight through the body in six directions, 30° apart: each triangle of a lattice
 is cut by its medians into six (the kisrhombille tiling). A slip line of any inclination lies within
-15° of such a direction, which is what the tiling costs in strength; see `jointed_fill`.
+15° of such a direction, which is what the tiling costs in strength; see `jointed_fill`. Bricks or
+hexagons, whose joints do not run through, would interlock, and never fail as soil does.
 
 All compliance is in the joints. A piece is the mirror image of its neighbour in the joint between
 them, so their incentres lie 2 r apart, r the radius of the inscribed circle, on a line across it:

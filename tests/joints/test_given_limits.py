@@ -1,4 +1,4 @@
-"""Limits of friction that are given: Coulomb's forces where they are his, and a symmetric tangent."""
+"""Given limits of friction: Coulomb's forces where they are his, and a symmetric tangent."""
 
 import numpy as np
 import pytest
