@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.operator import JointOperator
+from archfem.joints.operator import TOUCHING, JointOperator
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +43,13 @@ class GivenLimits(JointOperator):
         """
         return self.given
 
-    def limit_rates(self, across: Array, closed: Array, rate: Array) -> Array:
-        """Return zero, the derivative of limits that stay, of each of `entries`.
+    def stiffness(self, q: Array) -> Array:
+        """Return the numbers on which the tangent depends, as `tangents` takes them (m,) [N/m].
 
         Args:
-            across: derivative of normal forces, for each of `entries` (m,) [N/m].
-            closed: derivative of closed areas (m,) [m].
-            rate: of the shear by its limit (p,) [-].
+            q: coordinates (n,).
         """
-        return np.zeros_like(across)
+        across = self.law.stiffness(self.openings(q))
+        over = self.points.slides & (np.abs(self.elastic(q)) > (1.0 + TOUCHING) * self.given)
+        along = np.where(over, 0.0, self.points.shear)
+        return np.concatenate([across, along, *([np.zeros_like(across)] if self.slides else [])])
