@@ -14,12 +14,14 @@ from typing import Any
 import tomli_w
 
 from archfem.cases import motions as ground
+from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.cases.structures import planned
 from archfem.dynamics.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
+from archfem.masonry.stages import Stage
 from archfem.masonry.structure import Structure
 from archfem.models.discretisation import Discretisation
 from archfem.motion.design_spectra import DesignSpectrum
@@ -59,6 +61,7 @@ SECTIONS = (
     "analysis",
     "criteria",
     "limit",
+    "dead_load",
     "output",
 )
 
@@ -162,11 +165,17 @@ class Case:
     def _check(self) -> None:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
+        _ = self.stages
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
+
+    @cached_property
+    def stages(self) -> Sequence[Stage] | None:
+        """In which the structure is built; None where it is in one go."""
+        return stages_asked(self.settings.get("dead_load", {}), self.structure)
 
     @property
     def chooses(self) -> bool:

@@ -163,7 +163,8 @@ def at_rest(case: Case) -> Equilibrium:
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    return dead_load(_chosen(case) if case.chooses else build(case.structure, case.discretisation))
+    model = _chosen(case) if case.chooses else build(case.structure, case.discretisation)
+    return dead_load(model, stages=case.stages)
 
 
 def _chosen(case: Case) -> Model:

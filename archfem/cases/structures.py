@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
+from archfem.masonry.fill import jointed_fill
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
 from archfem.masonry.shapes.bridges import bridge
 from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
@@ -91,9 +92,17 @@ FILL = {
     "material": str,
     "contact": str,
 }
+LAWS = ("elastic", "jointed")
+JOINTED = {"law": str, "size": "m", "friction_angle": "degree", "cohesion": "Pa"}
+"""What [structure.fill] says of how soft bodies answer, in any shape."""
 PAVING = {"thickness": "m", "length": "m"}
 MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
-CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
+CONTACT = {
+    "normal_stiffness": "Pa/m",
+    "shear_stiffness": "Pa/m",
+    "friction": "1",
+    "cohesion": "Pa",
+}
 
 
 def planned(settings: Table, folder: Path = Path()) -> Structure:
@@ -110,8 +119,9 @@ def planned(settings: Table, folder: Path = Path()) -> Structure:
     given = settings.get("structure", {})
     name = chosen(given.get("shape"), SHAPES, "structure.shape")
     shape, keys = SHAPES[name]
-    values = checked(given, {**WORDS, **keys}, "structure")
+    values = checked(given, {**WORDS, **keys, "fill": dict}, "structure")
     del values["shape"]
+    fill = values.pop("fill", {})
     stone = _material(settings, values.pop("material", "stone"))
     contact = _contact(settings, values.pop("contact", "stone to stone"))
     _check_tables(settings)
@@ -119,7 +129,26 @@ def planned(settings: Table, folder: Path = Path()) -> Structure:
         values = _parts(values, settings)
     elif name == "outlines":
         values = _outlines(values, settings, folder)
-    return _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
+    made = _made(shape, f"structure of shape {name!r}", material=stone, contact=contact, **values)
+    return _filled(made, fill)
+
+
+def _filled(structure: Structure, given: Table) -> Structure:
+    """The structure with its fill as the case wants it."""
+    fill = checked(given, JOINTED, "structure.fill")
+    if chosen(fill.pop("law", "elastic"), LAWS, "structure.fill.law") == "elastic":
+        if fill:
+            raise InvalidInput(f"structure.fill has {sorted(fill)}: they need law = 'jointed'")
+        return structure
+    missing = sorted({"size", "friction_angle"} - set(fill))
+    if missing:
+        raise InvalidInput(f"structure.fill says nothing of {missing}: a jointed fill needs both")
+    return jointed_fill(
+        structure,
+        fill["size"],
+        angle=fill["friction_angle"],
+        cohesion=fill.get("cohesion", 0.0),
+    )
 
 
 def _check_tables(settings: Table) -> None:

@@ -128,6 +128,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     dt, tolerance = _steps(model, dt, tolerance)
     criteria = agreed(criteria, until)
     watch = None if until is None else begun(until, model.structure, criteria)
+    if isinstance(start, Equilibrium):
+        model = start.continued(model)
     equation = Equation(model, motion, damping, scheme or Conserving())
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)

@@ -5,6 +5,7 @@
     points      points on the joints, and forces there by springs or exact integrals
     operator    the joint operator G, from coordinates to forces
     faces       opening, rotation and slip of whole joints
+    given_limits  joints whose limits of friction stay as they are
     rigid       G of rigid blocks
     sparsity    one sparsity pattern for a family of matrices
     resultants  N, V, M, eccentricity, mobilised friction, thrust line

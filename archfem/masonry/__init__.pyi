@@ -4,12 +4,15 @@ from .actions import PointLoad as PointLoad
 from .actions import Settlement as Settlement
 from .assembly import assembled as assembled
 from .block import Block as Block
+from .fill import jointed_fill as jointed_fill
 from .materials import BACKFILL as BACKFILL
 from .materials import SOIL_TO_STONE as SOIL_TO_STONE
 from .materials import STONE as STONE
 from .materials import STONE_TO_STONE as STONE_TO_STONE
 from .materials import Contact as Contact
 from .materials import Material as Material
+from .stages import Stage as Stage
+from .stages import usual_stages as usual_stages
 from .structure import Joint as Joint
 from .structure import Structure as Structure
 from .survey.survey import Layer as Layer

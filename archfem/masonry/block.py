@@ -38,6 +38,8 @@ class Block:
         role: of its part: "ring" or "pier", which are judged, or "other", which follows what
             carries it. Where nothing of a part tells it, the structure fills it in by the words of
             the part's name, and warns where they leave it open; without a name a part is a ring.
+        grain: whether it is one of many pieces that stand for a body which deforms and gives way
+            between them, as `jointed_fill` makes them.
     """
 
     outline: tuple[Point, ...]
@@ -48,6 +50,7 @@ class Block:
     part: str = ""
     centre: Point | None = None
     role: str = ""
+    grain: bool = False
 
     def __post_init__(self) -> None:
         """Refuse outlines that do not bound an area anticlockwise."""

@@ -72,7 +72,8 @@ def yielding_blocks(structure: Structure) -> tuple[int, ...]:
     """Return the numbers of the blocks that deform rather than let their joints open.
 
     They are of neither rings nor piers. A fill fits itself to what it lies on; taken as one rigid
-    body it would hold every ring below.
+    body it would hold every ring below. So do the grains of a fill that has joints of its own,
+    together.
 
     Args:
         structure: whose blocks that move are looked at.
@@ -80,5 +81,9 @@ def yielding_blocks(structure: Structure) -> tuple[int, ...]:
     return tuple(
         number
         for number in structure.free
-        if structure.blocks[number].role == "other" and softness(structure, number).ratio < YIELDING
+        if structure.blocks[number].role == "other" and _yields(structure, number)
     )
+
+
+def _yields(structure: Structure, number: int) -> bool:
+    return structure.blocks[number].grain or softness(structure, number).ratio < YIELDING

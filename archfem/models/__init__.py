@@ -6,6 +6,7 @@
     gauges          what is read off the coordinates: joints' faces, blocks' displacements
     cells           polygons that cover the blocks, and how they move
     jointed         linear blocks between dry joints
+    unfinished      a structure of which a part stands, while it is being built
     rigid           the lowest rung: rigid blocks, no mesh
     reduced         faces and condensed, by a Galerkin basis
     full            the rung with all nodes

@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -22,7 +23,7 @@ class Jointed:
 
     Forces are K q + Gᵀ W t(G q). The tangent changes only when a point opens, closes or begins to
     slide, so the last one is kept and given again, as the same object, until then. `Model` says
-    what attributes and methods mean.
+    what attributes and methods mean; `built` is told by `begun`.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Jointed:
         self.operator = operator
         self.cells = cells
         self.supports = np.zeros((len(structure.blocks), 3))
+        self.built: Array | None = None
         self._pattern = pattern
         self._across = operator.tangents(pattern)
         self.prediction: Prediction | None = None
@@ -67,7 +69,7 @@ class Jointed:
             cells=self.cells,
         ).moved(self.supports)
 
-    def settled(self, settlement: Settlement) -> "Jointed":
+    def settled(self, settlement: Settlement) -> Self:
         """Return the same model with a support that has moved, further than before.
 
         Args:
@@ -75,7 +77,7 @@ class Jointed:
         """
         return self.moved(settlement.added(self.structure, self.supports))
 
-    def moved(self, supports: Array) -> "Jointed":
+    def moved(self, supports: Array) -> Self:
         """Return the same model with its supports moved: joints open and slip as much at q = 0.
 
         Args:
@@ -84,8 +86,33 @@ class Jointed:
         """
         other = copy(self)
         other.supports = supports
-        offset = gaps_of(self.structure, self.operator.points, supports) if supports.any() else None
+        offset = self.built
+        if supports.any():
+            gaps = gaps_of(self.structure, self.operator.points, supports)
+            offset = gaps if self.built is None else gaps + self.built
         other.operator = replace(self.operator, offset=offset)
+        other._last = None
+        return other
+
+    def begun(self, built: Array) -> Self:
+        """Return the same model, whose blocks were placed one after the other.
+
+        Args:
+            built: opening and slip at q = 0, on supports that have not moved, of joints that began
+                between blocks which had been displaced (2, p) [m]; kept as `built`.
+        """
+        other = copy(self)
+        other.built = built
+        return other.moved(self.supports)
+
+    def between(self, operator: JointOperator) -> Self:
+        """Return the same model between joints at the same points, which answer in another way.
+
+        Args:
+            operator: with the same opening and slip.
+        """
+        other = copy(self)
+        other.operator = operator
         other._last = None
         return other
 
@@ -94,7 +121,7 @@ class Jointed:
         """How far each joint point has slid for good (p,) [m]."""
         return self.operator.memory
 
-    def remembering(self, memory: Array) -> "Jointed":
+    def remembering(self, memory: Array) -> Self:
         """Return the same model, whose joints have slid so far.
 
         Args:
@@ -121,7 +148,7 @@ class Jointed:
         """
         return JointedPassage(self, Passage(self.operator, start, late))
 
-    def predicted(self, prediction: Prediction) -> "Jointed":
+    def predicted(self, prediction: Prediction) -> Self:
         """Return the same model, with what was predicted of it.
 
         Args:

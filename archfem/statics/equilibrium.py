@@ -1,7 +1,7 @@
 """Equilibrium under loads that stay: self-weight first of all."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,12 +9,16 @@ import xarray as xr
 
 from archfem.arguments import instance
 from archfem.arrays import Array
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce
+from archfem.masonry.stages import Stage, placed
 from archfem.models.gauges import Gauges
+from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
+from archfem.models.unfinished import Unfinished
 from archfem.statics.newton import Newton, Solved, Solver, magnitude
+from archfem.statics.relaxation import relaxed
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -35,6 +39,25 @@ class Equilibrium:
     q: Array
     iterations: int
     steps: int
+
+    def continued(self, model: Model) -> Model:
+        """Return a model with what the joints of this equilibrium know of how it came about.
+
+        Args:
+            model: the same rung of the same structure.
+
+        Raises:
+            InvalidInput: it is another one.
+        """
+        if model.size != self.model.size or len(model.memory) != len(self.model.memory):
+            raise InvalidInput(
+                f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
+                f"points, the model {model.size} and {len(model.memory)}: give the same model's"
+            )
+        built = self.model.built if isinstance(self.model, Jointed) else None
+        if built is not None and isinstance(model, Jointed):
+            model = model.begun(built)
+        return model.remembering(self.model.memory)
 
     @cached_property
     def joints(self) -> xr.Dataset:
@@ -64,26 +87,44 @@ def self_weight(model: Model) -> Array:
     return model.load(BodyForce(0.0, -1.0))
 
 
-def dead_load(model: Model, newton: Newton | None = None) -> Equilibrium:
+def dead_load(
+    model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
+) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
-    Joints open and slide as they must (nonlinear statics); steps of the load are halved where
-    Newton's method fails. Displacements are small: the structure keeps its shape.
+    Joints open and slide as they must (nonlinear statics); where Newton's method fails the
+    structure creeps to rest, or steps of the load are halved. Displacements are small: the
+    structure keeps its shape.
+
+    Built in one go, the structure gets its weight as a whole. Built in stages, blocks come
+    without stress onto what has been displaced already, and centring holds some until it is
+    struck. Joints of the result's `model` know how they began; whatever takes the result as its
+    start goes on with them, and a run that goes on from a `last_state` needs that model.
 
     Args:
-        model: any rung of the ladder.
+        model: any rung of the ladder; in stages not "monolithic".
         newton: settings of the solves.
+        stages: in which the structure was built, e.g. `usual_stages(structure)`; by default in one
+            go.
 
     Returns:
         The state, with its joints' resultants.
 
     Raises:
-        InvalidInput: the model is none.
+        InvalidInput: the model is none, or the stages do not build it.
         DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
             equilibrium found on the way, under part of the weight.
     """
     check_model(model)
-    return equilibrium_under(model, self_weight(model), newton)
+    if stages is None:
+        return equilibrium_under(model, self_weight(model), newton)
+    if not isinstance(model, Jointed):
+        raise InvalidInput(
+            f"a model '{model.fidelity}' cannot be built in stages: use 'full', which is the same"
+        )
+    solver = _solver(model, newton)
+    built = _built(solver, model.moved(np.zeros_like(model.supports)), stages)
+    return _on_moved_supports(solver, built, self_weight(model), model.supports)
 
 
 def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
@@ -102,17 +143,49 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
     Raises:
         DidNotConverge: there is none; `last` is the last one on the way.
     """
-    if newton is not None:
-        instance(newton, Newton, "newton", "give Newton(tolerance=…)")
-    solver = Solver(model.size, newton)
+    solver = _solver(model, newton)
     before = model.moved(np.zeros_like(model.supports))
     rest = Equilibrium(before, np.zeros(model.size), 0, 0)
     carried = _grown(solver, rest, lambda part: (before, part * load), "load")
-    if not model.supports.any():
-        return carried
-    return _grown(
-        solver, carried, lambda part: (model.moved(part * model.supports), load), "settlement"
-    )
+    return _on_moved_supports(solver, carried, load, model.supports)
+
+
+def _solver(model: Model, newton: Newton | None) -> Solver:
+    if newton is not None:
+        instance(newton, Newton, "newton", "give Newton(tolerance=…)")
+    return Solver(model.size, newton)
+
+
+def _on_moved_supports(
+    solver: Solver, found: Equilibrium, load: Array, supports: Array
+) -> Equilibrium:
+    """Move the supports of a structure at rest to where they are to be."""
+    if not supports.any():
+        return found
+    model = found.model
+    return _grown(solver, found, lambda part: (model.moved(part * supports), load), "settlement")
+
+
+def _built(solver: Solver, whole: Jointed, stages: Sequence[Stage]) -> Equilibrium:
+    """Build a structure stage by stage."""
+    site = Unfinished(whole)
+    found = Equilibrium(site, np.zeros(whole.size), 0, 0)
+    for stage, blocks in zip(stages, placed(whole.structure, stages), strict=True):
+        if stage.strike:
+            site = site.struck().remembering(found.model.memory)
+            found = _brought_on(solver, found, site, f"'{stage.name}'")
+        if blocks:
+            site = site.remembering(found.model.memory)
+            site = site.placed(blocks, found.q, centring=stage.centring)
+            found = _brought_on(solver, found, site, f"'{stage.name}'")
+    return replace(found, model=site.remembering(found.model.memory).finished())
+
+
+def _brought_on(solver: Solver, found: Equilibrium, site: Unfinished, what: str) -> Equilibrium:
+    """Bring on, little by little, all weight that is not in balance yet."""
+    carried = site.force(found.q)
+    rest = self_weight(site) - carried
+    return _grown(solver, found, lambda part: (site, carried + part * rest), what)
 
 
 def _grown(
@@ -122,15 +195,16 @@ def _grown(
     what: str,
 ) -> Equilibrium:
     """Follow an equilibrium while something grows, which gives a model and a load for each part."""
-    factor, step = 0.0, 1.0
+    # Where Newton's method fails the structure may creep there, once; then steps are halved.
+    factor, step, find = 0.0, 1.0, _found_or_crept
     while factor < 1.0:
         target = min(1.0, factor + step)
         model, load = at(target)
         model = model.remembering(found.model.memory)
         try:
-            solved = _solve(solver, model, load, found.q)
+            model, solved = find(solver, model, load, found.q)
         except DidNotConverge as error:
-            step /= 2.0
+            step, find = step / 2.0, _found
             if step >= SMALLEST_STEP:
                 continue
             raise DidNotConverge(
@@ -138,11 +212,22 @@ def _grown(
                 "carry it; make it thicker, or check the outline, the supports and the load",
                 last=found,
             ) from error
-        model = model.remembering(model.remembered(solved.q))
         found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
         factor = target
     return found
 
 
-def _solve(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
-    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
+def _found(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
+    """An equilibrium by Newton's method, and the model with what its joints then remember."""
+    solved = solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
+    return model.remembering(model.remembered(solved.q)), solved
+
+
+def _found_or_crept(
+    solver: Solver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solved]:
+    """The same; where Newton's method fails, the structure creeps there."""
+    try:
+        return _found(solver, model, load, start)
+    except DidNotConverge:
+        return relaxed(solver, model, load, start)

@@ -5,7 +5,7 @@ the equilibrium in a few iterations from any closed start. Where statuses cycle 
 search along the step for the point where the energy's slope vanishes ("cp") settles them.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import count
 
@@ -87,7 +87,14 @@ class Solver:
         self._searches: dict[str, PETSc.SNES] = {}
         self._scale = 1.0
 
-    def solve(self, residual: Residual, tangent: Tangent, start: Array, scale: float) -> Solved:
+    def solve(
+        self,
+        residual: Residual,
+        tangent: Tangent,
+        start: Array,
+        scale: float,
+        searches: Iterable[str] = tuple(_SEARCHES),
+    ) -> Solved:
         """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm.
 
         Args:
@@ -95,6 +102,7 @@ class Solver:
             tangent: derivative of the residual at q (n, n).
             start: first guess (n,).
             scale: size of the load, as by `magnitude`.
+            searches: line searches to try, one after the other.
 
         Returns:
             Coordinates, and what it took to find them.
@@ -105,7 +113,7 @@ class Solver:
         self._residual, self._tangent = residual, tangent
         self._scale = scale
         iterations = 0
-        for search in _SEARCHES:
+        for search in searches:
             snes = self._snes(search, start)
             self._solution.array[:] = start
             snes.solve(None, self._solution)

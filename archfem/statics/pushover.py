@@ -141,7 +141,7 @@ def pushover(
         if value is not None:
             instance(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
     begin = start or dead_load(model)
-    model = model.remembering(begin.model.memory)
+    model = begin.continued(model)
     path: Path
     if isinstance(load, Settlement):
         if control != "displacement":

@@ -1,0 +1,39 @@
+"""Given limits of friction: Coulomb's forces where they are his, and a symmetric tangent."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.joints.given_limits import GivenLimits
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """Three courses, the top one pushed beyond friction, and coordinates at which it slides."""
+    model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
+    q = np.array([1e-6, -3e-5, 0.0, 2e-4, -5e-5, 1e-6])
+    return model, q
+
+
+def test_with_coulombs_limits_forces_are_coulombs(pushed):
+    model, q = pushed
+    joints = model.operator
+    opening = joints.openings(q)
+    own = joints.limits(joints.law.forces(opening), joints.law.closed(opening))
+    given = GivenLimits.of(joints, own)
+    assert np.any(np.abs(joints.elastic(q)) > own)
+    assert np.array_equal(given.force(q), joints.force(q))
+
+
+def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
+    model, q = pushed
+    half = GivenLimits.of(model.operator, 0.5 * np.abs(model.operator.elastic(q)))
+    held = model.between(half)
+    tangent = held.tangent(q).toarray()
+    assert tangent == pytest.approx(tangent.T, abs=1e-12 * np.abs(tangent).max())
+    step = 1e-9
+    columns = [
+        (held.force(q + step * e) - held.force(q - step * e)) / (2.0 * step)
+        for e in np.eye(model.size)
+    ]
+    assert tangent == pytest.approx(np.array(columns).T, abs=1e-6 * np.abs(tangent).max())

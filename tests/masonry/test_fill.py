@@ -1,0 +1,196 @@
+"""Fill in pieces: compliance that no size changes, and earth pressures of Coulomb and Rankine."""
+
+from math import radians, sqrt, tan
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.masonry.fill import jointed_fill
+from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
+from archfem.masonry.softness import soft_blocks, yielding_blocks
+from archfem.statics.pushover import Stop
+
+HEIGHT = 1.5
+"""Of the fill behind a wall [m]."""
+
+WEDGE = 1e-4
+"""Of the force of a wedge: it moves as one body, so that equilibrium alone decides."""
+
+
+def box(length, floor, side, height=HEIGHT):
+    """A fill between two walls, on a floor; the right wall is called "wall"."""
+
+    def rectangle(x, y, name, **kind):
+        corners = ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))
+        kind = {"material": af.STONE, "fixed": True, "part": name, "role": "other"} | kind
+        return af.Block(corners, name=name, **kind)
+
+    far = length + 0.5
+    blocks = (
+        rectangle((-0.5, far), (-0.5, 0.0), "floor"),
+        rectangle((0.0, length), (0.0, height), "fill", material=BACKFILL, fixed=False),
+        rectangle((-0.5, 0.0), (0.0, height), "back"),
+        rectangle((length, far), (0.0, height), "wall"),
+    )
+    return af.masonry.assembled(blocks, lambda a, b: floor if "floor" in (a.name, b.name) else side)
+
+
+def smooth_box(angle, rows, *, passive=False, shift=0.0):
+    """Fill in rows of pieces behind a smooth wall, on a floor as rough as it is itself.
+
+    Joints run through the foot of the wall, but for a shift in widths of the tiling's triangles.
+    """
+    size = HEIGHT / (1.5 * rows)
+    side = size * sqrt(3.0)
+    length = side * (2.0 * np.ceil((4.5 if passive else 2.5) / side / 2.0) + shift)
+    floor = af.Contact(0.3e9, 0.24e9, tan(radians(angle)))
+    whole = box(length, floor, af.Contact(0.3e9, 0.24e9, 0.0))
+    return jointed_fill(whole, size, angle=angle)
+
+
+def on_wall(structure, joints):
+    """Force on the wall over γ H² / 2, of the fill between it and the floor."""
+    wall = structure.block_number("wall")
+    own = [
+        k
+        for k, pair in enumerate(structure.pairs)
+        if wall in pair and not all(structure.blocks[n].fixed for n in pair)
+    ]
+    return joints["N"].values[..., own].sum(axis=-1) / (0.5 * 18e3 * HEIGHT**2)
+
+
+def pressure(structure, move):
+    """Force on the wall at rest, after it has moved at once [m]."""
+    model = af.build(structure, fidelity="rigid", cells=(1, 1))
+    found = af.dead_load(model.settled(af.Settlement("wall", (move, 0.0, 0.0))))
+    return float(on_wall(structure, found.joints))
+
+
+def pressed(structure, move):
+    """Force on the wall where it has moved little by little, up to [m]."""
+    model = af.build(structure, fidelity="rigid", cells=(1, 1))
+    stop = Stop(displacement=abs(move) / structure.size)
+    way = af.Settlement("wall", (np.sign(move), 0.0, 0.0))
+    return float(on_wall(structure, af.pushover(model, way, stop=stop).joints)[-1])
+
+
+@pytest.mark.parametrize("size", [1.0, 0.5, 0.25])
+def test_compliance_does_not_depend_on_the_size(size):
+    """A fill between smooth walls is pressed like a bar: E ε, whatever is cut, clipped or merged.
+
+    The push outweighs the fill's own pressure, so that all joints are closed.
+    """
+    push = 0.2
+    length = 3.0 * sqrt(3.0)
+    slick = af.Contact(1e13, 1e13, 0.0)
+    fill = jointed_fill(box(length, slick, slick), size, angle=45.0, cohesion=1e9)
+    before, after = pressure(fill, 0.0), pressure(fill, -push)
+    force = (after - before) * 0.5 * 18e3 * HEIGHT**2
+    assert force == pytest.approx(6.25e6 * HEIGHT * push / length, rel=3e-3)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 4])
+def test_an_oedometer_is_as_compliant_as_a_bar(rows):
+    """Fill under its own weight settles by γ H² / 2E at its top, where there are few rows too."""
+    slick, held = af.Contact(1e13, 1e13, 0.0), af.Contact(1e13, 1e13, None)
+    size = HEIGHT / (1.5 * rows)
+    fill = jointed_fill(box(2.0 * size * sqrt(3.0), held, slick), size, angle=45.0, cohesion=1e9)
+    model = af.build(fill, fidelity="rigid", cells=(1, 1))
+    q = af.dead_load(model).q.reshape(-1, 3)
+    work = sum(fill.blocks[n].area * 18e3 * -q[k, 1] for k, n in enumerate(fill.free))
+    area = sum(fill.blocks[n].area for n in fill.free)
+    exact = area * 18e3**2 * HEIGHT**2 / 3.0 / 6.25e6  # ∫ γ u dA, u = γ (H y - y²/2) / E
+    assert work == pytest.approx(exact, rel=0.3 / rows**2)
+
+
+@pytest.mark.parametrize(("angle", "rows"), [(20.0, 1), (20.0, 4), (30.0, 2), (40.0, 1), (40.0, 4)])
+def test_active_force_is_that_of_the_best_wedge(angle, rows):
+    """The wedge on the joints at 60° presses with cot 60° tan(60° - φ); Rankine's where φ = 30°."""
+    found = pressed(smooth_box(angle, rows), 0.004)
+    assert found == pytest.approx(tan(radians(60.0 - angle)) / sqrt(3.0), rel=WEDGE)
+    rankine = tan(radians(45.0 - angle / 2.0)) ** 2
+    assert found == pytest.approx(rankine, rel={20.0: 0.012, 30.0: WEDGE, 40.0: 0.034}[angle])
+
+
+@pytest.mark.parametrize(("angle", "rows"), [(20.0, 2), (30.0, 1), (30.0, 2), (40.0, 2)])
+def test_passive_force_is_that_of_the_best_wedge(angle, rows):
+    """The wedge on the joints at 30° resists with cot 30° tan(30° + φ)."""
+    found = pressed(smooth_box(angle, rows, passive=True), -0.08)
+    assert found == pytest.approx(tan(radians(30.0 + angle)) * sqrt(3.0), rel=WEDGE)
+    rankine = tan(radians(45.0 + angle / 2.0)) ** 2
+    assert found == pytest.approx(rankine, rel={20.0: 0.013, 30.0: WEDGE, 40.0: 0.035}[angle])
+
+
+@pytest.mark.slow
+def test_where_no_joint_meets_the_foot_forces_converge_in_proportion_to_the_size():
+    """Slip lines then leave the wall up to a triangle's height above its foot."""
+    found = [pressed(smooth_box(30.0, n, passive=True, shift=1.0), -0.14) for n in (1, 2, 4)]
+    errors = np.array(found) / 3.0 - 1.0
+    assert errors[1] == pytest.approx(0.11, abs=0.02)
+    assert np.all(errors > 0.0)
+    assert np.all(errors[1:] < 0.6 * errors[:-1])
+
+
+def test_fill_bears_no_tension():
+    """Elastic fill hangs between walls that part; pieces open, and rest on the floor."""
+    glue = af.Contact(1e10, 1e10, None)
+    whole = box(3.0, glue, glue)
+    torn = jointed_fill(whole, 0.5, angle=30.0)
+    model = af.build(torn, fidelity="rigid", cells=(1, 1))
+    normal = af.dead_load(model.settled(af.Settlement("wall", (0.01, 0.0, 0.0)))).joints["N"]
+    assert normal.values.min() >= 0.0
+    elastic = af.build(whole, fidelity="full", cells=(2, 2))
+    moved = af.dead_load(elastic.settled(af.Settlement("wall", (0.01, 0.0, 0.0))))
+    stress = (elastic.cells.stress @ moved.q).reshape(-1, 3)
+    mean = 0.5 * (stress[:, 0] + stress[:, 1])
+    radius = np.hypot(0.5 * (stress[:, 0] - stress[:, 1]), stress[:, 2])
+    assert (mean + radius).max() > 1e3
+
+
+def test_pieces_fill_the_body_and_are_soil_still():
+    ring = {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 13}
+    whole = af.bridge(
+        arches=[af.shapes.Arch(name="arch", **ring)], backfill=af.shapes.Backfill(cover=0.5)
+    )
+    fill = jointed_fill(whole, 0.4, angle=35.0, cohesion=5e3)
+    soil = yielding_blocks(fill)
+    assert sum(fill.blocks[n].area for n in soil) == pytest.approx(whole.blocks[-1].area)
+    assert {fill.blocks[n].part for n in soil} == {"backfill"}
+    assert soft_blocks(fill) == ()  # no rung is too low for them
+    assert [j.name for j in fill.joints if j.role == "ring"] == [
+        j.name for j in whole.joints if j.role == "ring"
+    ]
+    between = [j for j in fill.joints if {*j.blocks} <= set(soil)]
+    assert {round(j.contact.normal_stiffness) for j in between} == {
+        round(6.25e6 / (0.4 * (sqrt(3.0) - 1.0) / 2.0))
+    }
+    against = [j for j in fill.joints if len({*j.blocks} & set(soil)) == 1]
+    assert all(j.contact.friction == SOIL_TO_STONE.friction for j in against)
+    assert all(j.contact.normal_stiffness <= 0.3e9 * (1.0 + 1e-9) for j in against)
+
+
+@pytest.mark.parametrize(
+    ("size", "angle", "words"),
+    [
+        (0.5, 70.0, "not from 0 to 60"),
+        (0.0, 30.0, "not above 0"),
+        (1e-3, 30.0, "give a size with which"),
+        (50.0, 30.0, "give a size with which"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(size, angle, words):
+    whole = box(3.0, SOIL_TO_STONE, SOIL_TO_STONE)
+    with pytest.raises(af.InvalidInput, match=words):
+        jointed_fill(whole, size, angle=angle)
+
+
+def test_a_structure_without_fill_is_refused(stack):
+    with pytest.raises(af.InvalidInput, match="no fill to cut"):
+        jointed_fill(stack, 0.5, angle=30.0)
+
+
+def test_fill_is_cut_once():
+    cut = smooth_box(30.0, 1)
+    with pytest.raises(af.InvalidInput, match="into pieces already"):
+        jointed_fill(cut, 0.5, angle=30.0)

@@ -1,0 +1,75 @@
+"""Structures that creep to rest, and soil joints that slide under dead load."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.statics.equilibrium import self_weight
+from archfem.statics.newton import Solver
+from archfem.statics.relaxation import relaxed
+
+REST = 1e-10
+"""Out of balance relative to the load, to which equilibria are found."""
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    """One span with an elastic fill, whose joints to the stone slide from 0.60 on."""
+    ring = af.shapes.Arch(name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11)
+    wall = {"length": 1.5, "height": 2.0, "above": 0.8}
+    return af.bridge(
+        arches=[ring],
+        sidewalls=[
+            af.shapes.Sidewall(name="left wall", **wall),
+            af.shapes.Sidewall(name="right wall", **wall),
+        ],
+        backfill=af.shapes.Backfill(cover=0.5),
+        width=4.0,
+    )
+
+
+def at_most_coulomb(structure, joints, cohesion=0.0):
+    """Whether no joint bears more shear than Coulomb's law allows."""
+    normal, shear = joints["N"].values, np.abs(joints["V"].values)
+    limit = structure.friction * normal + cohesion * structure.width * structure.depths
+    return bool(np.all(shear <= limit * (1.0 + 1e-9)))
+
+
+def test_where_nothing_slides_creep_ends_where_newton_does(stack):
+    model = af.build(stack, fidelity="rigid")
+    weight = self_weight(model)
+    after, solved = relaxed(Solver(model.size), model, weight, np.zeros(model.size))
+    direct = af.dead_load(model)
+    assert solved.q == pytest.approx(direct.q, rel=1e-6, abs=1e-15)
+    assert not after.memory.any()
+
+
+@pytest.mark.parametrize("fidelity", ["faces", "full"])
+def test_soil_joints_slide_and_newton_finds_the_dead_load(bridge, fidelity):
+    model = af.build(bridge, fidelity={"backfill": "full", "rest": fidelity}, cells=(2, 2))
+    found = af.dead_load(model)
+    assert at_most_coulomb(bridge, found.joints)
+    assert found.steps == 1
+    assert found.iterations <= 30
+    soil = bridge.block_number("backfill")
+    against = [k for k, pair in enumerate(bridge.pairs) if soil in pair]
+    used = found.joints["friction"].values[against]
+    assert np.nanmax(used) == pytest.approx(0.6, rel=1e-9)
+    assert np.abs(found.model.memory).max() > 1e-5
+
+
+def test_fill_in_pieces_creeps_to_rest(bridge):
+    """Its free ends stand by what cohesion there is; no joint bears more than Mohr and Coulomb."""
+    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    model = af.build(fill, fidelity="rigid", cells=(2, 1))
+    found = af.dead_load(model)
+    weight = self_weight(model)
+    rest = np.linalg.norm(found.model.force(found.q) - weight)
+    assert rest <= REST * np.abs(weight).sum()
+    assert at_most_coulomb(fill, found.joints, 10e3)
+
+
+def test_upright_ends_of_dry_sand_flow(bridge):
+    fill = af.masonry.jointed_fill(bridge, 0.8, angle=20.0)
+    with pytest.raises(af.DidNotConverge, match="cannot carry it"):
+        af.dead_load(af.build(fill, fidelity="rigid", cells=(1, 1)))

@@ -1,0 +1,153 @@
+"""Dead load by stages: closed forms of columns, balance of forces, and what comes after."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.errors import InvalidInput
+from archfem.masonry.stages import Stage, usual_stages
+from archfem.statics.equilibrium import self_weight
+
+ROUND_OFF = 1e-9
+"""Of solves to 1e-10 of the load."""
+
+
+@pytest.fixture(scope="module")
+def column():
+    """Three square courses on a base."""
+    return af.column(breadth=1.0, heights=[1.0, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    """A small bridge with fill in pieces, which holds together a little."""
+    ring = af.shapes.Arch(name="arch", span=4.0, rise=1.6, thickness=0.45, voussoirs=11)
+    wall = {"length": 1.0, "height": 1.2, "above": 0.8}
+    whole = af.bridge(
+        arches=[ring],
+        sidewalls=[
+            af.shapes.Sidewall(name="left wall", **wall),
+            af.shapes.Sidewall(name="right wall", **wall),
+        ],
+        backfill=af.shapes.Backfill(cover=0.4),
+        paving=af.shapes.Paving(thickness=0.2),
+        width=4.0,
+    )
+    return af.masonry.jointed_fill(whole, 0.8, angle=35.0, cohesion=10e3)
+
+
+def upward(structure, motions):
+    """Vertical displacements of rigid blocks [m]."""
+    return motions.reshape(-1, 3)[: len(structure.free), 1]
+
+
+def one_by_one(structure):
+    """A stage for each block that moves."""
+    return [Stage(blocks=(number,)) for number in structure.free]
+
+
+def test_a_column_built_course_by_course(column):
+    """Course i of n sinks by i (n - i + 1) W / k after it was placed; forces are those at once."""
+    model = af.build(column, fidelity="rigid")
+    staged, direct = af.dead_load(model, stages=one_by_one(column)), af.dead_load(model)
+    sink = 20e3 / 1.48e9  # of a joint under one course
+    assert upward(column, staged.q) == pytest.approx([-3 * sink, -4 * sink, -3 * sink])
+    assert upward(column, direct.q) == pytest.approx([-3 * sink, -5 * sink, -6 * sink])
+    assert staged.joints["N"].values == pytest.approx([60e3, 40e3, 20e3], rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize("fidelity", ["faces", "full"])
+def test_stresses_of_an_elastic_column_do_not_depend_on_the_order(fidelity):
+    """Courses that do not bulge (ν = 0) stay conforming, so that only displacements differ."""
+    column = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0], material=af.Material(30e9, 0.0, 20e3))
+    model = af.build(column, fidelity=fidelity, cells=(2, 2))
+    staged, direct = af.dead_load(model, stages=one_by_one(column)), af.dead_load(model)
+    for name in ("N", "V", "M"):
+        assert staged.joints[name].values == pytest.approx(
+            direct.joints[name].values, rel=1e-6, abs=1e-3
+        )
+    last, first = (model.cells.stress @ each.q for each in (staged, direct))
+    assert last == pytest.approx(first, abs=1e-6 * np.abs(first).max())
+    assert not np.allclose(staged.q, direct.q, rtol=0.1)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_a_ring_that_leaves_its_centring_stands_as_if_built_at_once(fidelity):
+    """Stones on centring bear nothing; nothing slides, so the way does not matter."""
+    glued = af.Contact(1.48e9, 0.30e9, None)
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, contact=glued)
+    model = af.build(ring, fidelity=fidelity, cells=(2, 2))
+    staged = af.dead_load(model, stages=usual_stages(ring))
+    direct = af.dead_load(model)
+    assert staged.q == pytest.approx(direct.q, abs=1e-7 * np.abs(direct.q).max())
+
+
+def test_what_was_built_in_stages_is_in_balance(bridge):
+    model = af.build(bridge, fidelity="rigid", cells=(2, 1))
+    found = af.dead_load(model, stages=usual_stages(bridge, layers=3))
+    weight = self_weight(found.model)
+    rest = np.linalg.norm(found.model.force(found.q) - weight)
+    assert rest <= 1e-9 * np.abs(weight).sum()
+    limits = bridge.friction * found.joints["N"].values + 10e3 * bridge.width * bridge.depths
+    assert np.all(np.abs(found.joints["V"].values) <= limits * (1.0 + ROUND_OFF))
+    carried = sum(
+        sign * (n * bridge.normals[k, 1] - v * bridge.tangents[k, 1])
+        for k, (n, v) in enumerate(found.joints[["N", "V"]].to_array().values.T)
+        for sign, block in zip((-1.0, 1.0), bridge.pairs[k], strict=True)
+        if bridge.blocks[block].fixed
+    )
+    assert -carried == pytest.approx(bridge.weight, rel=1e-8)
+
+
+def test_runs_and_modes_go_on_from_what_was_built(column):
+    """A structure at rest stays at rest, though its joints began in different places."""
+    model = af.build(column, fidelity="rigid")
+    dead = af.dead_load(model, stages=one_by_one(column))
+    still = af.Motion.synthetic(duration=0.25, pga=1e-9, seed=1)
+    run = af.time_history(model, still, start=dead, method="snes")
+    assert run.joints["N"].values[-1] == pytest.approx([60e3, 40e3, 20e3], rel=1e-6)
+    closed = af.modes(model, 3)
+    assert af.modes(dead.model, 3, about=dead).frequencies == pytest.approx(closed.frequencies)
+    sides = af.pushover(model, af.BodyForce(1.0), start=dead)
+    assert sides.limit == pytest.approx(1.0 / 3.0, rel=2e-2)  # of breadth to height
+
+
+def test_supports_that_moved_do_so_after_building(column):
+    model = af.build(column, fidelity="rigid").settled(af.Settlement(0, (0.0, -0.01, 0.0)))
+    staged = af.dead_load(model, stages=one_by_one(column))
+    sink = 20e3 / 1.48e9
+    expected = np.array([-3 * sink, -4 * sink, -3 * sink]) - 0.01
+    assert upward(column, staged.q) == pytest.approx(expected)
+
+
+def test_usual_stages_of_a_bridge(bridge):
+    stages = usual_stages(bridge, layers=3)
+    assert [stage.name for stage in stages] == [
+        "piers and walls", "rings", "centring struck", "fill, layer 1", "fill, layer 2",
+        "fill, layer 3", "what lies on the fill",
+    ]  # fmt: skip
+    placed = [number for stage in stages for number in stage.blocks]
+    assert sorted(placed) == list(bridge.free)
+
+
+@pytest.mark.parametrize(
+    ("stages", "words"),
+    [
+        ([Stage(blocks=(1, 2))], r"no stage places \['.*'\]"),
+        ([Stage(blocks=(1,)), Stage(blocks=(1, 2, 3))], "stand already"),
+        ([Stage(blocks=(1, 2, 3), centring=True)], "never struck"),
+        ([Stage(blocks=("cours",))], "there is no block or part 'cours'"),
+        ([Stage(blocks=(0,))], "is fixed"),
+    ],
+)
+def test_stages_that_build_nothing_are_refused(column, stages, words):
+    model = af.build(column, fidelity="rigid")
+    with pytest.raises(InvalidInput, match=words):
+        af.dead_load(model, stages=stages)
+
+
+def test_what_cannot_stand_until_the_rest_is_placed_is_told(bridge):
+    """Fill without its walls' weight, placed as one ring without centring, falls at once."""
+    ring = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17, chords=1)
+    with pytest.raises(af.DidNotConverge, match="'centring struck'"):
+        af.dead_load(af.build(ring, fidelity="rigid"), stages=usual_stages(ring))
