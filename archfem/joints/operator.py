@@ -203,6 +203,20 @@ class JointOperator:
         coupled: Array = rate[row] * (self.points.cohesion[row] * closed - friction * across)
         return coupled
 
+    def shear_resultants(self) -> sparse.csr_matrix:
+        """Elastic shear resultant of each joint from coordinates, sparse (n_joints, n) [N]."""
+        return (self.sums[0] @ sparse.diags(self.points.shear) @ self.slip).tocsr()
+
+    def bonded(self, gaps: Array) -> tuple[Array, Array]:
+        """Return the forces at the points if joints held tension and nothing slid, each (p,) [N].
+
+        Args:
+            gaps: opening and slip at the points (2, p) [m].
+        """
+        first, second = self.law.entries
+        across = self.law.stiffness(np.full(len(self.points.arm), -1.0)) * gaps[0][second]
+        return np.bincount(first, across, len(gaps[0])), self.points.shear * gaps[1]
+
     def glued(self) -> Array:
         """Return what `stiffness` is where all is closed and nothing slides (m,) [N/m]."""
         across = self.law.stiffness(np.full(len(self.points.arm), -1.0))

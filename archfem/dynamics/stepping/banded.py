@@ -24,7 +24,7 @@ from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.joint_law import closed_stiffness, pulls
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.open_points import SETTLED
+from archfem.dynamics.stepping.small_problem import SETTLED
 from archfem.dynamics.stepping.sparse_rows import times
 from archfem.dynamics.stepping.strategy import Reordered
 
@@ -76,13 +76,13 @@ class Banded(Reordered):
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """Return the strategy, or None where the bandwidth is too large.
+        """Return the strategy, or None where the bandwidth is too large, or steps are averaged.
 
         Args:
             equation: of motion.
         """
         order, width = narrow(equation.model.mass)
-        fits = equation.joints is not None and width <= WIDEST
+        fits = equation.joints is not None and not equation.conserving and width <= WIDEST
         return cls(equation, order, width) if fits else None
 
     def system(self, dt: float) -> BandedSystem:
@@ -97,7 +97,7 @@ class Banded(Reordered):
         numbers = linear.numbers
         without = (
             equation.model.blocks
-            + joints.shear_stiffness()
+            + joints.slip.T @ sparse.diags(joints.points.shear) @ joints.slip
             + numbers.inertia * equation.model.mass
             + numbers.rate * equation.rest
         ).tocsr()

@@ -100,9 +100,19 @@ class Equation:
 
     @cached_property
     def joints(self) -> JointOperator | None:
-        """The joints, where all that is not linear are joints on supports that have not moved."""
+        """The joints, where all that is not linear are joints that a compiled loop can follow.
+
+        Of joints on supports that have moved only the conserving scheme knows.
+        """
         joints = self.model.operator
-        return joints if joints is not None and joints.offset is None else None
+        known = joints is not None and (self.conserving or joints.offset is None)
+        return joints if known else None
+
+    @property
+    def remembers(self) -> int:
+        """How many joint points remember what they have slid."""
+        joints = self.model.operator
+        return len(joints.points.arm) if joints is not None and joints.slides else 0
 
     @cached_property
     def meter(self) -> Meter:

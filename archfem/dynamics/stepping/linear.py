@@ -17,12 +17,15 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload
 from numpy.typing import NDArray
+from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.joint_law import Law, joint_resultants, law_of, pulls
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.newmark import Numbers, add_mixed, follow, mix
+from archfem.dynamics.stepping.open_points import is_law
+from archfem.dynamics.stepping.path_law import PathLaw, path_law
 from archfem.dynamics.stepping.sparse_rows import Rows, add_rows, rows_of, stored, times, trimmed
 
 Matrix = Rows | Array
@@ -35,12 +38,12 @@ class Linear(NamedTuple):
         mass: M.
         closed: K, with all joints closed.
         rest: R, what of C is not proportional to M; without entries where there is none.
-        opening: G (p, n).
-        shear: shear resultants of the joints (n_joints, n).
-        weight: forces of gravity (n,).
+        opening: G, also of slips where those are followed (r, n).
+        shear: shear resultants of the joints, without rows where slips are followed (n_joints, n).
+        weight: forces of gravity, and of joints before anything moves (n,).
         body: forces per unit ground acceleration (2, n).
         numbers: of the time step.
-        law: of the joints.
+        law: of the joints, at an instant or over steps.
     """
 
     mass: Matrix
@@ -51,7 +54,7 @@ class Linear(NamedTuple):
     weight: Array
     body: Array
     numbers: Numbers
-    law: Law
+    law: Law | PathLaw
 
 
 class Kept(NamedTuple):
@@ -89,11 +92,45 @@ def reordered(equation: Equation, order: NDArray[Any], dt: float) -> Linear:
     assert joints is not None
     square = [model.mass, model.closed(), equation.rest]
     mass, closed, rest = (rows_of(trimmed(matrix[order][:, order])) for matrix in square)
-    wide = [joints.opening, joints.shear_resultants()]
-    opening, shear = (rows_of(trimmed(matrix[:, order])) for matrix in wide)
+    rows = gaps_of(equation, dt)
+    opening, shear = (rows_of(trimmed(matrix[:, order])) for matrix in (rows.gaps, rows.shear))
     body = np.ascontiguousarray(model.body[order].T)
-    weight, numbers, law = equation.weight[order], equation.numbers(dt), law_of(joints)
-    return Linear(mass, closed, rest, opening, shear, weight, body, numbers, law)
+    weight, numbers = rows.weight[order], equation.numbers(dt)
+    return Linear(mass, closed, rest, opening, shear, weight, body, numbers, rows.law)
+
+
+class Gaps(NamedTuple):
+    """What a linear strategy needs to know of the joints.
+
+    Attributes:
+        gaps: rows of the gaps that the law asks for (r, n).
+        shear: shear resultants of joints none of which slides (n_joints, n).
+        weight: gravity, and what joints exert before anything moves (n,).
+        law: of the joints.
+    """
+
+    gaps: sparse.csr_matrix
+    shear: sparse.csr_matrix
+    weight: Array
+    law: Law | PathLaw
+
+
+def gaps_of(equation: Equation, dt: float) -> Gaps:
+    """Return what a linear strategy needs to know of the joints.
+
+    Args:
+        equation: of motion, whose joints a compiled loop can follow.
+        dt: time step [s].
+    """
+    joints = equation.joints
+    assert joints is not None
+    shear, weight = joints.shear_resultants(), equation.weight
+    if not equation.conserving:
+        return Gaps(joints.opening, shear, weight, law_of(joints))
+    law, rows = path_law(joints, equation.numbers(dt), dt)
+    if joints.offset is not None:
+        weight = weight - joints.pushed(*joints.bonded(joints.offset))
+    return Gaps(rows, shear[:0] if joints.slides else shear, weight, law)
 
 
 def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:
@@ -120,11 +157,23 @@ def is_linear(system: types.Type) -> bool:
     Args:
         system: as numba types it.
     """
-    return isinstance(system, types.NamedTuple) and "linear" in system.fields
+    return is_law(law_type(system))
+
+
+def law_type(system: types.Type) -> types.Type | None:
+    """Return the type of the law of a system, or None where it has no field `linear`.
+
+    Args:
+        system: as numba types it.
+    """
+    if not isinstance(system, types.NamedTuple) or "linear" not in system.fields:
+        return None
+    linear = system.types[system.fields.index("linear")]
+    return linear.types[linear.fields.index("law")]
 
 
 @overload(begin)
-def _begin(system, state):  # type: ignore
+def _begin(system, state, memory):  # type: ignore
     return _started if is_linear(system) else None
 
 
@@ -134,11 +183,11 @@ def _settle(system, kept, step, states, ground):  # type: ignore
 
 
 @overload(measure)
-def _measure(system, kept, step, states, ground, resultants, energy):  # type: ignore
+def _measure(system, kept, step, states, ground, results, memory):  # type: ignore
     return _measured if is_linear(system) else None
 
 
-def _started(system, state):  # type: ignore
+def _started(system, state, memory):  # type: ignore
     """Images of a state under M, K and R, its gaps and what the joints do there."""
     linear, size, points = system.linear, state.shape[1], len(system.linear.law.stiffness)
     images, gaps = np.zeros((2, 3, 3, size)), np.zeros((2, 5, points))
@@ -159,7 +208,7 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     """Take a step, and let the images follow."""
     linear, right, contact = system.linear, kept.right, kept.contact
     old, new = kept.images[step % 2], kept.images[(step + 1) % 2]
-    _load(right, ground, linear.weight, linear.body)
+    add_load(right, ground, linear.weight, linear.body)
     add_mixed(right, old[0], linear.numbers.pushed)
     if stored(linear.rest) > 0:
         add_mixed(right, old[2], linear.numbers.dragged)
@@ -167,13 +216,14 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     passes = solve(system, contact, kept.gap, kept.before, kept.force)
     if passes > 0:
         add_rows(linear.opening, np.flatnonzero(kept.force), kept.force, right)
-        _follow(contact, right, (old, new), linear)
+        follow_images(contact, right, (old, new), linear)
         follow(contact, states[0], states[1], linear.numbers)
     return passes
 
 
-def _measured(system, kept, step, states, ground, resultants, energy):  # type: ignore
+def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
     """Resultants and energies at the end of a step."""
+    resultants, energy = results
     linear, numbers = system.linear, system.linear.numbers
     gap, contact = kept.gap, kept.contact
     turn, next_turn = step % 2, (step + 1) % 2
@@ -188,12 +238,12 @@ def _measured(system, kept, step, states, ground, resultants, energy):  # type: 
     times(linear.shear, contact, shear)
     joint_resultants(resultants, gap, shear, linear.law)
     images, forces = (kept.images[turn], kept.images[next_turn]), (linear.weight, linear.body)
-    _energies(states, images, forces, ground, (numbers.drag, numbers.lag), energy)
+    closed_energies(states, images, forces, ground, (numbers.drag, numbers.lag), energy)
     _joint_energies(old, new, energy)
 
 
 @numba.njit(cache=True)
-def _load(result, ground, weight, body):  # type: ignore
+def add_load(result, ground, weight, body):  # type: ignore
     """Forces of gravity and of the ground."""
     across, up = body[0], body[1]
     x, y = ground[0], ground[1]
@@ -202,7 +252,7 @@ def _load(result, ground, weight, body):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _follow(contact, right, images, linear):  # type: ignore
+def follow_images(contact, right, images, linear):  # type: ignore
     """Images of the state under M, K and R after a step; overwrites its right side."""
     (old, new), numbers = images, linear.numbers
     image = np.empty(len(contact))
@@ -231,7 +281,7 @@ def _late(gaps, lag, law):  # type: ignore
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc"})
-def _energies(states, images, forces, ground, damping, energy):  # type: ignore
+def closed_energies(states, images, forces, ground, damping, energy):  # type: ignore
     """Energies of a step as if all joints were closed and held tension."""
     (old, new), (weight, body), (drag, lag) = images, forces, damping
     across, up = body[0], body[1]

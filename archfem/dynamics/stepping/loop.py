@@ -15,12 +15,13 @@ ITERATIONS = 40
 """Passes over the joints in a step before it is given up."""
 
 
-def begin(system: Any, state: Any) -> Any:
+def begin(system: Any, state: Any, memory: Any) -> Any:
     """Return what is carried from step to step; to be overloaded.
 
     Args:
         system: of a strategy.
         state: from which the first step goes, in the strategy's terms (3, n).
+        memory: what the joints remember there (m,).
     """
     raise NotImplementedError
 
@@ -42,9 +43,9 @@ def settle(system: Any, kept: Any, step: Any, states: Any, ground: Any) -> Any:
 
 
 def measure(
-    system: Any, kept: Any, step: Any, states: Any, ground: Any, resultants: Any, energy: Any
+    system: Any, kept: Any, step: Any, states: Any, ground: Any, results: Any, memory: Any
 ) -> Any:
-    """Find the resultants and energies of a step that has settled; to be overloaded.
+    """Find the resultants, energies and memory of a step that has settled; to be overloaded.
 
     Args:
         system: of a strategy.
@@ -52,8 +53,9 @@ def measure(
         step: number of the step in its batch.
         states: at its start and at its end (2, 3, n).
         ground: mean acceleration of the ground over the step (2,) [m/s²].
-        resultants: N, V, M, filled (n_joints, 3) [N, N, N m].
-        energy: as by `energy.Meter.step`, filled (4,) [J].
+        results: N, V, M (n_joints, 3) [N, N, N m], and energies as by `energy.Meter.step`
+            (4,) [J], both filled.
+        memory: what the joints remember at its end, filled (m,).
     """
     raise NotImplementedError
 
@@ -78,12 +80,13 @@ forget_stale(Path(__file__).parent)
 
 
 @numba.njit(cache=True)
-def advance(series, results, ground, system):  # type: ignore
+def advance(series, memories, results, ground, system):  # type: ignore
     """Take steps until the end, or until one does not settle.
 
     Args:
         series: coordinates, their velocity and acceleration at the start in [0]; filled
             (steps + 1, 3, n).
+        memories: what the joints remember at the start in [0]; filled (steps + 1, m).
         results: N, V, M (steps, n_joints, 3), passes over the joints (steps,) and energies as by
             `energy.Meter.step` (steps, 4), all filled.
         ground: acceleration where the equation is written, and its mean over the step
@@ -94,11 +97,12 @@ def advance(series, results, ground, system):  # type: ignore
         How many steps were taken.
     """
     resultants, passes, energies = results
-    kept = begin(system, series[0])
+    kept = begin(system, series[0], memories[0])
     for step in range(len(resultants)):
         states = series[step : step + 2]
         passes[step] = settle(system, kept, step, states, ground[0, step])
         if passes[step] < 0:
             return step
-        measure(system, kept, step, states, ground[1, step], resultants[step], energies[step])
+        found = resultants[step], energies[step]
+        measure(system, kept, step, states, ground[1, step], found, memories[step + 1])
     return len(resultants)

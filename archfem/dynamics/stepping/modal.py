@@ -21,11 +21,11 @@ from numba.extending import overload
 from scipy.linalg import eigh
 
 from archfem.arrays import Array
+from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
 from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.stepping.joint_law import law_of
-from archfem.dynamics.stepping.linear import Linear, solve
+from archfem.dynamics.stepping.linear import Linear, gaps_of, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.open_points import SETTLED, exact, expected, release
+from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
 from archfem.dynamics.stepping.sparse_rows import add_rows, times
 
 LARGEST = 1200
@@ -111,21 +111,21 @@ class Modal:
         Args:
             dt: time step [s].
         """
-        equation, joints, (squares, shapes) = self._equation, self._equation.joints, self._modes
-        assert joints is not None
+        equation, (squares, shapes) = self._equation, self._modes
         numbers, damping = equation.numbers(dt), equation.damping
         rate = damping.stiffness if damping and damping.joints == "initial" else 0.0
-        opening = np.ascontiguousarray(joints.opening @ shapes)
+        rows = gaps_of(equation, dt)
+        opening = np.ascontiguousarray(rows.gaps @ shapes)
         linear = Linear(
             np.ones_like(squares),
             squares,
             rate * squares if rate else np.empty(0),
             opening,
-            np.ascontiguousarray(joints.shear_resultants() @ shapes),
-            shapes.T @ equation.weight,
+            np.ascontiguousarray(rows.shear @ shapes),
+            shapes.T @ rows.weight,
             np.ascontiguousarray((shapes.T @ equation.model.body).T),
             numbers,
-            law_of(joints),
+            rows.law,
         )
         gain = 1.0 / (squares * (1.0 + numbers.rate * rate) + numbers.inertia)
         compliance = (opening * gain) @ opening.T
@@ -144,8 +144,8 @@ def _solved(system, vector, gap, before, force):  # type: ignore
         Passes over the open points; -1 if they do not settle.
     """
     linear, law = system.linear, system.linear.law
-    near = expected(gap, before, force, law.facets)
-    enough = SETTLED * np.max(law.stiffness * np.abs(gap))
+    near = expected(law, gap, before, force)
+    enough = SETTLED * largest(law, gap)
     before[:] = gap
     for k in range(len(vector)):
         vector[k] *= system.gain[k]
@@ -157,13 +157,13 @@ def _solved(system, vector, gap, before, force):  # type: ignore
         passes += 1
         rows = np.flatnonzero(near)
         if len(rows) > 0:
-            taken = release(start, rows, system.compliance, law, force, enough)
+            taken = release(law, start, rows, system.compliance, force, enough)
             if taken < 0:
                 return -1
             passes += taken - 1
             gap[:] = start
             add_rows(system.compliance, rows, force, gap)
-        if exact(gap, force, near, law):
+        if exact(law, gap, force, near):
             _give(vector, linear.opening, force, system.gain)
             return passes
     return -1

@@ -16,22 +16,19 @@ from the gaps of the last pass, and those of the first pass from the λ of the l
 
 import numba
 import numpy as np
+from numba.extending import overload
 
 from archfem.dynamics.stepping.joint_law import Law, integrals, open_part, pull, pulls
 from archfem.dynamics.stepping.loop import ITERATIONS
-
-SETTLED = 1e-12
-"""Error of a contact force, relative to the largest of all joints as if closed, that ends the
-passes."""
-
-ROUNDED = 10.0
-"""How much more may be left once it does not fall any further: near a mechanism rounding weighs."""
-
-EXACT = SETTLED * ROUNDED
-"""The same that is left to rounding once the gaps of the whole structure are known."""
-
-AHEAD = 2.0
-"""Steps ahead for which it is foreseen which points may open."""
+from archfem.dynamics.stepping.small_problem import (
+    AHEAD,
+    EXACT,
+    ROUNDED,
+    exact,
+    expected,
+    largest,
+    release,
+)
 
 FEW = 24
 """Points up to which the problem is solved directly."""
@@ -41,23 +38,41 @@ ROUGH = 1e-3
 as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
 
 
-@numba.njit(cache=True)
-def release(start, rows, compliance, law, force, enough):  # type: ignore
-    """Find λ where it may differ from zero.
+@overload(release)
+def _release(law, start, rows, compliance, force, enough):  # type: ignore
+    return _released if is_law(law) else None
+
+
+@overload(exact)
+def _exact(law, gap, force, near):  # type: ignore
+    return _fits if is_law(law) else None
+
+
+@overload(expected)
+def _expected(law, gap, before, force):  # type: ignore
+    return _foreseen if is_law(law) else None
+
+
+@overload(largest)
+def _largest(law, gap):  # type: ignore
+    if is_law(law):
+        return lambda law, gap: np.max(law.stiffness * np.abs(gap))
+    return None
+
+
+def is_law(law):  # type: ignore
+    """Return whether this is the type of a law at an instant.
 
     Args:
-        start: z₀ (p,), of which the rows are used.
-        rows: points that may open, in order; of a facet both ends.
-        compliance: F (p, p), of which these rows and columns are used.
-        law: `Law`.
-        force: λ, as a first guess (p,); changed at the rows.
-        enough: error of λ that is left [N].
-
-    Returns:
-        Passes; -1 if it does not settle.
+        law: as numba types it.
     """
+    return getattr(law, "instance_class", None) is Law
+
+
+def _released(law, start, rows, compliance, force, enough):  # type: ignore
+    """Find λ where it may differ from zero; passes, or -1 if it does not settle."""
     law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
-    matrix, free, own = _square(compliance, rows), chosen(start, rows), chosen(force, rows)
+    matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
     root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
     gap, left, last = free + matrix @ own, ROUGH, np.inf
     for passes in range(1, ITERATIONS + 1):
@@ -77,43 +92,27 @@ def release(start, rows, compliance, law, force, enough):  # type: ignore
     return -1
 
 
-@numba.njit(cache=True)
-def exact(gap, force, near, law):  # type: ignore
-    """Return whether the gaps ask for the λ they were found with.
-
-    Args:
-        gap: of the whole structure (p,) [m].
-        force: λ (p,) [N].
-        near: points taken for open; those found to open, of a facet both ends, are added (p,).
-        law: `Law`.
-    """
+def _fits(law, gap, force, near):  # type: ignore
+    """Return whether the gaps ask for the λ they were found with; adds open points to near."""
     facets, stiffness, _, _ = law
-    largest, off = 0.0, 0.0
+    most, off = 0.0, 0.0
     for row in range(len(gap)):
         wanted = pull(gap[row], gap[row ^ 1] if facets else 0.0, stiffness[row], facets)
-        largest = max(largest, stiffness[row] * abs(gap[row]))
+        most = max(most, stiffness[row] * abs(gap[row]))
         off = max(off, abs(wanted - force[row]))
         if wanted > 0.0:
             near[row] = True
             if facets:
                 near[row ^ 1] = True
-    return off <= EXACT * largest
+    return off <= EXACT * most
 
 
-@numba.njit(cache=True)
-def expected(gap, before, force, facets):  # type: ignore
-    """Return which points are open, or will be soon if they go on as they did (p,).
-
-    Args:
-        gap: that the law saw at the end of the last step (p,) [m].
-        before: the same a step earlier (p,) [m].
-        force: λ at the end of the last step (p,) [N].
-        facets: whether facets are exact, whose ends then go together.
-    """
+def _foreseen(law, gap, before, force):  # type: ignore
+    """Return which points are open, or will be soon if they go on as they did (p,)."""
     near = np.empty(len(gap), dtype=np.bool_)
     for row in range(len(gap)):
         near[row] = force[row] != 0.0 or gap[row] + AHEAD * (gap[row] - before[row]) > 0.0
-    if facets:
+    if law.facets:
         for row in range(0, len(gap), 2):
             near[row] = near[row + 1] = near[row] or near[row + 1]
     return near
@@ -134,8 +133,13 @@ def chosen(vector, rows):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _square(matrix, rows):  # type: ignore
-    """Rows and columns of a matrix."""
+def square(matrix, rows):  # type: ignore
+    """Return some rows and columns of a matrix (rows, rows).
+
+    Args:
+        matrix: of which to take them (n, n).
+        rows: their numbers (rows,).
+    """
     result = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
         line = matrix[rows[i]]

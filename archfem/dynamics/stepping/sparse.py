@@ -17,11 +17,12 @@ import numpy as np
 from numba.extending import overload
 
 from archfem.arrays import Array
+from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
 from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.open_points import SETTLED, exact, expected, release
+from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
 from archfem.dynamics.stepping.panels import Factor, backward, factorised, forward
 from archfem.dynamics.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
@@ -92,7 +93,7 @@ class Sparse(Reordered):
             + numbers.inertia * trimmed(equation.model.mass)
             + numbers.rate * trimmed(equation.rest)
         )
-        points = len(linear.law.stiffness)
+        points = len(linear.opening[0]) - 1
         return SparseSystem(
             linear,
             factorised(effective[order][:, order], self._elimination),
@@ -114,11 +115,11 @@ def _solved(system, vector, gap, before, force):  # type: ignore
         Passes over the joints; -1 if they do not settle.
     """
     opening, law, factor = system.linear.opening, system.linear.law, system.factor
-    near = expected(gap, before, force, law.facets)
+    near = expected(law, gap, before, force)
     before[:] = gap
     start, room = np.empty(len(gap)), np.empty(len(vector))
     everywhere = np.ones(len(factor.parent), dtype=np.bool_)
-    enough = SETTLED * np.max(law.stiffness * np.abs(gap))
+    enough = SETTLED * largest(law, gap)
     forward(factor, vector, room)
     half = vector.copy()
     passes, fresh = 1, True
@@ -132,7 +133,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
                     start[row] = row_times(opening, row, vector)
             else:
                 _unload(start, gap, rows, system.compliance, force)
-            taken = release(start, rows, system.compliance, law, force, enough)
+            taken = release(law, start, rows, system.compliance, force, enough)
             if taken < 0:
                 return -1
             passes += taken - 1
@@ -143,7 +144,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
                 vector[k] += half[k]
         backward(factor, vector, room, everywhere)
         times(opening, vector, gap)
-        if exact(gap, force, near, law):
+        if exact(law, gap, force, near):
             return passes
         passes, fresh = passes + 1, False
     return -1

@@ -86,8 +86,9 @@ class Stepper:
         """
         strategy = self.strategy
         assert strategy is not None
-        series, results, ground, system = self.prepared(state, dt, times)
-        count = self._advance(series, results, ground, system)
+        room = self.prepared(state, dt, times)
+        series, memories, results, *_ = room
+        count = self._advance(*room)
         resultants, passes, energy = (each[:count] for each in results)
         return Batch(
             times[:count],
@@ -95,7 +96,7 @@ class Stepper:
             passes,
             np.full(count, dt),
             energy,
-            lambda k: State(float(times[k]), *strategy.leave(series[k + 1])),
+            lambda k: State(float(times[k]), *strategy.leave(series[k + 1]), memories[k + 1]),
         )
 
     def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
@@ -111,8 +112,11 @@ class Stepper:
         first = self.strategy.enter(np.stack([state.q, state.velocity, state.acceleration]))
         series = np.empty((steps + 1, *first.shape))
         series[0] = first
+        memories = np.zeros((steps + 1, self.equation.remembers))
+        if state.memory is not None and self.equation.remembers:
+            memories[0] = state.memory
         passes = np.zeros(steps, dtype=np.int64)
         results = (np.empty((steps, joints, 3)), passes, np.empty((steps, 4)))
         if dt not in self._systems:
             self._systems = {dt: self.strategy.system(dt)}
-        return series, results, self.equation.ground(times, dt), self._systems[dt]
+        return series, memories, results, self.equation.ground(times, dt), self._systems[dt]

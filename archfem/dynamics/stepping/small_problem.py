@@ -1,0 +1,77 @@
+"""The small problem of a step, in the joint points that open or slide alone; what solves it.
+
+With z the gaps at the joint points, z₀ those if all joints held tension and nothing slid, and F
+their compliance over a step,
+
+    z = z₀ + F λ,    λ = λ(z),
+
+λ what joints do not carry of that. It is `open_points` that solves it where joints open, at an
+instant, and `sliding_points` where they open and slide, over a step: which, the type of the law
+says as numba compiles what calls these.
+"""
+
+from typing import Any
+
+SETTLED = 1e-12
+"""Error of a contact force, relative to the largest of all joints as if closed, that ends the
+passes."""
+
+ROUNDED = 10.0
+"""How much more may be left once it does not fall any further: near a mechanism rounding weighs."""
+
+EXACT = SETTLED * ROUNDED
+"""The same that is left to rounding once the gaps of the whole structure are known."""
+
+AHEAD = 2.0
+"""Steps ahead for which it is foreseen which points may open."""
+
+
+def expected(law: Any, gap: Any, before: Any, force: Any) -> Any:
+    """Return which rows are at work, or will be soon if they go on as they did (p,).
+
+    Args:
+        law: of the joints.
+        gap: that the law saw at the end of the last step (p,) [m].
+        before: the same a step earlier (p,) [m].
+        force: λ at the end of the last step (p,) [N].
+    """
+    raise NotImplementedError
+
+
+def release(law: Any, start: Any, rows: Any, compliance: Any, force: Any, enough: Any) -> Any:
+    """Find λ where it may differ from zero.
+
+    Args:
+        law: of the joints.
+        start: z₀ (p,), of which the rows are used.
+        rows: that may be at work, in order; of a facet both ends.
+        compliance: F (p, p), of which these rows and columns are used.
+        force: λ, as a first guess (p,); changed at the rows.
+        enough: error of λ that is left [N].
+
+    Returns:
+        Passes; -1 if it does not settle.
+    """
+    raise NotImplementedError
+
+
+def exact(law: Any, gap: Any, force: Any, near: Any) -> Any:
+    """Return whether the gaps ask for the λ they were found with.
+
+    Args:
+        law: of the joints.
+        gap: of the whole structure (p,) [m].
+        force: λ (p,) [N].
+        near: rows taken to be at work; those found to be, of a facet both ends, are added (p,).
+    """
+    raise NotImplementedError
+
+
+def largest(law: Any, gap: Any) -> Any:
+    """Return the largest force of a point if all joints held tension [N].
+
+    Args:
+        law: of the joints.
+        gap: that the law saw at the end of the last step (p,) [m].
+    """
+    raise NotImplementedError
