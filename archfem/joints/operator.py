@@ -27,6 +27,10 @@ Status = NDArray[np.bool_]
 TOUCHING = 1e-9
 """Excess over Coulomb's limit, relative to it, that is rounding of a point which holds."""
 
+SLIDING = 1e-9
+"""Share of its elastic stiffness that the tangent leaves a point which slides: a body that slides
+at all its joints, to either side, would be free, though it holds as soon as it moves back."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointOperator:
@@ -186,7 +190,9 @@ class JointOperator:
         normal, shear = self.law.forces(opening), self.elastic(q)
         limit = (1.0 + TOUCHING) * self.limits(normal, self.law.closed(opening))
         over = points.slides & (np.abs(shear) > limit)
-        sign, along = np.where(over, np.sign(shear), 0.0), np.where(over, 0.0, points.shear)
+        sign = np.where(over, np.sign(shear), 0.0)
+        left = np.where(limit > 0.0, SLIDING, 0.0)  # nothing where it is open
+        along = np.where(over, left, 1.0) * points.shear
         coupled = self.limit_rates(across, self.law.closed_rate(opening), sign)
         return np.concatenate([across, along, coupled])
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -128,7 +129,7 @@ def test_what_is_remembered_holds_without_sliding_further():
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 @pytest.mark.parametrize(("rule", "seed"), [(rule, seed) for rule in RULES for seed in range(4)])
 def test_the_static_tangent_is_the_slope_of_the_forces(fidelity, rule, seed):
-    """Springs are linear between changes of status: 1e-8 covers the rounding of differences over 1e-10 m.
+    """Springs are linear between changes of status: 1e-8 covers rounding over 1e-10 m.
 
     Facets are smooth, so that central differences err by their square.
     """
@@ -271,8 +272,8 @@ def test_a_loop_of_even_slip_costs_what_its_area_is(rule, cohesion):
     model = dead.model.remembering(dead.model.memory)
     lost, area = 0.0, 0.0
     for turn, path in enumerate([across[20:], across[::-1], across, across[::-1], across]):
-        for start, end in zip(path[:-1], path[1:], strict=True):
-            first, last = dead.q + [start, 0.0, 0.0], dead.q + [end, 0.0, 0.0]
+        for start, end in pairwise(path):
+            first, last = (dead.q + np.array([each, 0.0, 0.0]) for each in (start, end))
             passage = model.passage(first, 0.0)
             if turn > 2:  # the loop closes from the second on
                 lost += passage.lost(last)
