@@ -1,10 +1,12 @@
 """Newmark's sliding block, integrated from event to event."""
 
+from itertools import pairwise
+
 import numpy as np
 
 
 def slide(ground, dt, limit):
-    """Slip and speed relative to the ground at the end of its motion [m, m/s].
+    """Slip relative to the ground at the end of its motion, and the way there and back [m].
 
     The ground's acceleration is straight between samples, so that between events the speed is a
     parabola and the slip a cubic in time: events are roots of known polynomials.
@@ -14,18 +16,19 @@ def slide(ground, dt, limit):
         dt: time between samples [s].
         limit: acceleration that friction can give, μ g [m/s²].
     """
-    slip = speed = 0.0
-    for before, after in zip(ground[:-1], ground[1:], strict=True):
+    slip = speed = path = 0.0
+    for before, after in pairwise(ground):
         rate, now, left = (after - before) / dt, before, dt
         while left > 1e-14 * dt:
             way = _way(now, rate, speed, limit)
             pull, jerk = (0.0, 0.0) if way == 0.0 else (-now - way * limit, -rate)
             span = min([left, *_events(now, rate, speed, limit, way)])
-            slip += span * (speed + span * (pull / 2.0 + span * jerk / 6.0))
+            moved = span * (speed + span * (pull / 2.0 + span * jerk / 6.0))
+            slip, path = slip + moved, path + abs(moved)
             speed += span * (pull + span * jerk / 2.0)
             speed = 0.0 if way == 0.0 or (span < left and abs(speed) < 1e-9) else speed
             now, left = now + rate * span, left - span
-    return slip, speed
+    return slip, path
 
 
 def _way(ground, rate, speed, limit):
@@ -34,7 +37,9 @@ def _way(ground, rate, speed, limit):
         return np.sign(speed)
     over = abs(ground) - limit
     grows = rate * np.sign(ground) > 0.0
-    return -np.sign(ground) if over > 1e-12 * limit or (abs(over) <= 1e-12 * limit and grows) else 0.0
+    return (
+        -np.sign(ground) if over > 1e-12 * limit or (abs(over) <= 1e-12 * limit and grows) else 0.0
+    )
 
 
 def _events(ground, rate, speed, limit, way):
