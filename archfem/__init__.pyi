@@ -29,6 +29,7 @@ from .errors import InvalidStructure as InvalidStructure
 from .joints.criteria import Criteria as Criteria
 from .limit.collapse import collapse_factor as collapse_factor
 from .limit.collapse import stands as stands
+from .limit.movement import largest_movement as largest_movement
 from .limit.thickness import minimum_thickness as minimum_thickness
 from .limit.verified import verified_mechanism as verified_mechanism
 from .masonry import shapes as shapes

@@ -11,9 +11,10 @@ import xarray as xr
 
 from archfem.arrays import Array
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
+from archfem.dynamics.verdicts import DEFINITIONS, PUBLISHED, first_mechanisms
 from archfem.files import in_one_stroke
 from archfem.joints.criteria import judged
+from archfem.limit.counted import KINDS
 from archfem.tables import aligned
 
 
@@ -101,7 +102,7 @@ def by_part(values: xr.DataArray) -> dict[str, float]:
 def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | None:
     """Return what an earlier command found of a case, without factors searched for otherwise.
 
-    What an earlier version wrote, which kept only words of how runs ended, is not taken.
+    What an earlier version wrote, which kept less of its runs, is not taken.
 
     Args:
         path: of the file that `write` has written.
@@ -115,7 +116,8 @@ def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | N
         found = Finding(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
-    if found.case != case or not all("ended" in run for run in found.runs.values()):
+    whole = all("ended" in run and PUBLISHED in run["mechanisms"] for run in found.runs.values())
+    if found.case != case or not whole:
         return None
     if search is not None and found.search not in (None, search):
         found.scales = {}
@@ -137,15 +139,17 @@ def study_table(findings: Mapping[str, Finding]) -> str:
     """Return two tables, a line for each case.
 
     The first tells of the motions as each case applies them: the first mode, the gravest joint of
-    rings and piers (its median over the pairs), and in how many pairs each definition of a
-    mechanism is met; a run that broke off tells only of the time before, and is counted below. The
-    second, where they were looked for, tells by what factor on the whole motions they begin: the
-    median over the pairs, and their range.
+    rings and piers (its median over the pairs), in how many pairs each definition of a mechanism
+    is met, and in how many a mechanism of which class by the words of Demirel and Aldemir; a run
+    that broke off tells only of the time before, and is counted below. The second, where they were
+    looked for, tells by what factor on the whole motions they begin: the median over the pairs, and
+    their range.
 
     Args:
         findings: by name of the case.
     """
     head = ["case", "mode 1", "mass x", "|e| dead", "|e| rings", "|e| piers", *DEFINITIONS]
+    head.append(PUBLISHED)
     rows = []
     for name, found in findings.items():
         cells = [name, f"{found.frequency:.2f} Hz", f"{found.mass:.0%}"]
@@ -154,7 +158,7 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         for definition in DEFINITIONS:
             met = [run["mechanisms"][definition] is not None for run in found.runs.values()]
             cells.append(f"{sum(met)} of {len(met)}")
-        rows.append(cells)
+        rows.append([*cells, _classes(found)])
     tables = [aligned(head, rows), *_broken(findings)]
     if any(found.scales for found in findings.values()):
         rows = [
@@ -163,6 +167,14 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         ]
         tables.append(aligned(["factor at first mechanism", *DEFINITIONS], rows))
     return "\n\n".join(tables)
+
+
+def _classes(finding: Finding) -> str:
+    """In how many pairs a mechanism of each class is met, by the words of Demirel and Aldemir."""
+    met = [
+        found["kind"] for run in finding.runs.values() if (found := run["mechanisms"][PUBLISHED])
+    ]
+    return ", ".join(f"{met.count(kind)} {kind}" for kind in KINDS if kind in met) or "none"
 
 
 def _broken(findings: Mapping[str, Finding]) -> list[str]:

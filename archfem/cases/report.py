@@ -28,6 +28,7 @@ from archfem.view.freebody import draw_free_body
 from archfem.view.joints import draw_joints
 from archfem.view.modes import draw_modes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
+from archfem.view.names import draw_names
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_structure
 from archfem.view.studies import draw_study
@@ -54,7 +55,7 @@ def write_limit(case: Case, found: Collapse, text: str, folder: Path) -> list[Pa
 
 
 def write_dead(rest: Rest, folder: Path) -> list[Path]:
-    """Draw the dead load: thrust lines; where there is a mesh, stress; a free body where asked.
+    """Draw names of joints, thrust lines of the dead load, stress on a mesh, a free body if asked.
 
     Args:
         rest: a case, which names the block to be cut free, if any, and its dead load.
@@ -65,7 +66,8 @@ def write_dead(rest: Rest, folder: Path) -> list[Path]:
     """
     case, dead, model, structure = rest.case, rest.dead, rest.dead.model, rest.case.structure
     files = [
-        save(draw_structure(structure, dead.joints, criteria=case.criteria), folder / "dead.png")
+        save(draw_structure(structure, dead.joints, criteria=case.criteria), folder / "dead.png"),
+        save(draw_names(structure), folder / "names.png"),
     ]
     if rest.use is not None:
         files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))

@@ -10,19 +10,21 @@ from archfem.dynamics.tradeoff import Accuracy
 from archfem.joints.criteria import envelope, first_time, flagged, judged, longest_duration
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.counted import Mechanism
+from archfem.limit.episodes import episode, lasting
+from archfem.masonry.naming import listed, listed_joints
 from archfem.masonry.structure import Structure
 from archfem.motion.matching import Match
 from archfem.motion.measures import measures
 from archfem.motion.motion import Motion
 from archfem.statics.strength import utilisation_sentence
 from archfem.tables import aligned
-from archfem.units import STANDARD_GRAVITY
-
-SHOWN = 8
-"""Names in a list, beyond which those in the middle are left out."""
+from archfem.units import STANDARD_GRAVITY, mm
 
 ENDS = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
 """Words for how a run ended, other than its own."""
+
+NONE = ("none", "-", "-", "-")
+"""Cells of a mechanism that was not found."""
 
 LOOSE = 100.0
 """Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
@@ -67,7 +69,8 @@ def pair_table(runs: Mapping[str, History]) -> str:
         runs: what to call each run, and the run.
     """
     head = ["pair", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"]
-    head += ["by count", "at", "joints", "verified", "at", "end"]
+    head += ["by count", "at", "for", "opens", "joints", "Demirel & Aldemir", "at"]
+    head += ["verified", "at", "for", "opens", "end"]
     rows = []
     for name, run in runs.items():
         joints = judged(run.joints)
@@ -76,6 +79,7 @@ def pair_table(runs: Mapping[str, History]) -> str:
         worst = size.max("time").where(~apart, 0.5)
         found = run.mechanism
         moved = run.verified.moved if run.structure is not None and run.verified else None
+        moving = ("unknown", *NONE[1:]) if run.structure is None else _told(moved, run)
         level, upright = np.abs(run.dataset["ground"].values).max(axis=0)
         rows.append(
             [
@@ -83,12 +87,13 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 f"{level:.2f} m/s²",
                 f"{upright:.2f} m/s²",
                 _number(float(size.max())),
-                str(joints["joint"].values[int(worst.values.argmax())]),
+                str(joints["name"].values[int(worst.values.argmax())]),
                 _number(float(joints["friction"].max())),
                 f"{int(apart.sum())} joints" if apart.any() else "-",
-                *_class_and_time(found),
-                " ".join(map(str, found.joints)) if found else "-",
-                *(("unknown", "-") if run.structure is None else _class_and_time(moved)),
+                *_told(found, run),
+                listed_joints(found.names) if found else "-",
+                *_told(run.demirel_aldemir, run)[:2],
+                *moving,
                 f"{ENDS.get(run.ended, run.ended)} {run.time[-1]:.2f} s",
             ]
         )
@@ -104,13 +109,14 @@ def collapse_words(structure: Structure, found: Collapse) -> str:
     """
     joints = structure.joints
     outcome = f"limit analysis: {found.outcome.sentence}"
-    if found.outcome is Outcome.COLLAPSES:
+    if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
         outcome += f", at a factor of {found.factor:.4g} on the load"
     hinges = [f"{joints[number].name} at the {side}" for number, side in found.hinges]
     sliding = [joints[number].name for number in found.sliding]
     lines = [outcome]
-    lines += [f"hinges, by the face in contact: {_shortened(hinges, ', ')}"] if hinges else []
-    lines += [f"sliding: {_shortened(sliding, ', ')}"] if sliding else []
+    lines += [f"hinges, by the face in contact: {listed(hinges)}"] if hinges else []
+    lines += [f"sliding: {listed_joints(sliding)}"] if sliding else []
+    lines += [str(found.solutions)] if found.solutions else []
     return "\n".join(lines)
 
 
@@ -131,7 +137,7 @@ def accuracy_words(found: Accuracy) -> str:
 
 
 def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
-    """Return what a run did: the table of its joints, use of strength, and its mechanisms.
+    """Return what a run did: its verdict, the table of its joints, and the use of strength.
 
     Args:
         structure: what was shaken.
@@ -139,51 +145,7 @@ def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
         dead: joints under dead load alone.
     """
     strength = utilisation_sentence(structure, run.joints)
-    return f"{joint_table(run.joints, dead)}\n\n{strength}\n{verdict(run)}"
-
-
-def verdict(run: History) -> str:
-    """Return a run's mechanisms in words: a line for the first by count, one for the verified.
-
-    Args:
-        run: what happened. Where it does not know its structure, there is no line for the verified.
-    """
-    found = run.mechanism
-    if found is None:
-        count = run.criteria.failures
-        lines = [f"no mechanism by count: never {count} failed joints at once in rings and piers"]
-    else:
-        lines = [f"by count: {_told(found, run)}"]
-    if run.structure is None:
-        return lines[0]
-    moved = run.verified
-    if moved is None:
-        lines.append("no verified mechanism: at no instant could rings or piers move")
-    else:
-        lines.append(f"verified: {_told(moved.moved, run)}")
-    return "\n".join(lines)
-
-
-def _told(found: Mechanism, run: History) -> str:
-    """A mechanism in words."""
-    words = (
-        f"{found.kind} mechanism of {found.part} at {found.time:.3f} s, "
-        f"joints {_shortened(list(map(str, found.joints)), ', ')}"
-    )
-    if run.structure is None:
-        return words
-    names = [run.structure.blocks[k].name for k in found.blocks]
-    if not names:
-        return f"{words}; rings and piers cannot move then"
-    return f"{words}; moving: {_shortened(names, '; ')}"
-
-
-def _shortened(words: Sequence[str], comma: str) -> str:
-    """A list in words, without its middle where it is long."""
-    if len(words) <= SHOWN:
-        return comma.join(words)
-    half = SHOWN // 2
-    return f"{comma.join([*words[:half], '…', *words[-half:]])} ({len(words)} in all)"
+    return f"{run.verdict}\n\n{joint_table(run.joints, dead)}\n\n{strength}"
 
 
 def motion_table(motions: Sequence[Motion]) -> str:
@@ -248,11 +210,13 @@ def match_table(matches: Sequence[Match]) -> str:
     return aligned(head, rows)
 
 
-def _class_and_time(found: Mechanism | None) -> tuple[str, str]:
-    """Two cells of a table."""
+def _told(found: Mechanism | None, run: History) -> tuple[str, str, str, str]:
+    """Four cells of a table: class, time, duration and opening of a mechanism."""
     if found is None or found.time is None:
-        return "none", "-"
-    return found.kind, _seconds(found.time)
+        return NONE
+    met = episode(run.joints, found)
+    wide = "-" if met.opening is None else f"{met.opening / mm:.3g} mm"
+    return found.kind, _seconds(found.time), lasting(met.duration), wide
 
 
 def _number(value: float) -> str:

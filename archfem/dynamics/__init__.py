@@ -10,6 +10,7 @@
     glance        a quick look at joints at every step
     events        what ends a run: enough failed joints, or blocks that can move
     recorder      what a run leaves behind
+    sentences     what a run means, in words
     history       the record of a run, and its file
     verdicts      when a run first meets a mechanism, by each definition
     scales        by what factor a motion must be multiplied for a mechanism

@@ -17,6 +17,7 @@ from archfem.joints.criteria import Criteria, chosen
 from archfem.joints.resultants import joint_dataset
 from archfem.limit.counted import KINDS, counted_mechanism, counted_mechanisms
 from archfem.limit.verified import Verifier
+from archfem.masonry.naming import listed_joints
 from archfem.masonry.structure import Structure
 
 Watch = Callable[[Array], str | None]
@@ -95,7 +96,7 @@ class CountedMechanism:
             if joints is None or found is None:
                 return None
             motion = verifier.verified(joints)
-            return f"a mechanism: joints {found.joints} of the {found.part}; {motion}"
+            return f"a mechanism of {found.part} by {listed_joints(found.names)}; {motion}"
 
         return look
 
@@ -144,7 +145,7 @@ class MovingMechanism:
             found = None if joints is None else verifier.moving(joints)
             if found is None or found.kind not in self.kinds:
                 return None
-            return f"a mechanism that moves: joints {found.moved.joints}; {found}"
+            return f"a mechanism that moves, by {listed_joints(found.moved.names)}; {found}"
 
         return look
 

@@ -8,11 +8,12 @@ from pathlib import Path
 import xarray as xr
 
 from archfem.arrays import Array
+from archfem.dynamics.sentences import extremes, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import one_joint
-from archfem.limit.counted import Mechanism, counted_mechanism
+from archfem.limit.counted import Mechanism, counted_mechanism, demirel_aldemir_mechanism
 from archfem.limit.verified import (
     VerifiedMechanism,
     first_verified_mechanism,
@@ -22,7 +23,8 @@ from archfem.masonry.structure import Structure
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
-    "higher block slips toward the extrados; gravity along -y; displacements relative to the ground"
+    "higher block slips toward the extrados; rotation > 0 opens the intrados; "
+    "gravity along -y; displacements relative to the ground"
 )
 
 
@@ -64,7 +66,10 @@ class History:
 
     @property
     def joints(self) -> xr.Dataset:
-        """N, V, M, eccentricity, friction and flags of failure over time and joint."""
+        """N, V, M, eccentricity, friction, opening, rotation, slip and flags over time and joint.
+
+        Files of earlier versions have no opening, rotation and slip.
+        """
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
         return self.dataset[names]
 
@@ -127,6 +132,31 @@ class History:
                 "looked for: read it with History.read(path, structure)"
             )
         return first_verified_mechanism(self.structure, self.joints)
+
+    @cached_property
+    def demirel_aldemir(self) -> Mechanism | None:
+        """The first mechanism by the criterion of `demirel_aldemir_mechanism`, or None."""
+        return demirel_aldemir_mechanism(self.joints)
+
+    @cached_property
+    def verdict(self) -> str:
+        """What the run means, in words: a sentence, and a line for each way to find a mechanism.
+
+        The sentence tells the largest hinge rotation, slip and displacement, and what is left at
+        the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
+        and, where the structure is known, verified, each with its duration and its opening. A run
+        that did not finish says so first.
+        """
+        found = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
+        names = None
+        if self.structure is not None:
+            found["verified"] = None if self.verified is None else self.verified.moved
+            names = [block.name for block in self.structure.blocks]
+        told = self.dataset.attrs
+        whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
+        lines = ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
+        lines += mechanism_lines(self.joints, found, names)
+        return "\n".join(line for line in lines if line)
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.

@@ -82,7 +82,7 @@ class Setting:
         """The setting in a few words."""
         asked, fidelity = self.discretisation, self.discretisation.fidelity
         rung = fidelity if isinstance(fidelity, str) else fidelity["rest"] + " + soil"
-        rule = asked.quadrature + (f" {asked.points}" if asked.points else "")
+        rule = asked.rule.rule + (f" {asked.points}" if asked.points else "")
         return f"{rung} {asked.through}×{asked.along} {rule} {1e3 * self.dt:g} ms"
 
 
@@ -94,7 +94,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
     cell: str = "quadrilateral",
     coarse: float | None = None,
     degree: int = 1,
-    quadrature: str = "lobatto",
+    quadrature: str | None = None,
     points: int | None = None,
     tolerance: float = 0.005,
     motion: Motion | None = None,
@@ -120,7 +120,9 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
             given, half of the block's mean thickness.
         degree: of the elements, 1 or 2.
-        quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
+        quadrature: rule on each joint facet, "exact", "lobatto", "nodal" or "gauss"; where it is
+            not given the exact one, or Lobatto's where points are given or there is no exact one
+            (degree 2, "monolithic").
         points: on each facet, 3 where not given.
         tolerance: for "auto", of the largest |e| of every joint [-].
         motion: for "auto", the ground motion to come; without it a synthetic one is used that

@@ -14,6 +14,7 @@ from archfem.dynamics.history import SIGNS, Ending, History
 from archfem.dynamics.steps import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
+from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 
@@ -52,6 +53,49 @@ class Rows:
         return self._array[: self.count]
 
 
+class Reach:
+    """How far each block has moved from where it was at the start of a run.
+
+    Args:
+        gauges: of the model that moves.
+    """
+
+    def __init__(self, gauges: Gauges) -> None:
+        self._gauges = gauges
+        self._start: Array | None = None
+
+    def add(self, times: Array, readings: Array) -> None:
+        """Look at some steps.
+
+        Args:
+            times: at their ends (steps,) [s]; the first step of all is the start.
+            readings: of the gauges (steps, r).
+        """
+        middles = self._gauges.middles(readings)
+        if self._start is None:
+            blocks = middles.shape[1]
+            self._start, self._when = middles[0], np.full(blocks, times[0])
+            self._square = np.zeros(blocks)
+        squares = np.square(middles - self._start).sum(axis=-1)
+        farthest = squares.argmax(axis=0)
+        found = squares[farthest, np.arange(len(farthest))]
+        self._when = np.where(found > self._square, times[farthest], self._when)
+        self._square, self._last = np.maximum(found, self._square), squares[-1]
+
+    def variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
+        """What was found, as variables of a dataset over block."""
+        about = "displacement of its middle"
+        words = {
+            "largest_displacement": (np.sqrt(self._square), "m", f"largest {about}"),
+            "largest_displacement_time": (self._when, "s", f"time of the largest {about}"),
+            "residual_displacement": (np.sqrt(self._last), "m", f"{about} at the end"),
+        }
+        return {
+            name: ("block", values, {"units": units, "long_name": text})
+            for name, (values, units, text) in words.items()
+        }
+
+
 @dataclass(kw_only=True)
 class Recorder:
     """What has been recorded so far, from the start of a run.
@@ -86,7 +130,11 @@ class Recorder:
         self._iterations = Rows(most, kind=np.int64)
         self._smallest, self._drift = Rows(most), Rows(most)
         self._numbers, self._times = Rows(records, kind=np.intp), Rows(records)
-        self._resultants = Rows(records, (len(self.model.structure.joints), 3))
+        joints = len(self.model.structure.joints)
+        self._gauges = Gauges.on(self.model)
+        self._faces = Rows(records, (3, joints))
+        self._reach = Reach(self._gauges)
+        self._resultants = Rows(records, (joints, 3))
         self._frames, self._fields = Rows(frames), Rows(frames, (self.model.size,))
 
     def add(self, batch: Batch, *, last: bool = False) -> None:
@@ -101,7 +149,8 @@ class Recorder:
             DidNotConverge: the guard is certain that what was kept is wrong.
         """
         self.state = batch.state(len(batch.times) - 1)
-        drift = self.guard.add(batch)
+        drift, readings = self.guard.add(batch), batch.read(self._gauges)
+        self._reach.add(batch.times, readings)
         numbers = self._drift.count + np.arange(len(batch.times))
         kept = numbers % self.every == 0
         kept[-1] |= last
@@ -111,6 +160,7 @@ class Recorder:
             (self._drift, drift),
             (self._numbers, numbers[kept]),
             (self._times, batch.times[kept]),
+            (self._faces, self._gauges.faces(readings[kept])),
             (self._resultants, batch.resultants[kept]),
         ):
             rows.add(values)
@@ -131,8 +181,11 @@ class Recorder:
             outcome: the same in words.
         """
         structure, resultants = self.model.structure, self._resultants.values
-        times = self._times.values[: len(resultants)]
-        dataset = joint_dataset(structure, resultants, times, self.criteria)
+        times, faces = (rows.values[: len(resultants)] for rows in (self._times, self._faces))
+        dataset = joint_dataset(structure, resultants, times, self.criteria, faces=faces)
+        dataset = dataset.assign(self._reach.variables()).assign_coords(
+            block=[block.name for block in structure.blocks]
+        )
         about = {"units": "m/s2", "long_name": "acceleration of the ground"}
         dataset["ground"] = ("time", "axis"), motion.at(times), about
         dataset.coords["axis"] = ["x", "y"]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.arrays import Array
+from archfem.models.gauges import Gauges
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,8 @@ class Batch:
         energy: kinetic, potential, work and loss of each step, as by `Meter.step` (steps, 4) [J].
         state: gives the state at the end of step k.
         fallback: whether these steps were given up by a strategy, and taken by SNES.
+        readings: of the model's gauges at their ends (steps, r); None where they are to be read
+            off the states.
     """
 
     times: Array
@@ -49,6 +52,17 @@ class Batch:
     energy: Array
     state: Callable[[int], State]
     fallback: bool = False
+    readings: Array | None = None
+
+    def read(self, gauges: Gauges) -> Array:
+        """Return the readings of gauges at the ends of the steps (steps, r).
+
+        Args:
+            gauges: of the model that moves.
+        """
+        if self.readings is not None:
+            return self.readings
+        return np.array([gauges.read(self.state(k).q) for k in range(len(self.times))])
 
     def cut(self, steps: int) -> "Batch":
         """Return the first steps of the batch.
@@ -65,6 +79,7 @@ class Batch:
             iterations=self.iterations[:steps],
             smallest=self.smallest[:steps],
             energy=self.energy[:steps],
+            readings=None if self.readings is None else self.readings[:steps],
         )
 
 

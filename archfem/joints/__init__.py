@@ -4,6 +4,7 @@
     quadrature  rules that integrate the traction along a joint
     points      points on the joints, and forces there by springs or exact integrals
     operator    the joint operator G, from coordinates to forces
+    faces       opening, rotation and slip of whole joints
     rigid       G of rigid blocks
     sparsity    one sparsity pattern for a family of matrices
     resultants  N, V, M, eccentricity, mobilised friction, thrust line

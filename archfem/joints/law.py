@@ -105,7 +105,8 @@ def shear_over_step(start: Any, change: Any, late: Any, limit: Any) -> tuple[Any
     """
     first = held(start, limit)
     over = excess(first + change, limit)
-    mean = first + 0.5 * change - 0.5 * over * abs(over) / (abs(change) + NONE)
+    most = 0.5 * (abs(change) + abs(over) + abs(abs(change) - abs(over)))
+    mean = first + 0.5 * change - 0.5 * over * abs(over) / (most + NONE)
     return held(mean + late * change, limit), first + change - over
 
 

@@ -166,8 +166,8 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        shear = self.tractions(q)[1] / self.points.shear
-        return np.where(self.points.slides, self.slips(q) - shear, 0.0)
+        further = (self.elastic(q) - self.tractions(q)[1]) / self.points.shear
+        return self.memory + np.where(self.points.slides, further, 0.0)
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).
@@ -188,8 +188,9 @@ class JointOperator:
         if not self.slides:
             return np.concatenate([across, points.shear])
         normal, shear = self.law.forces(opening), self.elastic(q)
-        limit = (1.0 + TOUCHING) * self.limits(normal, self.law.closed(opening))
-        over = points.slides & (np.abs(shear) > limit)
+        closed = self.law.closed(opening)
+        limit = (1.0 + TOUCHING) * self.limits(normal, closed)
+        over = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
         sign = np.where(over, np.sign(shear), 0.0)
         left = np.where(limit > 0.0, SLIDING, 0.0)  # nothing where it is open
         along = np.where(over, left, 1.0) * points.shear

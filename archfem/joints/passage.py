@@ -79,9 +79,9 @@ class Passage:
         Args:
             q: coordinates at the end (n,).
         """
-        points = self.operator.points
-        slid = self.operator.slips(q) - self._over(q)[3] / points.shear
-        return np.where(points.slides, slid, 0.0)
+        operator, points = self.operator, self.operator.points
+        further = (operator.elastic(q) - self._over(q)[3]) / points.shear
+        return operator.memory + np.where(points.slides, further, 0.0)
 
     def lost(self, q: Array) -> float:
         """Return the energy that friction and the lag of damping take [J]; never negative.

@@ -60,7 +60,9 @@ class JointPoints:
         sizes = [len(arms) for arms, _ in rules]
         joint = np.repeat(np.arange(len(rules)), sizes)
         contacts = [each.contact for each in structure.joints]
-        numbers = [(c.normal_stiffness, c.shear_stiffness, c.coefficient, c.cohesion) for c in contacts]
+        numbers = [
+            (c.normal_stiffness, c.shear_stiffness, c.coefficient, c.cohesion) for c in contacts
+        ]
         return cls(
             joint,
             np.concatenate([arms for arms, _ in rules]),
@@ -246,7 +248,9 @@ class Facets:
         """
         first, mixed, second = self._closed(opening)
         a, b = opening[0::2], opening[1::2]
-        return _in_turn(self._normal * (first * a + mixed * b), self._normal * (mixed * a + second * b))
+        return _in_turn(
+            self._normal * (first * a + mixed * b), self._normal * (mixed * a + second * b)
+        )
 
     def stiffness(self, opening: Array) -> Array:
         """Return the derivative of `forces`, one number for each of `entries` (2 p,) [N/m].

@@ -11,6 +11,7 @@ from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, flags
+from archfem.joints.faces import MEASURES, measures
 from archfem.masonry.naming import number_of
 from archfem.masonry.structure import Structure
 
@@ -43,11 +44,17 @@ def joint_dataset(
     resultants: Array,
     time: Array | None = None,
     criteria: Criteria | None = None,
+    *,
+    faces: Array | None = None,
 ) -> xr.Dataset:
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
-    without compression is open: its eccentricity and friction are undefined (NaN).
+    without compression is open: its eccentricity and friction are undefined (NaN). Opening,
+    rotation and slip follow from displacements alone: `opening` is the largest gap between the
+    faces, at the end that is more open (0 where they touch all over), `rotation` the turn of the
+    higher face relative to the lower one, positive where it opens the intrados, `slip` the mean
+    displacement of the higher block along the joint, positive toward the extrados.
 
     Args:
         structure: whose joints they are.
@@ -55,11 +62,14 @@ def joint_dataset(
             [N, N, N m].
         time: of the steps (steps,) [s], for the second shape.
         criteria: by which joints fail; by default the usual ones.
+        faces: gaps at mid-depth, rotations and slips, as by `face_matrix`, (3, n_joints) or
+            (steps, 3, n_joints) [m, rad, m]; None where displacements are not known.
 
     Returns:
-        Variables N, V, M, eccentricity and friction, and `flags` of failure, over joint, or over
-        time and joint, with the joints' names, parts, roles, depths and friction limits, and
-        whether they are judged, as coordinates, and the criteria as attributes.
+        Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` where they
+        are known, and `flags` of failure, over joint, or over time and joint, with the joints'
+        names, parts, roles, depths and friction limits, and whether they are judged, as
+        coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
@@ -69,6 +79,10 @@ def joint_dataset(
         key: (dims, value, {"units": units, "long_name": words})
         for (key, (units, words)), value in values
     }
+    if faces is not None:
+        for key, value in measures(faces, depth).items():
+            units, words = MEASURES[key]
+            variables[key] = dims, value, {"units": units, "long_name": words}
     coefficients = criteria.coefficients(structure.friction)
     variables |= flags(dims, resultants[..., 0], found, coefficients, criteria.hinge)
     coordinates = {

@@ -4,10 +4,13 @@
     programme  the linear programme and its limits
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
+    displaced  rigid blocks that have moved far
+    movement   the largest movement of a support that is survived
     thickness  the least thickness that stands
     skeleton   the blocks that move as rigid bodies when joints fail
     screen     a quick look at whether they can move at all
     counted    mechanisms by counting failed joints
+    episodes   how long a mechanism lasts, and how far it opens
     verified   mechanisms by a motion that the failed joints permit
 
 It imports from `masonry`, `joints` and the ground. Start reading at `collapse`.

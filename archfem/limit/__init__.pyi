@@ -5,6 +5,14 @@ from .collapse import stands as stands
 from .counted import Mechanism as Mechanism
 from .counted import counted_mechanism as counted_mechanism
 from .counted import counted_mechanisms as counted_mechanisms
+from .counted import demirel_aldemir_mechanism as demirel_aldemir_mechanism
+from .episodes import Episode as Episode
+from .episodes import episode as episode
+from .movement import End as End
+from .movement import Movement as Movement
+from .movement import Stage as Stage
+from .movement import largest_movement as largest_movement
+from .sliding import WithoutDilatancy as WithoutDilatancy
 from .thickness import minimum_thickness as minimum_thickness
 from .verified import VerifiedMechanism as VerifiedMechanism
 from .verified import Verifier as Verifier

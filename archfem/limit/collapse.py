@@ -15,7 +15,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
 from archfem.limit.blocks import RigidBlocks, rigid_load
 from archfem.limit.programme import Optimum, Programme, friction_limits, no_limits
-from archfem.limit.sliding import without_dilatancy
+from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
@@ -41,6 +41,7 @@ class Outcome(StrEnum):
     INFEASIBLE = "infeasible"
     SETTLES = "settles"
     LOCKS = "locks"
+    BRACKETED = "bracketed"
 
     @property
     def sentence(self) -> str:
@@ -54,6 +55,7 @@ _SENTENCES = {
     Outcome.INFEASIBLE: "it does not stand under its own weight",
     Outcome.SETTLES: "it follows its support and stands",
     Outcome.LOCKS: "it cannot follow this movement of its support",
+    Outcome.BRACKETED: "no state without dilatancy was found, and none lies beyond this bound",
 }
 
 
@@ -73,6 +75,7 @@ class Collapse:
         motion: velocities of all blocks' centroids and rotations (n_blocks, 3), scaled so that
             the fastest corner has 1 m/s, or those that follow a settlement. Zero where nothing
             moves. Where it does not stand: how it falls under its own weight.
+        solutions: with sliding without dilatancy, what is known of all its solutions.
     """
 
     factor: float
@@ -81,14 +84,27 @@ class Collapse:
     sliding: tuple[int, ...]
     joints: xr.Dataset
     motion: Array
+    solutions: WithoutDilatancy | None = None
+
+    @property
+    def hinge_names(self) -> tuple[str, ...]:
+        """Names of the joints that turn, in the order of `hinges`."""
+        return tuple(str(self.joints["name"].values[joint]) for joint, _ in self.hinges)
+
+    @property
+    def sliding_names(self) -> tuple[str, ...]:
+        """Names of the joints that slide, in the order of `sliding`."""
+        return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
 
     def __str__(self) -> str:
-        """Outcome, factor and failing joints in one line."""
-        hinges = ", ".join(f"{joint} {side}" for joint, side in self.hinges) or "none"
-        sliding = ", ".join(map(str, self.sliding)) or "none"
-        return (
-            f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; sliding {sliding}"
-        )
+        """Outcome, factor and failing joints, by number and name, in one line."""
+        turning = zip(self.hinges, self.hinge_names, strict=True)
+        hinges = ", ".join(f"{j} ({name}) {side}" for (j, side), name in turning) or "none"
+        slipping = zip(self.sliding, self.sliding_names, strict=True)
+        sliding = ", ".join(f"{j} ({name})" for j, name in slipping) or "none"
+        words = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; "
+        known = "" if self.solutions is None else f"; {self.solutions}"
+        return f"{words}sliding {sliding}{known}"
 
 
 def collapse_factor(
@@ -123,7 +139,8 @@ def collapse_factor(
         live: one action, or several that grow together; a `Settlement` comes alone.
         friction: "coulomb" holds |V| <= μ N with sliding that dilates (associated), so that with
             sliding joints the factor is an upper estimate and a warning is logged; "nonassociated"
-            iterates until joints slide without dilating; None forbids sliding.
+            searches states whose joints slide without dilating for the weakest; None forbids
+            sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
 
@@ -133,15 +150,17 @@ def collapse_factor(
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, or bodies such as a
             fill cannot be taken as rigid.
-        DidNotConverge: the iteration for sliding joints did not settle.
+        DidNotConverge: the solver of linear programmes gave up.
 
     Note:
-        The motion is one of the possible ones where several have the same factor. The iteration
-        for sliding finds *a* solution: without associated flow it need not be the only one.
+        The motion is one of the possible ones where several have the same factor. Without
+        associated flow factors are not unique: `solutions` of the result tells between which they
+        were found and between which all lie, and the factor is the least found, or for a settlement
+        the greatest work. Where none is found it is the proven bound, and the outcome says so.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
-        (1978) 1853-1871. Gilbert, Casapulla and Ahmed, Computers & Structures 84 (2006) 873-887.
+        (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
     dead = _self_weight(structure, friction, strength)
     fall = _unbalanced(dead)
@@ -156,18 +175,23 @@ def collapse_factor(
     else:
         asked, scale = _loaded(dead, loads(live)), -1.0
         ends = Outcome.COLLAPSES, Outcome.UNBOUNDED
-    found = asked.solve()
+    found = associated = asked.solve()
+    known = None
+    if friction == "nonassociated":
+        found, known = without_dilatancy(asked, associated, scale)
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
-        return _result(dead, ends[1], np.inf, rest)
-    if friction == "nonassociated":
-        found = without_dilatancy(asked, found)
+        if known is None or associated is None:
+            return replace(_result(dead, ends[1], np.inf, rest), solutions=known)
+        return _bracketed(dead, rest, known, support is None)
     result = _result(asked, ends[0], scale * found.value, found, support=support)
+    result = replace(result, solutions=known)
     if friction == "coulomb" and result.sliding:
         logger.warning(
-            "joints %s slide: with the dilatancy of associated flow the factor %.4g is an upper "
-            "estimate; friction='nonassociated' does without it",
+            "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
+            "upper estimate; friction='nonassociated' does without it",
             list(result.sliding),
+            ", ".join(result.sliding_names),
             result.factor,
         )
     return result
@@ -259,6 +283,14 @@ def _settled(dead: Programme, support: Array) -> Programme:
     """Ask for the least work on a motion of the supports."""
     gaps = dead.blocks.gaps(support)
     return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
+
+
+def _bracketed(dead: Programme, rest: Optimum, known: WithoutDilatancy, least: bool) -> Collapse:
+    """Return the safe end of the bracket, where no solution without dilatancy was found."""
+    logger.warning("no state without dilatancy was found; the factor is only a bound: %s", known)
+    bound = known.bracket[0 if least else 1]
+    state = replace(rest, forces=np.nan * rest.forces)
+    return replace(_result(dead, Outcome.BRACKETED, bound, state), solutions=known)
 
 
 def _balanced(fall: Optimum, dead: Programme) -> bool:

@@ -17,7 +17,14 @@ FEASIBLE = 1e-9
 EXCESS = 1e-7
 """Largest violation of the crushing limit accepted, as a fraction of the crushing force σ w h."""
 
+ENDED = (0, 2, 3)
+"""Answers of the solver that are one: an optimum, no state, an objective without bound."""
+
 CUTS = 60  # rounds of crushing cuts; as tangents of a parabola they need about six
+
+
+class NoState(DidNotConverge):
+    """The programme has nothing to choose from: no forces balance the loads within the limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +102,13 @@ class Optimum:
         value: the least value of the objective.
         forces: F_i, F_e and V of all joints (3 n_joints,) [mean block weights].
         coordinates: multipliers of the balance, the motion of the free blocks (3 n_free,).
+        unknowns: z, the unknowns beside the forces (k,).
     """
 
     value: float
     forces: Array
     coordinates: Array
+    unknowns: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +135,15 @@ class Programme:
     columns: sparse.csr_matrix | None = None
     prices: Array = field(default_factory=lambda: np.zeros(0))
 
+    def objective(self, state: Optimum) -> float:
+        """Return a·x + b·z of a state that another programme over the same unknowns found.
+
+        Args:
+            state: its forces and unknowns.
+        """
+        cost = 0.0 if self.cost is None else self.cost @ state.forces
+        return float(cost + self.prices @ state.unknowns)
+
     def solve(self) -> Optimum | None:
         """Solve, adding crushing cuts until none is violated.
 
@@ -133,7 +151,7 @@ class Programme:
             The optimum, or None where the objective falls without bound.
 
         Raises:
-            DidNotConverge: the solver gave up, or no state fulfils the limits.
+            DidNotConverge: the solver gave up; `NoState` where no state fulfils the limits.
         """
         limits = self.limits
         if self.crushing is not None:
@@ -167,22 +185,28 @@ class Programme:
         beside = sparse.csr_matrix((len(limits.bounds), extra))
         bounds = np.tile([0.0, np.inf], (size + extra, 1))
         bounds[2 * joints : size, 0] = -np.inf
-        found = linprog(
-            cost,
-            A_ub=sparse.hstack([limits.rows, beside], format="csr"),
-            b_ub=limits.bounds,
-            A_eq=balance,
-            b_eq=self.load,
-            bounds=bounds,
-            method="highs-ds",
-            options={
-                "primal_feasibility_tolerance": FEASIBLE,
-                "dual_feasibility_tolerance": FEASIBLE,
-                "presolve": False,
-            },
-        )
+        for presolve in (False, True):  # the second where round-off stopped the first
+            found = linprog(
+                cost,
+                A_ub=sparse.hstack([limits.rows, beside], format="csr"),
+                b_ub=limits.bounds,
+                A_eq=balance,
+                b_eq=self.load,
+                bounds=bounds,
+                method="highs-ds",
+                options={
+                    "primal_feasibility_tolerance": FEASIBLE,
+                    "dual_feasibility_tolerance": FEASIBLE,
+                    "presolve": presolve,
+                },
+            )
+            if found.status in ENDED:
+                break
         if found.status == 3:
             return None
+        if found.status == 2:
+            raise NoState("no state of equilibrium fulfils the limits")
         if found.status != 0:
             raise DidNotConverge(f"the linear programme found no state: {found.message}")
-        return Optimum(float(found.fun), found.x[:size], np.array(found.eqlin.marginals))
+        multipliers = np.array(found.eqlin.marginals)
+        return Optimum(float(found.fun), found.x[:size], multipliers, found.x[size:])

@@ -1,78 +1,272 @@
-"""Sliding without dilatancy in limit analysis: the iteration of Gilbert and others (2006)."""
+"""Sliding without dilatancy in limit analysis: states of equilibrium that slide without opening.
 
-from dataclasses import replace
+Let φ(c) be the optimum of the linear programme whose joints carry |V| <= c. A state with normal
+forces N is a solution without dilatancy where it is itself an optimum for c = μ N: its mechanism
+slides where |V| = μ N, opens only ends that carry nothing, and dissipates μ N |slip|. With y the
+mechanism that is dual to φ, and t(y) its slips, the gap
+
+    value(x) + μ N(x)·t(y) - [φ(c) + c·t(y)]  >=  0
+
+is zero for such a pair, and is linear in the forces x for a given mechanism and in the mechanism
+for given forces: a bilinear programme over two separate polyhedra, searched from many starts by
+solving for one and the other in turn.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
-from archfem.limit.programme import Optimum, Programme, friction_limits
+from archfem.limit.programme import Limits, Optimum, Programme, friction_limits
 
-RATE = 1e-5
-"""Relative change of the objective, and excess of |V| over μ N, at which the iteration ends."""
+STARTS = 40
+"""States from which the search starts, besides the associated one; fewer for many joints."""
 
-ROUNDS = 200
+JOINTS = 150
+"""Joints up to which every start is tried, and normal forces are bounded one by one."""
 
-START, FALL, END = 0.3, 0.6, 1e-3
-"""Dilatancy as a share of μ: in the first step, its fall from step to step, the least."""
+ROUNDS = 30
+"""Turns of forces and mechanism from one start; most end within three."""
 
-FRESH, STEADY = 0.6, 30
-"""Share of the newest N in the running mean; after so many steps it falls, to damp any cycle."""
+PREFERRED = 1e-4
+"""Share of the objective by which, among states of one gap, the weakest is taken."""
+
+ROOM = 1e-8
+"""Cohesion beside μ N, without which round-off makes the programme infeasible [block weights]."""
+
+CLOSED = 1e-7
+"""Gap, relative to the objective, that counts as none: programmes are solved to 1e-9."""
 
 
-def without_dilatancy(programme: Programme, start: Optimum) -> Optimum:
-    """Find a state in which joints slide along themselves, without opening.
+@dataclass(frozen=True)
+class WithoutDilatancy:
+    """What is known of the solutions without dilatancy, which need not be unique.
 
-    Coulomb's limit |V| <= μ N makes the linear programme slide at the angle of friction. Each
-    step replaces it, about the normal force N_k of the steps before, by a flatter one that meets
-    it at N_k, with a dilatancy α μ that falls from step to step:
+    Attributes:
+        bracket: factors between which every solution lies: for a load that grows, a proven lower
+            bound and the associated factor.
+        between: factors of the weakest and the strongest solution found; undefined (NaN) where
+            none was.
+        starts: from how many states the search started, and how many of them it led to a
+            solution.
+        unbalanced: largest residual of the balance of the solution returned [mean block weights].
+        excess: largest |V| - μ N, relative to the largest N.
+        opening: largest opening of an end that carries force, relative to the largest gap;
+            undefined (NaN) with a strength, at which ends that carry force give way.
+        gap: complementarity left: by how much friction dissipates more than loads do work,
+            relative to the objective.
+    """
 
-        |V| <= (1 - α) μ N_k + α μ N.
+    bracket: tuple[float, float]
+    between: tuple[float, float]
+    starts: tuple[int, int]
+    unbalanced: float = np.nan
+    excess: float = np.nan
+    opening: float = np.nan
+    gap: float = np.nan
 
-    Where the steps no longer change N, the state obeys Coulomb's limit and hardly dilates.
+    def __str__(self) -> str:
+        """Where solutions lie, in one line."""
+        low, high = self.between
+        return (
+            f"solutions without dilatancy found from {low:.4g} to {high:.4g} "
+            f"({self.starts[1]} of {self.starts[0]} starts); all lie from {self.bracket[0]:.4g} to "
+            f"{self.bracket[1]:.4g}"
+        )
+
+
+def without_dilatancy(
+    programme: Programme, start: Optimum | None, scale: float
+) -> tuple[Optimum | None, WithoutDilatancy]:
+    """Find the weakest state in which joints slide along themselves, without opening.
 
     Args:
-        programme: its limits are replaced.
-        start: its optimum with associated sliding.
+        programme: with Coulomb's limits.
+        start: its optimum, with associated sliding; None where it has no limit.
+        scale: factor per value of the objective.
 
     Returns:
-        The last optimum, whose motion dilates by at most 1e-3 μ per slip.
-
-    Raises:
-        DidNotConverge: the objective or N still change.
+        The solution of the largest objective that the search found, which is the least factor of
+        a load, or None where there is none; and what is known of all solutions.
 
     References:
-        Gilbert, Casapulla and Ahmed, Computers & Structures 84 (2006) 873-887.
+        Drucker, J. Appl. Mech. 21 (1954) 71-74. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001)
+        209-224. The gap is a disjoint bilinear programme: Konno, Math. Program. 11 (1976) 14-27.
     """
-    friction = programme.blocks.structure.friction
-    mean, old = _thrust(start), start
-    for step in range(ROUNDS):
-        share = max(START * FALL**step, END)
-        limits = friction_limits(share * friction, (1.0 - share) * friction * mean)
-        new = replace(programme, limits=limits).solve()
-        if new is None:
-            raise DidNotConverge(
-                "sliding without dilatancy finds no limit although associated sliding has one: "
-                "forbid sliding with friction=None, or keep 'coulomb'"
-            )
-        settled = abs(new.value - old.value) <= RATE * abs(new.value)
-        if share == END and settled and _excess(new, friction) <= RATE:
-            return new
-        fresh = FRESH * min(1.0, STEADY / (step + 1))
-        mean, old = fresh * _thrust(new) + (1.0 - fresh) * mean, new
-    raise DidNotConverge(
-        f"sliding without dilatancy did not settle in {ROUNDS} steps: its last objective is "
-        f"{old.value:.5g}, with |V| up to {_excess(old, friction):.2g} of the greatest N over μ N"
+    starts = _starts(programme, start)
+    tried = [_solution(programme, forces) for forces in starts]
+    found = [state for state in tried if state is not None]
+    thrusts = np.array([_thrust(forces) for forces in starts])
+    seen = thrusts.reshape(-1, len(programme.blocks.structure.depths)).min(axis=0, initial=np.inf)
+    associated = -np.inf if start is None else start.value
+    limits = scale * associated, scale * max(associated, _bound(programme, seen))
+    values = [scale * state.value for state, _ in found] or [np.nan]
+    known = WithoutDilatancy(
+        (min(limits), max(limits)), (min(values), max(values)), (len(starts), len(found))
+    )
+    if not found:
+        return None, known
+    weakest, gap = max(found, key=lambda each: each[0].value)
+    return weakest, _checked(programme, weakest, gap, known)
+
+
+def _starts(programme: Programme, start: Optimum | None) -> list[Array]:
+    """Forces of the associated optimum, and of vertices of what equilibrium permits."""
+    chance = np.random.default_rng(0)
+    tried = [] if start is None else [start.forces]
+    joints = len(programme.blocks.structure.depths)
+    for _ in range(max(2, STARTS * min(joints, JOINTS) ** 2 // joints**2)):
+        try:
+            state = _vertex(programme, start, chance)
+        except DidNotConverge:  # no state of equilibrium under so much load
+            continue
+        if state is not None:
+            tried.append(state.forces)
+    return tried
+
+
+def _vertex(
+    programme: Programme, start: Optimum | None, chance: np.random.Generator
+) -> Optimum | None:
+    """State of least compressions, weighted at random, under a random share of the load."""
+    joints = len(programme.blocks.structure.depths)
+    cost = np.concatenate([chance.random(2 * joints), np.zeros(joints)])
+    if programme.cost is not None:
+        size = _largest(programme.cost)
+        return replace(programme, cost=cost + chance.uniform(-1, 1) * programme.cost / size).solve()
+    assert programme.columns is not None
+    if start is None:
+        column = float(abs(programme.columns).sum())
+        size = 10.0 ** chance.uniform(-1, 1) * float(np.abs(programme.load).sum()) / column
+    else:
+        size = float(chance.random() * start.unknowns[0])
+    load = programme.load - programme.columns @ np.array([size])
+    return replace(programme, cost=cost, load=load, columns=None, prices=np.zeros(0)).solve()
+
+
+def _solution(programme: Programme, forces: Array) -> tuple[Optimum, float] | None:
+    """State and gap of a solution without dilatancy near given forces, or None."""
+    least = np.inf
+    for _ in range(ROUNDS):
+        cohesion = programme.blocks.structure.friction * _thrust(forces) + ROOM
+        try:
+            mechanism = replace(programme, limits=_cohesive(cohesion)).solve()
+            if mechanism is None:
+                return None
+            slips = _slips(programme, mechanism.coordinates)
+            state = _weakest(programme, slips)
+        except DidNotConverge:  # round-off left no state
+            return None
+        if state is None:
+            return None
+        forces = state.forces
+        value, lost = programme.objective(state), _dissipated(programme, slips, forces)
+        gap = value + lost - mechanism.value - float(cohesion @ slips)
+        if gap <= CLOSED * max(abs(value), abs(mechanism.value)) + ROOM * float(slips.sum()):
+            return Optimum(value, forces, mechanism.coordinates, state.unknowns), gap
+        if gap > (1.0 - CLOSED) * least:
+            return None
+        least = gap
+    return None
+
+
+def _weakest(programme: Programme, slips: Array) -> Optimum | None:
+    """Forces of least gap to a mechanism of given slips, and of these the weakest."""
+    friction = programme.blocks.structure.friction * slips
+    cost = np.concatenate([friction, friction, np.zeros(len(friction))])
+    if programme.cost is not None:
+        cost += (1.0 - PREFERRED) * programme.cost
+    return replace(programme, cost=cost, prices=(1.0 - PREFERRED) * programme.prices).solve()
+
+
+def _bound(programme: Programme, seen: Array) -> float:
+    """Bound the objective of every solution without dilatancy from above.
+
+    A solution's N is at least the least N of any state of equilibrium, so that a state with |V| <=
+    μ min N is admissible in the programme of which the solution is an optimum. In joints of which
+    a state was seen that leaves them without N there is nothing to look for.
+
+    Returns:
+        The bound; -inf where no solution can exist.
+    """
+    joints = len(programme.blocks.structure.depths)
+    least = np.zeros(joints)
+    for joint in np.flatnonzero(seen > ROOM) if joints <= JOINTS else ():
+        cost = np.zeros(3 * joints)
+        cost[[joint, joints + joint]] = 1.0
+        found = _least(replace(programme, cost=cost, prices=np.zeros_like(programme.prices)))
+        least[joint] = max(found - ROOM, 0.0)
+    negated = None if programme.cost is None else -programme.cost
+    highest = -_least(replace(programme, cost=negated, prices=-programme.prices))
+    limits = _cohesive(programme.blocks.structure.friction * least)
+    try:
+        safe = replace(programme, limits=limits).solve()
+    except DidNotConverge:  # no equilibrium with so little friction
+        return highest
+    return -np.inf if safe is None else min(highest, safe.value)
+
+
+def _least(programme: Programme) -> float:
+    """Least objective, or -inf where it is without bound or the solver cannot tell."""
+    try:
+        found = programme.solve()
+    except DidNotConverge:
+        return -np.inf
+    return -np.inf if found is None else found.value
+
+
+def _checked(
+    programme: Programme, state: Optimum, gap: float, known: WithoutDilatancy
+) -> WithoutDilatancy:
+    """Add how well a state fulfils what a solution must."""
+    thrust, shear = _thrust(state.forces), np.abs(state.forces.reshape(3, -1)[2])
+    left = programme.blocks.balance @ state.forces - programme.load
+    if programme.columns is not None:
+        left = left + programme.columns @ state.unknowns
+    gaps = _gaps(programme, state.coordinates)
+    carries = state.forces[: 2 * len(thrust)] > CLOSED * max(float(thrust.max()), 1.0)
+    excess = np.max(shear - programme.blocks.structure.friction * thrust)
+    opening = np.max(gaps[: len(carries)][carries], initial=0.0)
+    if programme.crushing is not None:
+        opening = np.nan
+    return replace(
+        known,
+        unbalanced=float(np.abs(left).max()),
+        excess=float(excess) / _largest(thrust),
+        opening=float(opening) / _largest(gaps),
+        gap=max(gap, 0.0) / _largest(np.array([state.value, ROOM])),
     )
 
 
-def _thrust(state: Optimum) -> Array:
+def _largest(values: Array) -> float:
+    """Largest magnitude, to divide by."""
+    return float(np.abs(values).max(initial=np.finfo(float).tiny))
+
+
+def _cohesive(cohesion: Array) -> Limits:
+    """Limits |V| <= c."""
+    return friction_limits(np.zeros_like(cohesion), cohesion)
+
+
+def _gaps(programme: Programme, coordinates: Array) -> Array:
+    """Openings of both ends and slips of a mechanism, with those of a moving support."""
+    gaps: Array = -(programme.blocks.balance.T @ coordinates)
+    return gaps if programme.cost is None else gaps + programme.cost
+
+
+def _slips(programme: Programme, coordinates: Array) -> Array:
+    """Sizes of the slips of a mechanism (n_joints,)."""
+    slips: Array = np.abs(_gaps(programme, coordinates).reshape(3, -1)[2])
+    return slips
+
+
+def _thrust(forces: Array) -> Array:
     """Normal force of each joint (n_joints,) [block weights]."""
-    thrust: Array = state.forces.reshape(3, -1)[:2].sum(axis=0)
+    thrust: Array = forces.reshape(3, -1)[:2].sum(axis=0)
     return thrust
 
 
-def _excess(state: Optimum, friction: Array) -> float:
-    """Largest |V| - μ N, relative to the largest N."""
-    thrust, shear = _thrust(state), np.abs(state.forces.reshape(3, -1)[2])
-    return float(np.max(shear - friction * thrust) / max(thrust.max(), 1.0))
+def _dissipated(programme: Programme, slips: Array, forces: Array) -> float:
+    """Work of friction on slips of given size."""
+    return float(programme.blocks.structure.friction * slips @ _thrust(forces))

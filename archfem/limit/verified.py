@@ -179,12 +179,14 @@ class Verifier:
         moving = np.flatnonzero(size > MOVING)
         blocks = self.skeleton.structure.blocks
         roles = {blocks[k].part: blocks[k].role for k in moving if blocks[k].part in self.parts}
+        numbers = tuple(self.skeleton.joints[k] for k in working)
         moved = Mechanism(
             mechanism_kind(roles.values()),
             " + ".join(roles),
-            tuple(self.skeleton.joints[k] for k in working),
+            numbers,
             float(joints["time"]) if "time" in joints.coords else None,
             tuple(self.skeleton.blocks[k] for k in moving),
+            tuple(self.structure.joints[number].name for number in numbers),
         )
         counted = counted_mechanism(joints)
         return VerifiedMechanism(moved, counted, self.skeleton.in_whole(motion))

@@ -33,6 +33,9 @@ class BodyForce:
 class PointLoad:
     """A force on the extrados, where a vertical through x leaves the structure.
 
+    On a voussoir that is a sector it stands on the arc itself, so that an inclined force has its
+    true arm.
+
     Attributes:
         x: where it stands [m].
         force: its components for the whole width, up positive (2,) [N].
@@ -58,7 +61,7 @@ class PointLoad:
         tops = {
             number: top
             for number in structure.free
-            if (top := _highest(structure.blocks[number].drawn(), self.x)) is not None
+            if (top := structure.blocks[number].top(self.x)) is not None
         }
         if not tops:
             points = np.concatenate([structure.blocks[b].drawn() for b in structure.free])
@@ -141,15 +144,3 @@ def loads(given: Action | Sequence[Action]) -> list[Action]:
             "of them; a Settlement comes alone"
         )
     return list(several)
-
-
-def _highest(outline: Array, x: float) -> float | None:
-    """Largest y at which a vertical line meets a closed outline, or None where it misses."""
-    start, end = outline, np.roll(outline, -1, axis=0)
-    step = end[:, 0] - start[:, 0]
-    met = (np.minimum(start[:, 0], end[:, 0]) <= x) & (x <= np.maximum(start[:, 0], end[:, 0]))
-    met &= np.abs(step) > 0.0
-    if not met.any():
-        return None
-    share = (x - start[met, 0]) / step[met]
-    return float(np.max(start[met, 1] + share * (end[met, 1] - start[met, 1])))

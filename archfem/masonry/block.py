@@ -7,7 +7,13 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
-from archfem.masonry.geometry import area_of_polygon, area_of_sector, side_of_line
+from archfem.masonry.geometry import (
+    area_of_polygon,
+    area_of_sector,
+    heights_of_arc,
+    heights_of_edges,
+    side_of_line,
+)
 from archfem.masonry.materials import Material
 
 Point = tuple[float, float]
@@ -83,6 +89,21 @@ class Block:
         if self.centre is None:
             return self.points
         return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+
+    def top(self, x: float) -> float | None:
+        """Return the largest y at which a vertical meets the outline, arcs as arcs [m].
+
+        Args:
+            x: of the vertical [m].
+
+        Returns:
+            The height, or None where the vertical misses the block.
+        """
+        arcs = () if self.centre is None else (0, 2)
+        met = heights_of_edges(self.points, x, arcs)
+        for side in arcs:
+            met += heights_of_arc(self.points[side : side + 2], np.array(self.centre), x)
+        return max(met, default=None)
 
     def side_of(self, line: Array, near: float) -> int:
         """Return on which side of a line it lies that it touches with straight edges.

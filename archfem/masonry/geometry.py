@@ -47,6 +47,51 @@ def area_of_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     return area, centre + reach * bisector, about_centre - area * reach**2
 
 
+def heights_of_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[float]:
+    """Heights at which a vertical line meets the straight edges of an outline.
+
+    Args:
+        points: vertices in order (n, 2) [m].
+        x: of the line [m].
+        arcs: numbers of the sides that are not straight.
+
+    Returns:
+        The heights; upright edges are left to their neighbours [m].
+    """
+    start, step = points, np.roll(points, -1, axis=0) - points
+    low, high = np.sort(np.stack([start[:, 0], start[:, 0] + step[:, 0]]), axis=0)
+    met = (low <= x) & (x <= high) & (high > low)
+    met[list(arcs)] = False
+    share = (x - start[met, 0]) / step[met, 0]
+    heights: list[float] = (start[met, 1] + share * step[met, 1]).tolist()
+    return heights
+
+
+def heights_of_arc(ends: Array, centre: Array, x: float) -> list[float]:
+    """Heights at which a vertical line meets an arc of less than half a circle.
+
+    Args:
+        ends: of the arc (2, 2) [m].
+        centre: of its circle (2,) [m].
+        x: of the line [m].
+
+    Returns:
+        The heights, ends included [m].
+    """
+    start, end = ends - centre
+    square = float(start @ start)
+    sense = np.sign(start[0] * end[1] - start[1] * end[0])
+    rise = np.sqrt(max(square - (x - centre[0]) ** 2, 0.0))
+    near = 1e-12 * square
+    heights = []
+    for y in (rise, -rise):
+        after = sense * (start[0] * y - start[1] * (x - centre[0]))
+        before = sense * ((x - centre[0]) * end[1] - y * end[0])
+        if min(after, before) >= -near and (x - centre[0]) ** 2 <= square + near:
+            heights.append(float(centre[1] + y))
+    return heights
+
+
 def side_of_line(points: Array, line: Array, near: float, arcs: Sequence[int] = ()) -> int:
     """On which side of a line an outline lies that covers it with straight edges.
 

@@ -3,6 +3,7 @@
     model           the protocol `Model`, and what was predicted of one
     discretisation  rung, mesh and quadrature: what a model is made with
     build           from a structure to a model on the rung that was asked for
+    gauges          what is read off the coordinates: joints' faces, blocks' displacements
     cells           polygons that cover the blocks, and how they move
     jointed         linear blocks between dry joints
     rigid           the lowest rung: rigid blocks, no mesh

@@ -1,5 +1,6 @@
 from .cells import Cells as Cells
 from .discretisation import Discretisation as Discretisation
 from .fem.mesh import read_mesh as read_mesh
+from .gauges import Gauges as Gauges
 from .model import Model as Model
 from .model import Prediction as Prediction

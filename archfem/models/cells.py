@@ -62,7 +62,8 @@ class Cells:
     def at(self, block: int, point: Array) -> sparse.csr_matrix:
         """Return the displacement of a point on the surface of a block, from coordinates.
 
-        Taken from the nearest edge, linearly between its ends.
+        Taken from the nearest edge: linearly between its ends, and beside it, as where chords
+        stand for an arc, turning with it, so that a rigid motion is exact.
 
         Args:
             block: number of the block.
@@ -79,4 +80,7 @@ class Cells:
         distance = np.linalg.norm(start + share[:, None] * step - point, axis=1)
         nearest = int(np.argmin(distance))
         ends = [self.lift[2 * node : 2 * node + 2] for node in edges[nearest]]
-        return ((1.0 - share[nearest]) * ends[0] + share[nearest] * ends[1]).tocsr()
+        foot = (1.0 - share[nearest]) * ends[0] + share[nearest] * ends[1]
+        along, beside = step[nearest], point - start[nearest] - share[nearest] * step[nearest]
+        turn = sparse.csr_matrix([[-along[1], along[0]]]) @ (ends[1] - ends[0]) / (along @ along)
+        return (foot + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ turn).tocsr()

@@ -37,7 +37,8 @@ class Discretisation:
         coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
             given, half of the block's mean thickness 2 A / P, A its area and P its perimeter.
         degree: of the elements, 1 or 2.
-        quadrature: rule on each joint facet, "lobatto", "nodal", "gauss" or "exact".
+        quadrature: rule on each joint facet, "exact", "lobatto", "nodal" or "gauss"; None takes the
+            exact one, and Lobatto's where there is none: of degree 2, and for "monolithic".
         points: on each facet, 3 where not given.
     """
 
@@ -46,7 +47,7 @@ class Discretisation:
     cell: str = "quadrilateral"
     coarse: float | None = None
     degree: int = 1
-    quadrature: str = "lobatto"
+    quadrature: str | None = None
     points: int | None = None
 
     def __post_init__(self) -> None:
@@ -78,7 +79,10 @@ class Discretisation:
     @property
     def rule(self) -> Quadrature:
         """The rule on each joint facet."""
-        return Quadrature(self.quadrature, self.points)
+        if self.quadrature is not None:
+            return Quadrature(self.quadrature, self.points)
+        exact = self.degree == 1 and self.fidelity != "monolithic" and self.points is None
+        return Quadrature("exact" if exact else "lobatto", self.points)
 
     @property
     def name(self) -> str:

@@ -21,12 +21,12 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
     Args:
         structure: what to model.
         cells: facets on each joint; with exact quadrature one is enough.
-        rule: quadrature on each facet; by default the usual one.
+        rule: quadrature on each facet; by default the exact one.
 
     Returns:
         The model, its coordinates in the order of `structure.free`.
     """
-    rule = rule or Quadrature()
+    rule = rule or Quadrature("exact")
     facets = 1 if rule.rule == "exact" else cells  # the gap between rigid faces is linear
     free = [structure.blocks[number] for number in structure.free]
     density = np.array([structure.density(block) * structure.width for block in free])

@@ -12,6 +12,7 @@ from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce
+from archfem.models.gauges import Gauges
 from archfem.models.model import Model, check_model
 from archfem.statics.newton import Newton, Solved, Solver, magnitude
 
@@ -37,8 +38,10 @@ class Equilibrium:
 
     @cached_property
     def joints(self) -> xr.Dataset:
-        """N, V, M, eccentricity and friction over joint."""
-        return joint_dataset(self.model.structure, self.model.resultants(self.q))
+        """N, V, M, eccentricity, friction, opening, rotation and slip over joint."""
+        gauges = Gauges.on(self.model)
+        faces = gauges.faces(gauges.read(self.q))
+        return joint_dataset(self.model.structure, self.model.resultants(self.q), faces=faces)
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint carries.

@@ -12,6 +12,7 @@ from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
+from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
@@ -94,6 +95,12 @@ class LoadPath:
     def resultants(self) -> Array:
         """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
         return np.array(self.resisted)
+
+    @property
+    def faces(self) -> Array:
+        """Gaps at mid-depth, rotations and slips of joints (steps, 3, n_joints) [m, rad, m]."""
+        gauges = Gauges.on(self.model)
+        return gauges.faces(np.array([gauges.read(q) for q in self.states]))
 
     def advance(self, border: Array, distance: float) -> bool:
         """Add the equilibrium at a distance along the border's direction.
@@ -229,6 +236,16 @@ class SupportPath:
         return np.array(self.resisted)
 
     @property
+    def faces(self) -> Array:
+        """Gaps at mid-depth, rotations and slips of every joint (steps, 3, n_joints) [m, rad, m].
+
+        Those that the motion alone would cause grow with it.
+        """
+        parts, still = np.array(self.parts)[:, None], Gauges.on(self._moved(0.0))
+        far = Gauges.on(self._moved(1.0)).offset - still.offset
+        return still.faces(np.array([still.read(q) for q in self.states]) + parts * far)
+
+    @property
     def factors(self) -> Array:
         """Work of the weights on a unit of the motion (steps,) [N m].
 
@@ -253,7 +270,7 @@ class SupportPath:
             Whether there is one.
         """
         part = self.parts[-1] + distance * self.unit[0] / self.reach
-        model = self.model.moved(self.supports + part * self.motion)
+        model = self._moved(part)
         try:
             solved = Solver(model.size).solve(
                 lambda q: model.force(q) - self.dead,
@@ -273,6 +290,10 @@ class SupportPath:
             change = abs(float(after - before))
             self.unit = (self.unit[0], change if change > TOLERANCE * abs(before) else np.inf)
         return True
+
+    def _moved(self, part: float) -> Model:
+        """The model with its support moved by a multiple of the motion."""
+        return self.model.moved(self.supports + part * self.motion)
 
 
 Path = LoadPath | SupportPath

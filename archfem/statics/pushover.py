@@ -212,7 +212,8 @@ def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     """Label what was found."""
     count, factors = len(path.states), np.array(path.factors)
     steps = np.arange(count, dtype=float)
-    joints = joint_dataset(path.model.structure, path.resultants, steps, criteria)
+    structure, faces = path.model.structure, path.faces
+    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces)
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {

@@ -3,6 +3,7 @@
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
     structure  a structure at an instant; several side by side
+    names      which joint is which
     joints     joints over time
     envelopes  eccentricity part by part
     stress     a map of principal compression

@@ -13,6 +13,7 @@ from .modes import draw_modes as draw_modes
 from .motions import draw_motion as draw_motion
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
+from .names import draw_names as draw_names
 from .pushover import draw_pushover as draw_pushover
 from .stress import draw_stress as draw_stress
 from .structure import draw_instants as draw_instants

@@ -142,7 +142,7 @@ def _draw_thrust(axes: Axes, structure: Structure, joints: xr.Dataset) -> None:
 def _caption(found: Collapse) -> str:
     """Outcome, and the factor where there is one."""
     sentence = found.outcome.sentence
-    if found.outcome is Outcome.COLLAPSES:
+    if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
         sentence += f" at a factor of {found.factor:.4g}"
     return sentence[0].upper() + sentence[1:]
 

@@ -1,18 +1,18 @@
 """Eccentricity of the joints, part by part: its envelope over runs, or its value at one instant."""
 
-from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, envelope, judged, roles_of
+from archfem.view.names import short_name
 from archfem.view.style import (
     COLUMN,
     EDGE,
@@ -27,7 +27,7 @@ from archfem.view.style import (
     legend,
 )
 
-ROW, ROOM = 80, 6
+ROW, ROOM = 80, 8
 """Joints that fit side by side in a wide picture, and those for which a panel has room at least."""
 
 LABEL = "eccentricity e = M / (N h) [-]"
@@ -48,8 +48,8 @@ def draw_envelope(
 ) -> Figure:
     """Draw the least and largest eccentricity of each joint over runs, against the faces.
 
-    Each ring and pier has a panel of its own, in which its joints count from 0. Crosses above the
-    upper face mark joints that came apart at some time. Where runs have different criteria, the
+    Each ring and pier has a panel of its own, with short names of its joints below. Crosses above
+    the upper face mark joints that came apart at some time. Where runs have different criteria, the
     least |e| of a hinge is shown.
 
     Args:
@@ -120,7 +120,7 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
 def draw_band(
     axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float = SHADE
 ) -> None:
-    """Draw the least and the largest eccentricity of joints, which count from 0.
+    """Draw the least and the largest eccentricity of joints, one after another from 0.
 
     Args:
         axes: where to draw.
@@ -162,13 +162,15 @@ def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axe
     """A panel for each ring and pier, the rings first, with the faces of its joints."""
     if not 1 <= len(drawn) <= len(LINES):
         raise InvalidInput(f"{len(drawn)} runs in one picture: give 1 to {len(LINES)}")
-    sizes: dict[str, int] = {}
+    names: dict[str, list[str]] = {}
     roles: dict[str, str] = {}
     for joints in drawn.values():
         own = judged(joints)
         roles |= roles_of(own)
-        for part, size in Counter(own["part"].values.astype(str).tolist()).items():
-            sizes[part] = max(sizes.get(part, 0), size)
+        for part in roles_of(own):
+            found = _of_part(own, part)["name"].values.astype(str).tolist()
+            names[part] = max(names.get(part, []), found, key=len)
+    sizes = {part: len(own) for part, own in names.items()}
     parts = sorted(sizes, key=lambda part: roles[part] != "ring")
     if axes is None:
         shown = _page({part: sizes[part] for part in parts})
@@ -182,10 +184,21 @@ def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axe
         dress(panel, "joint [-]", panel.get_ylabel())
         draw_faces(panel, hinge)
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+        panel.xaxis.set_major_formatter(_named([short_name(each, part) for each in names[part]]))
         if len(parts) > 1:
             panel.set_title(part, fontsize=NORMAL, color=INK)
             panel.set_xlim(-0.7, sizes[part] - 0.3)
     return shown
+
+
+def _named(names: Sequence[str]) -> FuncFormatter:
+    """Write names at whole numbers, and nothing beyond them."""
+
+    def name(place: float, _: object) -> str:
+        number = round(place)
+        return names[number] if 0 <= number < len(names) else ""
+
+    return FuncFormatter(name)
 
 
 def _page(sizes: Mapping[str, int]) -> dict[str, Axes]:

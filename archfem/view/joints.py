@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
@@ -22,7 +23,7 @@ LOOSE = 1.5
 has any value."""
 
 
-def draw_joints(run: History, joints: Sequence[int]) -> Figure:
+def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
     Friction has the sense of the shear force. Lines are interrupted while a joint is open; limits
@@ -30,7 +31,7 @@ def draw_joints(run: History, joints: Sequence[int]) -> Figure:
 
     Args:
         run: what happened.
-        joints: numbers of the joints.
+        joints: their names, or their numbers.
 
     Returns:
         The page: the ground's motion, and a row for each joint.
@@ -38,25 +39,28 @@ def draw_joints(run: History, joints: Sequence[int]) -> Figure:
     Raises:
         InvalidInput: there is no such joint.
     """
-    recorded, rows = run.joints, 1 + len(joints)
-    _check_numbers(recorded, joints)
-    criteria = Criteria.of(recorded)
+    if not len(joints):
+        raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
+    chosen, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
     figure = Figure(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
-    panels = figure.subplots(rows, 2, sharex=True)
-    for axes in panels[0]:
-        _ground(axes, run)
-    if len(panels[0, 1].lines) > 1:
-        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96)}
-        panels[0, 1].legend(frameon=False, fontsize=SMALL, ncols=2, **above)
-    for (left, right), number in zip(panels[1:], joints, strict=True):
-        own = recorded.sel(joint=number)
+    grid = figure.add_gridspec(rows, 2)
+    ground = figure.add_subplot(grid[0, :])
+    _ground(ground, run)
+    ground.xaxis.set_major_locator(MaxNLocator(5))
+    panels = []
+    for row, own in enumerate(chosen, start=1):
+        left, right = (figure.add_subplot(grid[row, k], sharex=ground) for k in range(2))
+        criteria = Criteria.of(own)
         name = "\n".join(wrap(str(own["name"].values), LETTERS))
         dress(left, "", f"{name}\nM / (N h) [-]")
         _eccentricity(left, own, criteria)
         _friction(right, own, criteria)
+        panels.append((left, right))
     for axes in panels[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
-    figure.align_ylabels(panels)
+    for axes in (each for row in panels[:-1] for each in row):
+        axes.tick_params(labelbottom=False)
+    figure.align_ylabels([ground, *(left for left, _ in panels)])
     return figure
 
 
@@ -91,16 +95,6 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     return figure
 
 
-def _check_numbers(joints: xr.Dataset, numbers: Sequence[int]) -> None:
-    """There must be such joints."""
-    known = joints["joint"].values
-    unknown = [number for number in numbers if number not in known]
-    if unknown or not len(numbers):
-        raise InvalidInput(
-            f"joints {unknown or 'none'} cannot be drawn: give numbers from 0 to {len(known) - 1}"
-        )
-
-
 def _ground(axes: Axes, run: History) -> None:
     """Draw the acceleration of the ground."""
     dress(axes, "", "ground [m/s²]")
@@ -108,6 +102,9 @@ def _ground(axes: Axes, run: History) -> None:
     axes.plot(time, ground[:, 0], color=INK, lw=0.6, label="horizontal")
     if ground[:, 1].any():
         axes.plot(time, ground[:, 1], color=LINES[4], lw=0.5, alpha=0.9, label="vertical")
+        axes.legend(
+            frameon=False, fontsize=SMALL, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.96)
+        )
     axes.set_xlim(time[0], time[-1])
 
 

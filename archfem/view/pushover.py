@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.errors import InvalidInput
+from archfem.masonry.naming import listed_joints
 from archfem.statics.pushover import Pushover
 from archfem.units import mm
 from archfem.view.style import COLUMN, HINGE, INK, LINES, SMALL, dress, legend
@@ -26,7 +27,8 @@ def draw_pushover(
 ) -> Figure:
     """Draw factors over displacements; discs mark where joints first hinge.
 
-    Where there is one curve, each disc has the joints' numbers and the face that stays in contact.
+    Where there is one curve its discs are numbered, with the joints' names and the faces that stay
+    in contact beside it.
 
     Args:
         pushes: what to call each pushover, and the pushover.
@@ -50,9 +52,11 @@ def draw_pushover(
     reach = reach or max(_flat(push) for push in pushes.values())
     for (label, push), colour in zip(pushes.items(), LINES, strict=False):
         axes.plot(push.curve["displacement"] / mm, push.curve["factor"], color=colour, label=label)
-        _mark(axes, push, reach, named=len(pushes) == 1)
+        told = _mark(axes, push, reach)
     axes.plot([], [], "o", color=HINGE, ms=6.0, mec="white", label="joint hinges")
     falls = any(push.factor < float(push.curve["factor"][0]) for push in pushes.values())
+    if len(pushes) == 1 and told:
+        _tell(axes, told, above=falls)
     for name, value in (limits or {}).items():
         _limit(axes, f"{name}: {value:.4g}", value, at_left=falls)
     axes.set_xlim(0.0, reach / mm)
@@ -82,21 +86,33 @@ def _flat(push: Pushover) -> float:
     return 1.3 * float(push.curve["displacement"][first])
 
 
-def _mark(axes: Axes, push: Pushover, reach: float, *, named: bool) -> None:
-    """Put discs where joints first hinge, one for all joints of a step."""
+def _mark(axes: Axes, push: Pushover, reach: float) -> dict[tuple[float, float], str]:
+    """Put discs where joints first hinge, one for all of a step: their places, and which joints."""
     steps: dict[int, list[tuple[int, str]]] = {}
     for (joint, side), step in zip(push.hinges, push.hinge_steps, strict=True):
         steps.setdefault(step, []).append((joint, side))
-    halo = [withStroke(linewidth=2.5, foreground="white")]
+    names, told = push.joints["name"].values.astype(str), {}
     for step, hinges in steps.items():
         place = float(push.curve["displacement"][step]) / mm, float(push.curve["factor"][step])
         if place[0] > reach / mm:
             continue
         axes.plot(*place, "o", color=HINGE, ms=6.0, mec="white", mew=0.8, zorder=5)
-        if named:
-            faces = {side: [str(j) for j, own in hinges if own == side] for _, side in hinges}
-            words = "; ".join(f"{', '.join(joints)} {side}" for side, joints in faces.items())
-            note = axes.annotate(
-                words, place, (7, -9), textcoords="offset points", fontsize=SMALL, color=INK
-            )
-            note.set_path_effects(halo)
+        faces = {side: [names[j] for j, own in hinges if own == side] for _, side in hinges}
+        told[place] = "; ".join(f"{listed_joints(own)}, {side}" for side, own in faces.items())
+    return told
+
+
+def _tell(axes: Axes, told: Mapping[tuple[float, float], str], *, above: bool) -> None:
+    """Number the discs of a curve, and say what they are in the corner that it leaves free."""
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    for number, place in enumerate(told, start=1):
+        axes.annotate(
+            f"{number}", place, (4, -11), textcoords="offset points", fontsize=SMALL, color=INK,
+            path_effects=halo,
+        )  # fmt: skip
+    lines = [f"{number}  {words}" for number, words in enumerate(told.values(), start=1)]
+    axes.annotate(
+        "\n".join(lines), (0.97, 0.95 if above else 0.05), xycoords="axes fraction",
+        fontsize=SMALL, color=INK, ha="right", va="top" if above else "bottom",
+        multialignment="left",
+    )  # fmt: skip

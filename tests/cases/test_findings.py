@@ -12,7 +12,7 @@ def finding(**given):
     run = {
         "eccentricity": {"arch": 0.4},
         "friction": {"arch": float("inf")},
-        "mechanisms": dict.fromkeys(DEFINITIONS),
+        "mechanisms": dict.fromkeys((*DEFINITIONS, "Demirel and Aldemir")),
         "ended": "finished",
         "outcome": "reached the end of the motion",
     }

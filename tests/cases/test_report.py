@@ -31,5 +31,6 @@ def test_a_case_may_ask_for_a_free_body(tmp_path):
     for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):
         rest = af.cases.Rest.of(af.Case.of({**tables, "model": cells}))
         files = [path.name for path in results.write_dead(rest, tmp_path)]
-        assert files == ["dead.png", *(f"dead_stress.{kind}" for kind in more), "free_body.png"]
+        drawn = [f"dead_stress.{kind}" for kind in more]
+        assert files == ["dead.png", "names.png", *drawn, "free_body.png"]
     assert (tmp_path / "dead_stress.txt").read_text().splitlines()[1].startswith("arch ")

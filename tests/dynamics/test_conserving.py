@@ -220,7 +220,7 @@ def mixed(fidelity, rule):
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
 def test_strategies_step_as_snes_does(fidelity, rule, method):
-    """To 1e-8 over 60 steps in which joints open and slide, of glued and sliding joints together."""
+    """To 1e-8 over 60 steps in which joints open and slide; some are glued."""
     built = mixed(fidelity, rule)
     damping = af.Rayleigh(0.05, (8.0, 16.0))
     motion = SHAKE.cut(1.0, 1.3)

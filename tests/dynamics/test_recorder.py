@@ -67,7 +67,10 @@ def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
         resultants = np.ones((len(times), len(model.structure.joints), 3))
         energy = np.zeros((len(times), 4))
         ones = np.ones(len(times), dtype=np.int64)
-        return af.dynamics.Batch(times, resultants, ones, 0.005 * ones, energy, state)
+        readings = np.array([af.models.Gauges.on(model).read(start.q)] * len(times))
+        return af.dynamics.Batch(
+            times, resultants, ones, 0.005 * ones, energy, state, readings=readings
+        )
 
     def pressed(k):
         if k == 2:

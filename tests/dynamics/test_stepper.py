@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
+from archfem.dynamics.stepping.choice import STRATEGIES
 from archfem.dynamics.stepping.loop import ITERATIONS, advance
 from archfem.dynamics.stepping.modal import Modal
 from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.stepping.strategy import in_own_terms
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -29,6 +32,36 @@ def test_contact_stepper_falls_back(ring, rule):
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
     drift = run.dataset["energy_drift"] - exact.dataset["energy_drift"]
     assert np.abs(drift).max() < 1e-6 * np.abs(exact.dataset["energy_drift"]).max()
+
+
+@pytest.mark.parametrize("kind", STRATEGIES)
+def test_maps_in_the_terms_of_a_strategy(ring, kind):
+    """What a map gives of displacements, whichever terms they are in."""
+    model = af.build(ring, fidelity="faces")
+    strategy = kind.of(af.dynamics.Equation(model, MOTION, DAMPING))
+    matrix = sparse.random(7, model.size, 0.2, "csr", random_state=1)
+    own = strategy.enter(np.random.default_rng(1).normal(size=(3, model.size)))
+    found = in_own_terms(strategy, matrix, model.mass) @ own[0]
+    assert found == pytest.approx(matrix @ strategy.leave(own)[0], rel=1e-9, abs=1e-12)
+
+
+def test_maps_in_terms_of_any_kind(ring):
+    """Neither reordered nor modes: found vector by vector."""
+    model = af.build(ring, fidelity="rigid")
+    matrix = sparse.random(7, model.size, 0.2, "csr", random_state=1)
+    own = np.random.default_rng(1).normal(size=model.size)
+    found = in_own_terms(_Doubled(), matrix, model.mass)
+    assert found @ own == pytest.approx(2.0 * matrix @ own)
+
+
+class _Doubled:
+    """A strategy that halves all displacements."""
+
+    def enter(self, vectors):
+        return 0.5 * vectors
+
+    def leave(self, vectors):
+        return 2.0 * vectors
 
 
 def _one_pass(series, results, ground, system):

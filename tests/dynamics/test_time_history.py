@@ -26,7 +26,7 @@ def test_an_event_ends_the_run(run, model, motion):
     assert run.mechanism is not None
     halted = time_history(model, motion, damping=DAMPING, until=af.CountedMechanism())
     assert halted.time[-1] == pytest.approx(run.mechanism.time)
-    assert "a mechanism: joints" in halted.outcome
+    assert "a mechanism of arch by joints " in halted.outcome
     assert halted.mechanism == run.mechanism
 
 

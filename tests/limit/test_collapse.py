@@ -109,6 +109,27 @@ def test_motion_opens_joints_and_never_closes_one(live):
     assert np.max(opening_in + opening_out) > 1e-3
 
 
+def test_factor_of_an_inclined_load_by_hand():
+    """Moments, about the second to the fourth hinge, of all that stands left of each.
+
+    Unknown are the two reactions at the first hinge and the factor. The load stands on the arc.
+    """
+    structure, x, force = ring(), -0.7, np.array([2e3, -1.5e3])
+    found = collapse_factor(structure, live=af.PointLoad(x, tuple(force)), friction=None)
+    at = np.array([x, np.sqrt((2.95 + 0.275) ** 2 - x**2)])
+    hinges = [(j, np.array(getattr(structure.joints[j], face))) for j, face in found.hinges]
+    assert len(hinges) == 4
+    (first, foot), loaded = hinges[0], np.arctan2(*at)  # clockwise from the crown
+    rows, known = [], []
+    for joint, pivot in hinges[1:]:
+        stones = structure.blocks[first + 1 : joint + 1]
+        middle = np.arctan2(*np.array(structure.joints[joint].middle))
+        pushed = np.cross(at - pivot, force) if loaded < middle else 0.0
+        rows.append([-(foot - pivot)[1], (foot - pivot)[0], pushed])
+        known.append(sum(20e3 * stone.area * (stone.centroid - pivot)[0] for stone in stones))
+    assert found.factor == pytest.approx(np.linalg.solve(rows, known)[2], rel=EXACT)
+
+
 def test_fastest_corner_moves_at_unit_speed():
     structure = ring()
     motion = collapse_factor(structure, live=SIDEWAYS).motion
@@ -234,7 +255,7 @@ def test_sliding_is_warned_of(caplog):
     block = af.column(breadth=0.6, heights=[2.4], contact=rough(0.1))
     with caplog.at_level(logging.WARNING, "archfem"):
         collapse_factor(block, live=SIDEWAYS)
-    assert "joints [0] slide" in caplog.text
+    assert "joints [0] (joint 0) slide" in caplog.text
     caplog.clear()
     with caplog.at_level(logging.WARNING, "archfem"):
         collapse_factor(block, live=SIDEWAYS, friction="nonassociated")

@@ -6,7 +6,12 @@ import xarray as xr
 from mechanisms import failing, piers
 
 import archfem as af
-from archfem.limit.counted import counted_mechanism, mechanism_kind
+from archfem.limit.counted import (
+    counted_mechanism,
+    counted_mechanisms,
+    demirel_aldemir_mechanism,
+    mechanism_kind,
+)
 
 
 def history(structure, instants):
@@ -49,3 +54,64 @@ def test_count_takes_the_class_of_all_that_failed_or_the_class_asked_for():
 )
 def test_class_follows_from_rings_and_piers(roles, kind):
     assert mechanism_kind(roles) == kind
+
+
+RING = {3: 0.5, 6: -0.5, 9: 0.5}
+"""Three hinges of the ring on piers of two courses."""
+
+FOURTH = {12: -0.5}
+
+
+@pytest.mark.parametrize(
+    ("failures", "found"),
+    [
+        (RING, None),
+        (RING | {0: 0.5}, None),  # a pier's joint is not one of the four
+        (RING | {0: 0.5, 19: 0.5}, None),
+        (RING | FOURTH, ("local", "arch")),
+        (RING | FOURTH | {0: 0.5}, ("semi-global", "left pier + arch")),
+        (RING | FOURTH | {0: 0.5, 19: 0.5}, ("global", "left pier + arch + right pier")),
+        ({0: 0.5, 1: 0.5, 18: 0.5, 19: 0.5}, None),  # no ring
+    ],
+)
+def test_the_words_of_demirel_and_aldemir(failures, found):
+    """Four in one ring are local; joints of piers beside them make it semi-global or global."""
+    met = demirel_aldemir_mechanism(failing(piers(2), failures))
+    assert (met and (met.kind, met.part)) == found
+    if met:
+        assert met.joints == tuple(sorted(failures))
+
+
+def test_the_words_of_demirel_and_aldemir_begin_with_four_in_a_ring():
+    """They count what slides, and joints that do both once; a wider count begins before."""
+    structure = piers(2)
+    instants = [RING, RING | {0: 0.5}, RING | FOURTH | {0: 0.5}, RING | FOURTH]
+    joints = history(structure, instants)
+    met = demirel_aldemir_mechanism(joints)
+    assert (met.time, met.kind) == (2.0, "semi-global")
+    assert met.names == tuple(structure.joints[joint].name for joint in (0, 3, 6, 9, 12))
+    assert counted_mechanisms(joints)["four in a ring"].time == met.time
+    assert counted_mechanism(joints).time == 1.0
+    assert demirel_aldemir_mechanism(joints, af.Criteria(failures=3)).time == 0.0
+    both = dict.fromkeys(RING, 0.7)
+    assert demirel_aldemir_mechanism(failing(structure, RING, both)) is None
+    assert demirel_aldemir_mechanism(failing(structure, RING, {12: -0.7})).kind == "local"
+    assert demirel_aldemir_mechanism(failing(structure, RING, apart=[12])).kind == "local"
+
+
+def test_two_rings_without_piers_are_local_each():
+    """Three and two failures in two rings are none; where one has four, only that one counts."""
+    spans = [
+        af.shapes.Arch(span=4.0, rise=1.5, thickness=0.5, voussoirs=9, name=f"{side} arch")
+        for side in ("left", "right")
+    ]
+    structure = af.bridge(arches=spans, piers=[af.shapes.Pier(gap=1.0, height=1.5)])
+    of = {
+        part: [k for k, joint in enumerate(structure.joints) if joint.part == part]
+        for part in ("left arch", "right arch")
+    }
+    few = dict.fromkeys(of["left arch"][:3] + of["right arch"][:2], 0.5)
+    assert demirel_aldemir_mechanism(failing(structure, few)) is None
+    assert counted_mechanism(failing(structure, few)).kind == "global"
+    met = demirel_aldemir_mechanism(failing(structure, few | {of["left arch"][3]: 0.5}))
+    assert (met.kind, met.part, met.joints) == ("local", "left arch", tuple(of["left arch"][:4]))

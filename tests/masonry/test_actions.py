@@ -7,12 +7,31 @@ import archfem as af
 from archfem.masonry.actions import loads
 
 
-def test_a_point_load_stands_on_the_extrados(ring):
-    number, point = af.PointLoad(0.4, (0.0, -1.0)).place(ring)
-    assert ring.blocks[number].name in ("voussoir 9", "voussoir 10")
+@pytest.mark.parametrize("x", [-2.9, -1.4, 0.0, 0.4, 2.2])
+def test_a_point_load_stands_on_the_arc_of_the_extrados(ring, x):
+    number, point = af.PointLoad(x, (0.0, -1.0)).place(ring)
     outer = 2.95 + 0.55 / 2.0
-    # On one of 16 chords of a stone, which lie within 5 mm of its face.
-    assert point == pytest.approx([0.4, np.sqrt(outer**2 - 0.4**2)], abs=5e-3)
+    assert point == pytest.approx([x, np.sqrt(outer**2 - x**2)], abs=1e-12)
+    toward = np.arctan2(*(ring.blocks[number].centroid[::-1]))
+    assert abs(np.arctan2(point[1], point[0]) - toward) <= np.radians(159.0 / 17.0) / 2.0 + 1e-9
+
+
+def test_a_point_load_on_a_corner_stands_there(ring):
+    for joint in ring.joints:
+        assert af.PointLoad(joint.extrados[0], (0.0, -1.0)).place(ring)[1] == pytest.approx(
+            joint.extrados, abs=1e-9
+        )
+
+
+def test_an_arc_below_is_met_too():
+    """A sector that hangs: its third side is the lower face of what a vertical passes."""
+    across = np.radians([250.0, 290.0])
+    inner, outer = (r * np.column_stack([np.cos(across), np.sin(across)]) for r in (2.0, 3.0))
+    hung = af.Block((*map(tuple, outer), *map(tuple, inner[::-1])), af.STONE, "hung", centre=(0, 0))
+    assert hung.top(0.1) == pytest.approx(-np.sqrt(4.0 - 0.01), abs=1e-12)
+    assert hung.top(1.5) is None
+    beside = 0.95  # passes the straight side, and the outer arc below
+    assert hung.top(beside) == pytest.approx(-beside / np.tan(np.radians(20.0)), abs=1e-12)
 
 
 def test_a_point_load_beside_the_structure_is_refused(stack):

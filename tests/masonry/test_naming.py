@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.masonry.naming import number_of
+from archfem.masonry.naming import listed, listed_joints, number_of
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
@@ -44,3 +44,26 @@ def test_a_case_names_joints_or_numbers_them():
 def test_a_case_refuses_joints_that_are_not_there(joints, says):
     with pytest.raises(af.errors.InvalidInput, match=says):
         af.Case.read(RING, [f"output.joints={joints}"])
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["joint 5"], "joint 5"),
+        (["joint 0", "joint 5", "joint 11"], "joints 0, 5 and 11"),
+        (NAMES, "north pier, base; main arch, joints 4 and 5"),
+        (["a, joint 1", "b, joint 1", "a, joint 2"], "a, joint 1; b, joint 1; a, joint 2"),
+        (["stone 4 to fill", "bed 3"], "stone 4 to fill; bed 3"),
+        (
+            [f"joint {k}" for k in range(9)],
+            "joints 0, 1, 2 and 3; …; joints 5, 6, 7 and 8 (9 in all)",
+        ),
+    ],
+)
+def test_joints_in_a_list(names, words):
+    assert listed_joints(names) == words
+
+
+def test_a_long_list_loses_its_middle():
+    assert listed(["a", "b"]) == "a, b"
+    assert listed([*"abcdefghi"], "; ") == "a; b; c; d; …; f; g; h; i (9 in all)"

@@ -85,6 +85,7 @@ def test_the_verdict_does_not_hang_on_names(names, told):
         "four in a ring": (5.0, "local"),
         "ring and pier": (2.0, "semi-global"),
         "verified": (5.0, "local"),
+        "Demirel and Aldemir": (5.0, "local"),
     }
     made = viaduct(*names)
     assert verdicts(made) == expected

@@ -1,6 +1,11 @@
 """Polygons that cover the blocks."""
 
+import numpy as np
 import pytest
+from scipy.sparse.linalg import lsqr
+
+import archfem as af
+from archfem.masonry.rigid_motion import motion_of
 
 
 def test_rims_run_once_around_each_block(ring_model):
@@ -12,3 +17,17 @@ def test_rims_run_once_around_each_block(ring_model):
         block_ = ring_model.structure.blocks[number]
         # The mesh has four chords where the block has arcs: 0.02 % of its area.
         assert abs(twice[own].sum()) / 2.0 == pytest.approx(block_.area, rel=5e-4)
+
+
+@pytest.mark.parametrize("rung", ["rigid", "faces", "full"])
+def test_an_inclined_load_has_the_arm_of_the_arc(rung):
+    """Its work on a turn of the whole plane, although meshes have chords for the arc."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
+    model = af.build(ring, fidelity=rung, cells=(2, 2))
+    push = af.PointLoad(-0.7, (2e3, -1.5e3))
+    turned = motion_of(model.cells.places, np.zeros(2)) @ [0.0, 0.0, 1.0]
+    of_free = np.isin(model.cells.block, ring.free)
+    rows = np.repeat(of_free, 2)
+    q = lsqr(model.cells.lift[rows], turned[of_free].ravel(), atol=1e-14, btol=1e-14)[0]
+    height = np.sqrt((2.95 + 0.275) ** 2 - 0.7**2)
+    assert model.load(push) @ q == pytest.approx(-0.7 * -1.5e3 - height * 2e3, rel=1e-8)

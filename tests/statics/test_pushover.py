@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.limit.blocks import RigidBlocks
 from archfem.statics.pushover import CONTROLS, Stop, pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
@@ -223,3 +224,33 @@ def test_work_on_a_settlement_is_the_thrust_on_the_support():
     thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
     assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)
     assert float(found.curve["displacement"][-1]) > 0.0
+
+
+def test_joints_turn_as_the_mechanism_of_limit_analysis():
+    """Far along, what the joints turn from step to step is its motion, and only its hinges turn."""
+    load = LOADS["sideways"]
+    found = pushover(rigid(RING), load)
+    mechanism = af.collapse_factor(RING, live=load, friction=None)
+    intrados, extrados, _ = RigidBlocks(RING).gaps(mechanism.motion)
+    expected = (intrados - extrados) / RING.depths
+    turned = found.joints["rotation"].isel(step=[-2, -1]).diff("step").values[0]
+    scale = (turned @ expected) / (expected @ expected)
+    assert scale > 0.0
+    # closed joints still turn elastically
+    assert turned == pytest.approx(scale * expected, abs=0.02 * np.abs(scale * expected).max())
+    wide = found.joints["opening"].isel(step=-1).values
+    assert set(np.argsort(wide)[-4:]) == {joint for joint, _ in mechanism.hinges}
+
+
+def test_openings_over_a_settlement_are_those_of_its_equilibria():
+    """Of each step, and of the dead load on a support moved so far at once."""
+    model = rigid(RING)
+    found = pushover(model, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))
+    step = int(np.argmin(np.abs(found.curve["displacement"].values - 2e-3)))
+    far = float(found.curve["displacement"][step])
+    direct = af.dead_load(model.settled(af.Settlement("left abutment", (-far, 0.0, 0.0))))
+    for name in ("opening", "rotation", "slip"):
+        expected = direct.joints[name].values
+        got = found.joints[name].isel(step=step).values
+        assert got == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+    assert float(found.joints["opening"].isel(step=step).max()) > 1e-4

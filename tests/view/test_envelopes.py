@@ -86,3 +86,18 @@ def test_eccentricity_over_time_is_refused(run):
 def test_too_few_or_many_runs_are_refused(run, count):
     with pytest.raises(af.InvalidInput, match=rf"{count} runs in one picture: give 1 to 6"):
         draw_envelope({str(k): run for k in range(count)})
+
+
+def test_ticks_are_names_of_joints():
+    """The ring on piers counts its joints through, so that a part need not begin at 0."""
+    built = af.arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=15, pier_breadth=1.2, courses=[0.5, 0.5]
+    )
+    names = {joint.part: [] for joint in built.joints}
+    for joint in built.joints:
+        names[joint.part].append(joint.name)
+    for panel in draw_envelope({"run": history(built, 0.3)}).axes:
+        told = panel.xaxis.get_major_formatter()
+        for number, name in enumerate(names[panel.get_title()]):
+            assert f"joint {told(number, 0)}" == name
+        assert told(99, 0) == ""

@@ -23,8 +23,8 @@ from archfem.dynamics.energy import Meter
 from archfem.dynamics.schemes import Conserving, Rayleigh, Scheme
 from archfem.dynamics.stepping.newmark import Numbers, numbers_of
 from archfem.dynamics.steps import State
-from archfem.joints.operator import JointOperator
 from archfem.errors import InvalidInput
+from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
 from archfem.motion.averages import mean_accelerations
 from archfem.motion.motion import Motion

@@ -80,11 +80,9 @@ def _started(system, state, memory):  # type: ignore
     times(linear.opening, state[0], gap)
     times(linear.opening, state[1], rate)
     gap += law.offset
-    law.start[:] = gap
-    for point in range(points):
-        if law.group[point] >= 0:
-            law.elastic[point] = law.shear[point] * (gap[law.group[point]] - memory[point])
-    before = gap - rate * linear.numbers.lag
+    law.start[:], law.speed[:] = gap, rate * (2.0 / linear.numbers.velocity[1])
+    law.slid[: len(memory)] = memory
+    before = gap - law.speed
     return Passed(
         images,
         gap,
@@ -123,7 +121,7 @@ def _hold(law, slid):  # type: ignore
     for point in range(len(law.group)):
         row = law.group[point]
         if row >= 0:
-            slid[row] += law.shear[point] * law.start[row] - law.elastic[point]
+            slid[row] += law.shear[point] * law.slid[point]
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
@@ -172,16 +170,18 @@ def _go_on(law, kept, energy, memory):  # type: ignore
             stiffness, slip = law.shear[point], law.gain * (kept.gap[row] - start[row])
             energy[3] += work.lost[point] - late * stiffness * slip**2
     for row in range(len(start)):
-        start[row] += law.gain * (kept.gap[row] - start[row])
+        moved = law.gain * (kept.gap[row] - start[row])
+        start[row] += moved
+        law.speed[row] = 2.0 * moved - law.speed[row]
     pulls(start[:points], law.still, kept.pulled)
     for point in range(points):
         energy[1] -= 0.5 * start[point] * kept.pulled[point]
         row = law.group[point]
         if row >= 0:
-            stiffness = law.shear[point]
-            law.elastic[point] = work.last[point]
-            energy[1] += 0.5 * (work.last[point] ** 2 / stiffness - stiffness * start[row] ** 2)
-            memory[point] = start[row] - work.last[point] / stiffness
+            law.slid[point] += work.slid[point]
+            memory[point] = law.slid[point]
+            elastic = start[row] - law.slid[point]
+            energy[1] += 0.5 * law.shear[point] * (elastic**2 - start[row] ** 2)
     energy[1] += law.stored
 
 

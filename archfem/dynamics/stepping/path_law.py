@@ -35,7 +35,7 @@ class Work(NamedTuple):
         taken: λ of all rows (r,) [N].
         rate: derivatives of λ at a point by z there and at the other end of its facet (p, 2) [N/m].
         shear: mean shear forces (p,) [N].
-        last: elastic shear at the end (p,) [N].
+        slid: what points slide (p,) [m].
         rates: derivatives of the mean shear by its elastic change and by the limit (p, 2) [-].
         lost: energy that friction and damping take along each point (p,) [J].
     """
@@ -45,7 +45,7 @@ class Work(NamedTuple):
     taken: Array
     rate: Array
     shear: Array
-    last: Array
+    slid: Array
     rates: Array
     lost: Array
 
@@ -66,7 +66,9 @@ class PathLaw(NamedTuple):
         members: points, sorted by their rows of slips (p,).
         offset: gaps before anything moves, of all rows (r,) [m].
         start: gaps at the start of the step, of all rows (r,) [m].
-        elastic: shear forces at its start (p,) [N].
+        speed: change of the gaps per step at their rates there (r,) [m].
+        slid: how far points have slid for good before (p,) [m].
+        guess: of z at all rows (r,) [m].
         stored: energy of joints before anything moves, if they held tension [J].
         work: room for what joints do over it.
     """
@@ -83,7 +85,9 @@ class PathLaw(NamedTuple):
     members: Any
     offset: Array
     start: Array
-    elastic: Array
+    speed: Array
+    slid: Array
+    guess: Array
     stored: float
     work: Work
 
@@ -121,7 +125,9 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
         np.argsort(group, kind="stable") if len(kept) else np.zeros(0, int),
         np.concatenate([offset[0], offset[1][kept]]),
         np.zeros(count + len(kept)),
+        np.zeros(count + len(kept)),
         np.zeros(count),
+        np.zeros(count + len(kept)),
         0.5 * float(np.sum(offset * joints.bonded(offset))),
         _room(count, count + len(kept)),
     )
@@ -266,7 +272,8 @@ def slide(law, gap, row):  # type: ignore
     group = row - len(law.group)
     for place in range(law.first[group], law.first[group + 1]):
         point = law.members[place]
-        stiffness, first, limit = law.shear[point], law.elastic[point], np.inf
+        stiffness, limit = law.shear[point], np.inf
+        first = stiffness * (law.start[row] - law.slid[point])
         if law.friction[point] < np.inf:
             limit = law.cohesion[point] * work.area[point]
             limit = max(limit - law.friction[point] * work.normal[point], 0.0)
@@ -274,7 +281,7 @@ def slide(law, gap, row):  # type: ignore
         trial = first + (0.5 + late) * change
         work.lost[point] = late * change * slip
         work.rates[point, 0], work.rates[point, 1] = 0.5 + late, 0.0
-        work.shear[point], work.last[point] = trial, first + change
+        work.shear[point], work.slid[point] = trial, 0.0
         if max(abs(first), abs(first + change), abs(trial)) > limit:
             _rub(work, point, (first, change, late, limit), stiffness)
             taken += trial - work.shear[point]
@@ -293,7 +300,7 @@ def _rub(work, point, step, stiffness):  # type: ignore
     slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
     mean = start + 0.5 * change - 0.5 * over * slid
     shear = min(max(mean + late * change, -limit), limit)
-    work.shear[point], work.last[point] = shear, last
+    work.shear[point], work.slid[point] = shear, (first + change - last) / stiffness
     if abs(mean + late * change) > limit:
         work.rates[point, 0], work.rates[point, 1] = 0.0, np.sign(shear)
     else:

@@ -8,7 +8,7 @@ gradient of an energy, and the problem
 is not symmetric. It is solved by Newton's method, (1 - F λ') δ = z₀ + F λ - z, in the rows that
 open or slide and in the openings that press on those, by a dense factor where they are few and by
 stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) where
-they are many. Where the passes go round in a circle of holding and sliding they take half steps.
+they are many. Where the passes go round in a circle of holding and sliding they go less far.
 """
 
 import numba
@@ -31,8 +31,14 @@ from archfem.dynamics.stepping.small_problem import (
 FEW = 60
 """Rows up to which the problem is solved directly."""
 
-WHOLE = 8
-"""Passes that take whole steps."""
+WHOLE = 4
+"""Passes that take whole steps anyhow."""
+
+SLOW = 0.7
+"""Error left by a pass, of that before, above which passes are taken to go in a circle."""
+
+CALM = 3
+"""Passes that do not, one after another, after which a whole step is tried again."""
 
 ROUGH = 1e-3
 """Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
@@ -72,6 +78,8 @@ def _largest(law, gap):  # type: ignore
 def _foreseen(law, gap, before, force):  # type: ignore
     """Return which rows are at work, or will be soon if they go on as they did (r,)."""
     near = np.zeros(len(gap), dtype=np.bool_)
+    for row in range(len(gap)):
+        law.guess[row] = law.start[row] + law.speed[row] / law.gain
     for row in range(len(law.group)):
         if gap[row] + AHEAD * (gap[row] - before[row]) > 0.0 or force[row] != 0.0:
             _involve(law, row, near)
@@ -116,6 +124,7 @@ def _fits(law, gap, force, near):  # type: ignore
         if row < points:
             most = max(most, law.still.stiffness[row] * abs(gap[row]))
         off = max(off, abs(taken[row] - force[row]))
+        law.guess[row] = gap[row]
         if taken[row] != 0.0 and not near[row]:
             _involve(law, row, near)
     return off <= EXACT * most
@@ -127,15 +136,17 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     for k in range(size):
         local[rows[k]] = k
     matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
-    gap, z, last = start.copy(), free + matrix @ own, np.inf
-    wanted = np.empty(size)
-    rooms = (np.empty((5 * size + len(law.group), 2), dtype=np.int64), np.empty(5 * size + len(law.group)))
+    gap, z, last = start.copy(), chosen(law.guess, rows), np.inf
+    wanted, share, calm = np.empty(size), 1.0, 0
+    rooms = (
+        np.empty((5 * size + len(law.group), 2), dtype=np.int64),
+        np.empty(5 * size + len(law.group)),
+    )
     count = _taken(law, (gap, z), rows, local, wanted, rooms)
     for passes in range(1, ITERATIONS + 1):
         step = _newton(matrix, free + matrix @ wanted - z, rooms, count)
         for entry in range(count):
             wanted[rooms[0][entry, 0]] += rooms[1][entry] * step[rooms[0][entry, 1]]
-        share = 1.0 if passes <= WHOLE else 0.5
         for k in range(size):
             own[k] += share * (wanted[k] - own[k])
         z = free + matrix @ own
@@ -145,6 +156,8 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
             for k in range(size):
                 force[rows[k]] = own[k]
             return passes
+        calm = calm + 1 if off <= SLOW * last else 0
+        share = 1.0 if passes < WHOLE or calm >= CALM else 0.5
         last = off
     return -1
 

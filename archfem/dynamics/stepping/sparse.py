@@ -22,8 +22,8 @@ from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
 from archfem.dynamics.stepping.panels import Factor, backward, factorised, forward
+from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
 from archfem.dynamics.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping import loop
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.exact import Exact
-from archfem.dynamics.stepping.strategy import Strategy
+from archfem.dynamics.stepping.strategy import Strategy, in_own_terms
 from archfem.dynamics.steps import Batch, State
+from archfem.models.gauges import Gauges
 
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""
@@ -97,7 +100,22 @@ class Stepper:
             np.full(count, dt),
             energy,
             lambda k: State(float(times[k]), *strategy.leave(series[k + 1]), memories[k + 1]),
+            readings=self._read(series[1 : count + 1, 0]),
         )
+
+    @cached_property
+    def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array | None]:
+        """Of the model, from the strategy's own terms: matrix, and offset where there is one."""
+        assert self.strategy is not None
+        gauges, mass = Gauges.on(self.equation.model), self.equation.model.mass
+        offset = gauges.offset if gauges.offset.any() else None
+        return in_own_terms(self.strategy, gauges.matrix, mass), offset
+
+    def _read(self, displacements: Array) -> Array:
+        """Readings (steps, r), from displacements in the strategy's own terms (steps, m)."""
+        matrix, offset = self._gauges
+        readings: Array = (matrix @ np.ascontiguousarray(displacements.T)).T
+        return readings if offset is None else readings + offset
 
     def prepared(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
         """Return what `loop.advance` takes to go from a state to these times.

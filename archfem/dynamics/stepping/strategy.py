@@ -1,12 +1,18 @@
 """What a strategy of time stepping has to provide, and what most of them have in common."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.equation import Equation
+
+ROUND_OFF = 1e-8
+"""Of two ways to the same readings, relative to the largest: entering and leaving modes."""
 
 
 class Strategy(Protocol):
@@ -59,6 +65,41 @@ class Strategy(Protocol):
         Args:
             dt: time step [s].
         """
+
+
+def in_own_terms(
+    strategy: Strategy, matrix: sparse.csr_matrix, mass: sparse.csr_matrix
+) -> sparse.csr_matrix | Array:
+    """Return a linear map of displacements as one of displacements in a strategy's own terms.
+
+    With q = L η that is D L. Of reordered coordinates it is D with its columns in their order; of
+    modes, for which Lᵀ M L = 1 and so entering is η = Lᵀ M q, it is what D M⁻¹ becomes when
+    entered. Where neither holds, L is found vector by vector.
+
+    Args:
+        strategy: whose terms they are.
+        matrix: D (r, n).
+        mass: M (n, n).
+
+    Returns:
+        D L (r, m).
+    """
+    if isinstance(strategy, Reordered):
+        return matrix[:, strategy.order]
+    found = _in_threes(strategy.enter, splu(mass.tocsc()).solve(matrix.T.toarray()).T)
+    probe = np.cos(np.arange(found.shape[-1]))
+    expected = matrix @ _in_threes(strategy.leave, probe[None])[0]
+    if np.allclose(found @ probe, expected, rtol=0.0, atol=ROUND_OFF * np.abs(expected).max()):
+        return found
+    return np.asarray(matrix @ _in_threes(strategy.leave, np.eye(len(probe))).T)
+
+
+def _in_threes(way: Callable[[Array], Array], vectors: Array) -> Array:
+    """Enter or leave with any number of vectors (k, …), which go three at a time as states do."""
+    missing = -len(vectors) % 3
+    filled = np.concatenate([vectors, np.zeros((missing, *vectors.shape[1:]))])
+    found = [way(filled[first : first + 3]) for first in range(0, len(filled), 3)]
+    return np.concatenate(found)[: len(vectors)]
 
 
 class Reordered:

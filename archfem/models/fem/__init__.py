@@ -1,11 +1,14 @@
 """Meshes, spaces and forms: the one place that knows FEniCSx and gmsh.
 
-edges      edges that touching blocks share
-division   into how many cells each edge is cut
-mesh       one conforming mesh of all blocks
-space      the Lagrange space broken across joints
-forms      weak forms in UFL
-_fenicsx   what differs between versions of DOLFINx
+edges         edges that touching blocks share
+division      into how many cells each edge is cut
+mesh          one conforming mesh of all blocks
+space         the Lagrange space broken across joints
+joint_facets  what points on joint facets carry into forms, and what is read there
+joint_forms   gap, slip and tractions of joints in UFL
+forms         weak forms of blocks and joints
+step_forms    the same, averaged over a step in time
+_fenicsx      what differs between versions of DOLFINx
 
 Start reading at `mesh`, then at `space`.
 """

@@ -2,9 +2,14 @@
 
 Find u in the broken space such that for all v
 
-    ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n g(v) + t_s s(v)) = ∫ w ρ b·v
+    ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t) = ∫ w ρ b·v
 
-with plane stress σ, opening g(v) = ⟦v⟧·n, slip s(v) = ⟦v⟧·t and the tractions of `joints.law`.
+with plane stress σ and the tractions of `joints.law`, of the gap g = ⟦u⟧·n and the slip s = ⟦u⟧·t:
+
+    t_n = k_n <g>_-,    t_s = k_s (s - s_p),    |t_s| ≤ μ |t_n| + c on the closed part of a joint,
+
+where s_p is how far each point had slid for good, and has to grow where friction does not hold t_s.
+Joints without friction coefficient never slide. `step_forms` has the means of all over a step.
 """
 
 from dataclasses import dataclass
@@ -17,9 +22,10 @@ from dolfinx import fem
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.law import normal_traction, shear_traction
 from archfem.joints.quadrature import Quadrature
 from archfem.models.fem import _fenicsx
+from archfem.models.fem.joint_facets import JointFacets, Reading
+from archfem.models.fem.joint_forms import Faces, Fields
 from archfem.models.fem.space import BrokenSpace
 
 
@@ -61,77 +67,86 @@ class Forms:
     rule: Quadrature
 
     @cached_property
-    def _measures(self) -> tuple[list[tuple[Any, Any]], list[tuple[Any, Any]]]:
-        """Pairs (material, its dx) and (contact, its dS)."""
+    def _measures(self) -> list[tuple[Any, Any]]:
+        """Pairs (material, its dx)."""
         mesh, structure = self.space.mesh, self.space.mesh.structure
         materials = list(dict.fromkeys(block.material for block in structure.blocks))
-        contacts = list(dict.fromkeys(joint.contact for joint in structure.joints))
         of_block = np.array([materials.index(block.material) for block in structure.blocks])
-        of_joint = np.array([contacts.index(joint.contact) for joint in structure.joints])
-        facets, numbers = mesh.joints
         cells = np.arange(len(mesh.blocks), dtype=np.int32)
-        dx = _fenicsx.cell_measure(
-            mesh.grid, _fenicsx.tags(mesh.grid, 2, cells, of_block[mesh.blocks])
-        )
-        dS = _fenicsx.jump_measure(
-            mesh.grid,
-            _fenicsx.tags(mesh.grid, 1, facets, of_joint[numbers]),
-            *self._scheme,
-        )
-        return (
-            [(material, dx(k)) for k, material in enumerate(materials)],
-            [(contact, dS(k)) for k, contact in enumerate(contacts)],
-        )
+        tags = _fenicsx.tags(mesh.grid, 2, cells, of_block[mesh.blocks])
+        dx = _fenicsx.cell_measure(mesh.grid, tags)
+        return [(material, dx(k)) for k, material in enumerate(materials)]
 
-    @property
-    def _scheme(self) -> tuple[str, int]:
-        """Quadrature along joints as FFCx knows it, by the degree it integrates exactly."""
-        points = self.rule.count(self.space.degree)
-        if self.rule.rule == "gauss":
-            return "default", 2 * points - 1
-        return "GLL", 2 * points - 3
+    @cached_property
+    def facets(self) -> JointFacets:
+        """Facets on joints, and what their points carry."""
+        return JointFacets(self.space, self.rule)
+
+    @cached_property
+    def faces(self) -> list[Faces]:
+        """Faces of joints, of one contact each."""
+        return [Faces(self.facets, patch) for patch in self.facets.patches]
 
     def _number(self, value: float) -> Any:
         return _fenicsx.constant(self.space.mesh.grid, value)
 
-    def _bodies(self, u: Any, v: Any) -> Any:
-        """∫ w σ(u):ε(v)."""
-        width = self._number(self.space.mesh.structure.width)
+    @property
+    def _width(self) -> Any:
+        return self._number(self.space.mesh.structure.width)
+
+    def bodies(self, u: Any, v: Any) -> Any:
+        """Return ∫ w σ(u):ε(v), a UFL form.
+
+        Args:
+            u: displacement, a UFL expression [m].
+            v: another.
+        """
+        width = self._width
         terms = [
             width
             * ufl.inner(plane_stress(u, self._number(m.young), self._number(m.poisson)), strain(v))
             * dx
-            for m, dx in self._measures[0]
+            for m, dx in self._measures
         ]
         return sum(terms[1:], terms[0])
 
-    def _joints(self, u: Any, v: Any) -> Any:
-        """Σ ∫ w (t_n g(v) + t_s s(v)); neither product depends on which side is called +."""
-        normal = ufl.FacetNormal(self.space.mesh.grid)("+")
-        tangent = ufl.perp(normal)
-        width = self._number(self.space.mesh.structure.width)
+    def over_joints(self, densities: list[Any]) -> Any:
+        """Return Σ ∫ w d over the joints, a UFL form.
 
-        def across(w: Any) -> Any:
-            return ufl.dot(w("-") - w("+"), normal)
-
-        def along(w: Any) -> Any:
-            return ufl.dot(w("-") - w("+"), tangent)
-
-        terms = [
-            width
-            * (
-                normal_traction(across(u), self._number(c.normal_stiffness)) * across(v)
-                + shear_traction(along(u), self._number(c.shear_stiffness)) * along(v)
-            )
-            * dS
-            for c, dS in self._measures[1]
-        ]
+        Args:
+            densities: for each of `faces`, a UFL expression.
+        """
+        width = self._width
+        pairs = zip(densities, self.faces, strict=True)
+        terms = [width * density * faces.patch.measure for density, faces in pairs]
         return sum(terms[1:], terms[0])
+
+    def pushed(self, tractions: list[Fields], v: Any) -> Any:
+        """Return Σ ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t), a UFL form.
+
+        Args:
+            tractions: across and along the joint, for each of `faces`, UFL expressions [Pa].
+            v: displacement, a UFL expression.
+        """
+        pairs = zip(tractions, self.faces, strict=True)
+        return self.over_joints([n * f.opening(v) + s * f.slip(v) for (n, s), f in pairs])
+
+    def reading(self, values: list[list[Any]]) -> Reading:
+        """Compile what reads values at the points of joints.
+
+        Args:
+            values: for each of `faces`, n UFL expressions.
+
+        Returns:
+            What `JointFacets.read` takes.
+        """
+        patches = [faces.patch for faces in self.faces]
+        return self.facets.reading(list(zip(patches, values, strict=True)))
 
     def stiffness(self) -> sparse.csr_matrix:
         """Assemble the blocks' stiffness [N/m]."""
         u, v = ufl.TrialFunction(self.space.functions), ufl.TestFunction(self.space.functions)
-        return _fenicsx.assembled_matrix(fem.form(self._bodies(u, v)))
+        return _fenicsx.assembled_matrix(fem.form(self.bodies(u, v)))
 
     def mass(self) -> sparse.csr_matrix:
         """Assemble the consistent mass [kg]."""
@@ -140,88 +155,87 @@ class Forms:
         width = self._number(structure.width)
         terms = [
             width * self._number(m.unit_weight / structure.gravity) * ufl.inner(u, v) * dx
-            for m, dx in self._measures[0]
+            for m, dx in self._measures
         ]
         return _fenicsx.assembled_matrix(fem.form(sum(terms[1:], terms[0])))
 
     @cached_property
-    def _nonlinear(self) -> tuple[Any, Any, Any]:
-        """Displacement, and the compiled internal force and its derivative."""
-        u, v = fem.Function(self.space.functions), ufl.TestFunction(self.space.functions)
-        force = self._bodies(u, v) + self._joints(u, v)
-        return u, fem.form(force), fem.form(ufl.derivative(force, u))
+    def _displacements(self) -> Fields:
+        """The displacement, and the same where derivatives shall not see it."""
+        return fem.Function(self.space.functions), fem.Function(self.space.functions)
 
-    def force(self, displacement: Array) -> Array:
+    def _placed(self, displacement: Array, slid: Array | None) -> None:
+        """Give all forms a displacement, and how far each joint point has slid before."""
+        for u in self._displacements:
+            u.x.array[:] = displacement
+        self.facets.carry(np.zeros(self.facets.count) if slid is None else slid)
+
+    @cached_property
+    def _force(self) -> Any:
+        u, v = self._displacements[0], ufl.TestFunction(self.space.functions)
+        pushed = self.pushed([faces.tractions(u) for faces in self.faces], v)
+        return fem.form(self.bodies(u, v) + pushed)
+
+    def force(self, displacement: Array, slid: Array | None = None) -> Array:
         """Return the assembled internal forces of blocks and joints (2 m,) [N].
 
         Args:
             displacement: of all nodes (2 m,) [m].
+            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
         """
-        u, force, _ = self._nonlinear
-        u.x.array[:] = displacement
-        return _fenicsx.assembled_vector(force)
+        self._placed(displacement, slid)
+        return _fenicsx.assembled_vector(self._force)
 
-    def tangent(self, displacement: Array) -> sparse.csr_matrix:
+    @cached_property
+    def _tangent(self) -> Any:
+        (u, same), v = self._displacements, ufl.TestFunction(self.space.functions)
+        pushed = self.pushed([faces.steady_tractions(u, same) for faces in self.faces], v)
+        return fem.form(ufl.derivative(self.bodies(u, v) + pushed, u))
+
+    def tangent(self, displacement: Array, slid: Array | None = None) -> sparse.csr_matrix:
         """Return the assembled derivative of `force` (2 m, 2 m) [N/m].
 
         Args:
             displacement: of all nodes (2 m,) [m].
+            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
         """
-        u, _, tangent = self._nonlinear
-        u.x.array[:] = displacement
-        return _fenicsx.assembled_matrix(tangent)
+        self._placed(displacement, slid)
+        return _fenicsx.assembled_matrix(self._tangent)
 
     @cached_property
     def _energy(self) -> Any:
-        """Half of the work of internal forces on the displacement: forces are homogeneous."""
-        u = self._nonlinear[0]
-        return fem.form(0.5 * (self._bodies(u, u) + self._joints(u, u)))
+        u = self._displacements[0]
+        stored = self.over_joints([faces.energy(u) for faces in self.faces])
+        return fem.form(0.5 * self.bodies(u, u) + stored)
 
-    def energy(self, displacement: Array) -> float:
-        """Return the potential energy of blocks and joints [J].
+    def energy(self, displacement: Array, slid: Array | None = None) -> float:
+        """Return the potential energy of blocks and joints if nothing slid any further [J].
 
         Args:
             displacement: of all nodes (2 m,) [m].
+            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
         """
-        self._nonlinear[0].x.array[:] = displacement
+        self._placed(displacement, slid)
         return float(fem.assemble_scalar(self._energy))
 
     @cached_property
-    def _resultants(self) -> list[tuple[Any, Any, Any]]:
-        """Compiled integrals of N, V and M, for each joint."""
-        mesh, structure = self.space.mesh, self.space.mesh.structure
-        u = self._nonlinear[0]
-        number = fem.Function(_fenicsx.space(mesh.grid, "DG", 0, 1))
-        number.x.array[_fenicsx.cell_dofs(number.function_space)[:, 0]] = mesh.blocks
-        higher = ufl.conditional(ufl.gt(number("+")[0], number("-")[0]), 1.0, -1.0)
-        jump = higher * (u("+") - u("-"))
-        facets, of_joint = mesh.joints
-        found = []
-        for k, joint in enumerate(structure.joints):
-            own = facets[of_joint == k]
-            tags = _fenicsx.tags(mesh.grid, 1, own, np.ones_like(own))
-            dS = _fenicsx.jump_measure(mesh.grid, tags, *self._scheme)(1)
-            along = _fenicsx.constant(mesh.grid, joint.tangent)
-            arm = ufl.dot(
-                ufl.SpatialCoordinate(mesh.grid) - _fenicsx.constant(mesh.grid, joint.middle), along
-            )
-            width = self._number(structure.width)
-            opening = ufl.dot(jump, _fenicsx.constant(mesh.grid, structure.normals[k]))
-            pull = width * normal_traction(opening, self._number(joint.contact.normal_stiffness))
-            shear = width * shear_traction(
-                ufl.dot(jump, along), self._number(joint.contact.shear_stiffness)
-            )
-            found.append(tuple(fem.form(f * dS) for f in (-pull, shear, -pull * arm("+"))))
-        return found
+    def _tractions(self) -> Reading:
+        u = self._displacements[0]
+        return self.reading([[*faces.tractions(u), faces.slid(u)] for faces in self.faces])
 
-    def resultants(self, displacement: Array) -> Array:
-        """Return N, V, M of every joint, integrated from the tractions (n_joints, 3) [N, N, N m].
+    def tractions(self, displacement: Array, slid: Array | None = None) -> Array:
+        """Return what acts at the points of each joint facet, and how far they have slid then.
 
         Args:
             displacement: of all nodes (2 m,) [m].
+            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
+
+        Returns:
+            Tractions across and along the joint [Pa], and how far the points have slid for good
+            [m], as `JointFacets.read` (3, f, k).
         """
-        self._nonlinear[0].x.array[:] = displacement
-        return np.array([[fem.assemble_scalar(f) for f in joint] for joint in self._resultants])
+        self._placed(displacement, slid)
+        return self.facets.read(self._tractions)
 
     def stress(self) -> sparse.csr_matrix:
         """Mean stress of each cell, (σ_xx, σ_yy, σ_xy), from nodal displacements (3 cells, 2 m)."""
@@ -229,7 +243,7 @@ class Forms:
         cellwise = _fenicsx.space(grid, "DG", 0, 3)
         u, test = ufl.TrialFunction(self.space.functions), ufl.TestFunction(cellwise)
         terms = []
-        for m, dx in self._measures[0]:
+        for m, dx in self._measures:
             s = plane_stress(u, self._number(m.young), self._number(m.poisson))
             terms.append(ufl.inner(ufl.as_vector([s[0, 0], s[1, 1], s[0, 1]]), test) * dx)
         integral = _fenicsx.assembled_matrix(fem.form(sum(terms[1:], terms[0])))

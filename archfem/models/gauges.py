@@ -1,0 +1,92 @@
+"""What is read off the coordinates of a model at every step, as by gauges fixed to it.
+
+At each joint its faces (gap, rotation, slip), and for each block the displacement of its middle.
+All of it is linear in the coordinates: readings are D q + d.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol, cast
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy import sparse
+
+from archfem.arrays import Array
+from archfem.joints.faces import face_matrix
+from archfem.joints.operator import JointOperator
+from archfem.models.model import Model
+
+_made: WeakKeyDictionary[Model, "Gauges"] = WeakKeyDictionary()
+
+
+class Assembled(Protocol):
+    """A model whose joints' forces come from weak forms, and that tells of their openings too."""
+
+    @property
+    def kinematics(self) -> JointOperator:
+        """From coordinates to openings and slips; its forces are of no concern."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gauges:
+    """Readings of a model.
+
+    Attributes:
+        matrix: D, from coordinates to readings, of the joints first, then of the blocks (r, n).
+        offset: d, readings at q = 0, which supports cause that have moved (r,).
+        joints: number of joints.
+    """
+
+    matrix: sparse.csr_matrix
+    offset: Array
+    joints: int
+
+    @classmethod
+    def on(cls, model: Model) -> "Gauges":
+        """Return the gauges of a model, made once.
+
+        Args:
+            model: any rung.
+        """
+        if model not in _made:
+            _made[model] = cls._made_for(model)
+        return _made[model]
+
+    @classmethod
+    def _made_for(cls, model: Model) -> "Gauges":
+        """Put gauges on a model."""
+        operator = model.operator or cast(Assembled, model).kinematics
+        faces, moved = face_matrix(operator)
+        cells = model.cells
+        blocks = len(model.structure.blocks)
+        share = 1.0 / np.bincount(cells.block)[cells.block]
+        places = np.arange(len(share))
+        mean = sparse.csr_matrix((share, (cells.block, places)), (blocks, len(share)))
+        middles = sparse.kron(mean, sparse.identity(2)) @ cells.lift
+        offset = np.concatenate([moved, np.zeros(2 * blocks)])
+        return cls(sparse.vstack([faces, middles], "csr"), offset, len(model.structure.joints))
+
+    def read(self, q: Array) -> Array:
+        """Return all readings (r,).
+
+        Args:
+            q: coordinates (n,).
+        """
+        return np.asarray(self.matrix @ q + self.offset)
+
+    def faces(self, readings: Array) -> Array:
+        """Return gaps at mid-depth, rotations and slips of the joints (…, 3, n_joints).
+
+        Args:
+            readings: (…, r).
+        """
+        own = readings[..., : 3 * self.joints]
+        return own.reshape(*readings.shape[:-1], 3, self.joints)
+
+    def middles(self, readings: Array) -> Array:
+        """Return displacements of the blocks' middles (…, n_blocks, 2) [m]; 0 of fixed blocks.
+
+        Args:
+            readings: (…, r).
+        """
+        return readings[..., 3 * self.joints :].reshape(*readings.shape[:-1], -1, 2)
