@@ -191,12 +191,12 @@ def test_order_of_a_rocking_block_through_impacts(friction, least, bound):
 
 
 def test_second_order_while_joints_stay_closed():
-    """A small sine of the ground: 2.00 against a fine solution, no joint point opens or slides."""
+    """A small sine of the ground, against a fine solution: no joint point opens or slides."""
     built = model("ring", 0.6)
-    times = np.arange(0.0, 0.41, 0.01)
+    times = np.arange(0.0, 0.205, 0.01)
     motion = af.Motion(0.02 * np.sin(2.0 * np.pi * 5.0 * times), 0.01)
     damping, sizes = af.Rayleigh(0.05, (8.0, 16.0)), np.array([2e-3, 1e-3, 5e-4])
-    fine, *errors = (steps(built, motion, dt, damping)[3][-1].q for dt in (2.5e-5, *sizes))
+    fine, *errors = (steps(built, motion, dt, damping)[3][-1].q for dt in (5e-5, *sizes))
     errors = [np.abs(q - fine).max() for q in errors]
     assert observed_order(sizes, errors) == pytest.approx(2.0, abs=0.05)
 
@@ -204,6 +204,7 @@ def test_second_order_while_joints_stay_closed():
 # ---- strategies
 
 
+@cache
 def mixed(fidelity, rule):
     """A ring of which every third joint is glued, one has cohesion, the others slide."""
     ring = model("ring", 0.4).structure
@@ -216,15 +217,19 @@ def mixed(fidelity, rule):
     return af.build(structure, fidelity=fidelity, cells=(2, 2), quadrature=rule)
 
 
+@cache
+def shaken(fidelity, rule, method):
+    """A short run, as by `steps`."""
+    damping, motion = af.Rayleigh(0.05, (8.0, 16.0)), SHAKE.cut(1.0, 1.3)
+    return steps(mixed(fidelity, rule), motion, 0.005, damping, method)
+
+
 @pytest.mark.parametrize("method", ["contact", "compliance"])
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
 def test_strategies_step_as_snes_does(fidelity, rule, method):
     """To 1e-8 over 60 steps in which joints open and slide; some are glued."""
-    built = mixed(fidelity, rule)
-    damping = af.Rayleigh(0.05, (8.0, 16.0))
-    motion = SHAKE.cut(1.0, 1.3)
-    slow, fast = (steps(built, motion, 0.005, damping, each) for each in ("snes", method))
+    slow, fast = (shaken(fidelity, rule, each) for each in ("snes", method))
     assert np.abs(slow[3][-1].memory).max() > 1e-5
     assert (slow[2][:, :, 0].min(axis=0) < slow[2][0, :, 0]).any()
     for ours, theirs in zip(slow[1:3], fast[1:3], strict=True):

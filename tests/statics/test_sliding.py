@@ -128,6 +128,40 @@ def test_limit_analysis_may_pinch_a_wedge_that_has_never_been_pressed():
         af.dead_load(af.build(structure, fidelity="rigid"))
 
 
+# ---- a loop
+
+
+def test_a_loop_under_varying_thrust_is_that_of_one_spring():
+    """Shear to and fro while the thrust swells twice as fast: V against a spring and a slider.
+
+    The block is moved evenly, so that all its points are one. The area of the closed loop is the
+    work of friction, μ N times what slides, which a fine path gives to the order of its steps.
+    """
+    friction, k_n, k_s = 0.4, 1e9, 4e8
+    structure = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(k_n, k_s, friction))
+    model = af.build(structure, fidelity="rigid")
+    phase = np.linspace(0.0, 6.0 * np.pi, 3001)
+    slips, thrusts = 1e-4 * np.sin(phase), 20e3 * (1.0 + 0.6 * np.sin(2.0 * phase + 0.5))
+    slid, shears, work = 0.0, [], []
+    for slip, thrust in zip(slips, thrusts, strict=True):
+        q = np.array([slip, -thrust / k_n, 0.0])
+        found = model.resultants(q)[0]
+        before, trial = slid, k_s * (slip - slid)
+        if abs(trial) > friction * thrust:
+            slid = slip - np.sign(trial) * friction * thrust / k_s
+        shear = k_s * (slip - slid)
+        assert found[0] == pytest.approx(thrust, rel=1e-12)
+        assert abs(found[1]) == pytest.approx(abs(shear), abs=1e-9 * 20e3)
+        model = model.remembering(model.remembered(q))
+        assert np.abs(model.memory) == pytest.approx(abs(slid), abs=1e-9 * 1e-4)
+        shears.append(shear)
+        work.append(friction * thrust * abs(slid - before))
+    last = slice(2000, None)  # the third loop, which closes
+    mean = 0.5 * (np.array(shears[last])[1:] + np.array(shears[last])[:-1])
+    area = mean @ np.diff(slips[last])
+    assert area == pytest.approx(sum(work[2001:]), rel=2e-3)
+
+
 # ---- an arch that slides at its springings
 
 
