@@ -21,7 +21,7 @@ def block(friction, stiffness):
     """So flat that its bed stays closed: 1 m broad and 0.1 m high."""
     contact = af.Contact(stiffness, stiffness, friction)
     structure = af.column(breadth=1.0, heights=[0.1], contact=contact)
-    return af.build(structure, fidelity="rigid")
+    return af.build(structure, fidelity="rigid", quadrature="lobatto")
 
 
 def run(model, motion, dt, start=None, damping=None):
@@ -125,7 +125,7 @@ def incline(angle, friction, stiffness=1e11):
         ),
         (af.Joint((0, 1), *turned((-0.5, 0.0), (0.5, 0.0)), contact, "bed", role="pier"),),
     )
-    return af.build(structure, fidelity="rigid")
+    return af.build(structure, fidelity="rigid", quadrature="lobatto")
 
 
 @pytest.mark.parametrize("over", [1e-6, 1e-3, 0.2])

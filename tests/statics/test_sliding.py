@@ -95,7 +95,9 @@ def test_a_wedge_slides_out_of_its_groove(friction, control):
     """
     expected = np.tan(np.pi / 4.0 + np.arctan(friction))
     pushed = af.pushover(
-        af.build(groove(friction), fidelity="rigid"), af.BodyForce(1.0), control=control
+        af.build(groove(friction), fidelity="rigid", quadrature="lobatto"),
+        af.BodyForce(1.0),
+        control=control,
     )
     least = 1e-2 if control == "force" else 1e-6  # by force, within its last step
     assert pushed.factor == pytest.approx(expected, rel=least)
@@ -125,7 +127,7 @@ def test_limit_analysis_may_pinch_a_wedge_that_has_never_been_pressed():
     structure = af.Structure(tuple(blocks), joints)
     assert af.stands(structure)
     with pytest.raises(af.DidNotConverge):
-        af.dead_load(af.build(structure, fidelity="rigid"))
+        af.dead_load(af.build(structure, fidelity="rigid", quadrature="lobatto"))
 
 
 # ---- a loop
@@ -139,8 +141,8 @@ def test_a_loop_under_varying_thrust_is_that_of_one_spring():
     """
     friction, k_n, k_s = 0.4, 1e9, 4e8
     structure = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(k_n, k_s, friction))
-    model = af.build(structure, fidelity="rigid")
-    phase = np.linspace(0.0, 6.0 * np.pi, 3001)
+    model = af.build(structure, fidelity="rigid", quadrature="lobatto")
+    phase = np.linspace(0.0, 6.0 * np.pi, 1201)
     slips, thrusts = 1e-4 * np.sin(phase), 20e3 * (1.0 + 0.6 * np.sin(2.0 * phase + 0.5))
     slid, shears, work = 0.0, [], []
     for slip, thrust in zip(slips, thrusts, strict=True):
@@ -156,10 +158,10 @@ def test_a_loop_under_varying_thrust_is_that_of_one_spring():
         assert np.abs(model.memory) == pytest.approx(abs(slid), abs=1e-9 * 1e-4)
         shears.append(shear)
         work.append(friction * thrust * abs(slid - before))
-    last = slice(2000, None)  # the third loop, which closes
+    last = slice(800, None)  # the third loop, which closes
     mean = 0.5 * (np.array(shears[last])[1:] + np.array(shears[last])[:-1])
     area = mean @ np.diff(slips[last])
-    assert area == pytest.approx(sum(work[2001:]), rel=2e-3)
+    assert area == pytest.approx(sum(work[801:]), rel=5e-3)
 
 
 # ---- an arch that slides at its springings
@@ -210,17 +212,18 @@ def thrust_at_springing(thickness):
 def test_an_arch_slides_at_its_springings(thickness):
     """H is at most μ W at the foot, and at least what the line of thrust needs within the ring.
 
-    The rigid rung stands and falls on either side of that coefficient, as limit analysis has it.
+    The rigid rung stands and falls on either side of that coefficient, as limit analysis has it,
+    with springs at the edges: under exact integration a joint comes up to N h/2 as it turns.
     """
     needed = thrust_needed(1.0, thickness, 16)
     holds, falls = (semicircle(factor * needed, thickness) for factor in (1.001, 0.999))
     assert af.stands(holds)
     assert not af.stands(falls)
-    dead = af.dead_load(af.build(holds, fidelity="rigid"))
+    dead = af.dead_load(af.build(holds, fidelity="rigid", quadrature="lobatto"))
     thrust = dead.joints["V"].values[[0, -1]] / dead.joints["N"].values[[0, -1]]
     assert np.abs(thrust) == pytest.approx(needed, rel=1.1e-3)
     with pytest.raises(af.DidNotConverge):
-        af.dead_load(af.build(falls, fidelity="rigid"))
+        af.dead_load(af.build(falls, fidelity="rigid", quadrature="lobatto"))
 
 
 # ---- random structures
@@ -314,7 +317,9 @@ def test_pushover_with_friction_against_limit_analysis(make, seed, caplog):
     caplog.set_level(logging.ERROR)
     structure, load = make(seed)
     limit = af.collapse_factor(structure, live=load)
-    pushed = af.pushover(af.build(structure, fidelity="rigid", cells=(1, 1)), load)
+    pushed = af.pushover(
+        af.build(structure, fidelity="rigid", cells=(1, 1), quadrature="lobatto"), load
+    )
     assert "the slope fell" in pushed.outcome
     assert pushed.factor <= limit.factor * (1.0 + 1e-7)
     if not limit.sliding:
