@@ -27,6 +27,10 @@ Status = NDArray[np.bool_]
 TOUCHING = 1e-9
 """Excess over Coulomb's limit, relative to it, that is rounding of a point which holds."""
 
+SLIDING = 1e-9
+"""Share of its elastic stiffness that the tangent leaves a point which slides: a body that slides
+at all its joints, to either side, would be free, though it holds as soon as it moves back."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointOperator:
@@ -187,7 +191,9 @@ class JointOperator:
         closed = self.law.closed(opening)
         limit = (1.0 + TOUCHING) * self.limits(normal, closed)
         over = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
-        sign, along = np.where(over, np.sign(shear), 0.0), np.where(over, 0.0, points.shear)
+        sign = np.where(over, np.sign(shear), 0.0)
+        left = np.where(limit > 0.0, SLIDING, 0.0)  # nothing where it is open
+        along = np.where(over, left, 1.0) * points.shear
         coupled = self.limit_rates(across, self.law.closed_rate(opening), sign)
         return np.concatenate([across, along, coupled])
 

@@ -23,6 +23,10 @@ TOLERANCE, ITERATIONS = 1e-9, 30
 FIRST = 1e-6
 """First displacement, relative to the structure's size."""
 
+FIRM = 1e-3
+"""Share of the closed stiffness that a tangent is given where it alone leads nowhere: where several
+joints slide or turn under the same load it is singular, although each step has an equilibrium."""
+
 
 @dataclass(eq=False)
 class LoadPath:
@@ -110,25 +114,42 @@ class LoadPath:
         """
         along, up = border / np.array(self.unit)
         row = sparse.csr_matrix(np.append(along * self.probe, up))
+        x = np.append(self.states[-1], self.factors[-1])
+        target = (row @ x)[0] + distance
+        return any(self._reached(row, target, distance, share) for share in (0.0, FIRM))
+
+    def _reached(
+        self, row: sparse.csr_matrix, target: float, distance: float, share: float
+    ) -> bool:
+        """Add the equilibrium where row × (q, λ) is the target; tangents share the closed one.
+
+        Returns:
+            Whether Newton's method found it.
+        """
         column = sparse.csr_matrix(-self.live[:, None])
         x = np.append(self.states[-1], self.factors[-1])
-        target = row @ x + distance
-        for iteration in range(ITERATIONS):
+        for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
             tangent = self.model.tangent(x[:-1])
             rest, ahead = self._rest(x), target - row @ x
             if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
-                self.states.append(x[:-1])
-                self.resisted.append(self.model.resultants(x[:-1]))
-                self.model = self.model.remembering(self.model.remembered(x[:-1]))
-                self.factors.append(float(x[-1]))
-                self.iterations.append(iteration)
+                self._add(x, iteration)
                 return True
+            if share > 0.0:
+                tangent = (1.0 - share) * tangent + share * self.model.closed()
             matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
             try:
                 x = x + splu(matrix).solve(np.append(rest, ahead))
             except RuntimeError:  # SuperLU: exactly singular
                 return False
         return False
+
+    def _add(self, x: Array, iterations: int) -> None:
+        """Add an equilibrium, (q, λ) in one (n + 1,), and what the joints remember of it."""
+        self.states.append(x[:-1])
+        self.resisted.append(self.model.resultants(x[:-1]))
+        self.model = self.model.remembering(self.model.remembered(x[:-1]))
+        self.factors.append(float(x[-1]))
+        self.iterations.append(iterations)
 
     def _rest(self, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
