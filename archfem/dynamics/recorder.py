@@ -45,7 +45,9 @@ class Rows:
             rows: (some, …), with the shape of the others.
         """
         if self.count + len(rows) > len(self._array):
-            longer = np.empty((2 * self.count + len(rows), *self._array.shape[1:]), self._array.dtype)
+            longer = np.empty(
+                (2 * self.count + len(rows), *self._array.shape[1:]), self._array.dtype
+            )
             longer[: self.count] = self.values
             self._array = longer
         self._array[self.count : self.count + len(rows)] = rows
@@ -171,9 +173,8 @@ class Recorder:
         self.fallback += batch.fallback * len(batch.times)
         if self.fields_every:
             for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
-                q = batch.state(k).q
                 self._frames.add(batch.times[k : k + 1])
-                self._fields.add(q[None])
+                self._fields.add(batch.state(k).q[None])
         self.guard.judge()
 
     def history(self, motion: Motion, ended: Ending, outcome: str) -> History:
@@ -233,6 +234,8 @@ class Recorder:
             dataset["q"] = ("frame", "coordinate"), self._fields.values
         for name in ("q", "velocity", "acceleration"):
             dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
+        if self.state.memory is not None:
+            dataset["last_memory"] = "point", self.state.memory
 
 
 def versions() -> str:

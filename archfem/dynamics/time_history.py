@@ -154,9 +154,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     return history
 
 
-def _steps(
-    model: Model, dt: float | None, tolerance: float | None
-) -> tuple[float | None, float]:
+def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[float | None, float]:
     """The time step [s], None where steps have lengths of their own, and the tolerance [-]."""
     if tolerance is not None:
         if dt is not None:
@@ -252,7 +250,9 @@ def last_state(history: History) -> State:
             must be the same.
     """
     dataset = history.dataset
+    names = [
+        name for name in ("q", "velocity", "acceleration", "memory") if f"last_{name}" in dataset
+    ]
     return State(
-        float(dataset.attrs["last_time"]),
-        *(dataset[f"last_{name}"].values for name in ("q", "velocity", "acceleration")),
+        float(dataset.attrs["last_time"]), *(dataset[f"last_{name}"].values for name in names)
     )

@@ -100,7 +100,9 @@ class Pace:
             elif worst < EASY * self.tolerance and level < coarsest - finest:
                 level += 1
 
-    def _tried(self, state: State, dt: float, ends: Array, last: bool) -> tuple[Batch | None, float]:
+    def _tried(
+        self, state: State, dt: float, ends: Array, last: bool
+    ) -> tuple[Batch | None, float]:
         """Steps up to the first that errs too much, and their largest error; None if the first does.
 
         Where steps cannot be shorter all are taken.

@@ -99,7 +99,11 @@ class Stepper:
             passes,
             np.full(count, dt),
             energy,
-            lambda k: State(float(times[k]), *strategy.leave(series[k + 1]), memories[k + 1]),
+            lambda k: State(
+                float(times[k]),
+                *strategy.leave(series[k + 1]),
+                memories[k + 1] if self.equation.remembers else None,
+            ),
             readings=self._read(series[1 : count + 1, 0]),
         )
 
