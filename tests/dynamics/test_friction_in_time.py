@@ -204,7 +204,6 @@ def test_a_run_in_two_parts_is_one_run():
     assert second[-1].q == pytest.approx(whole[-1].q, rel=1e-7)
 
 
-@pytest.mark.xfail(strict=True, reason="last_state leaves out what the joints remember")
 def test_a_history_can_be_continued():
     """`last_state` of a history carries what the joints remember."""
     model, motion = block(0.25, 1e10), af.Motion.synthetic(duration=2.0, pga=5.0, seed=4)
