@@ -218,16 +218,23 @@ def _enter(entries, count, row, column, value):  # type: ignore
 
 @numba.njit(cache=True)
 def _newton(matrix, rest, entries, count):  # type: ignore
-    """Solve (1 - F λ') δ = rest."""
-    if len(rest) > FEW:
-        return _gradients(matrix, rest, entries, count)
-    whole = np.eye(len(rest))
+    """Solve (1 - F λ') δ = rest for those rows on which some λ depends; 0 elsewhere."""
+    places, values = entries
+    used = np.zeros(len(rest), dtype=np.bool_)
     for entry in range(count):
-        row, column = entries[0][entry]
-        value = entries[1][entry]
-        for k in range(len(rest)):
-            whole[column, k] -= value * matrix[row, k]  # transposed, as F is symmetric
-    return np.linalg.solve(whole.T, rest)
+        used[places[entry, 1]] = True
+    rows = np.flatnonzero(used)
+    if len(rows) > FEW:
+        return _gradients(matrix, rest, entries, count)
+    number = np.cumsum(used) - 1
+    whole = np.eye(len(rows))
+    for entry in range(count):
+        line, column = matrix[places[entry, 0]], number[places[entry, 1]]
+        for k in range(len(rows)):
+            whole[column, k] -= values[entry] * line[rows[k]]  # transposed, as F is symmetric
+    step = np.zeros(len(rest))
+    step[rows] = np.linalg.solve(whole.T, rest[rows])
+    return step
 
 
 @numba.njit(cache=True)
