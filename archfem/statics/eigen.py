@@ -98,7 +98,14 @@ def lowest(
 
 
 def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    made = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data))
+    """A matrix for PETSc, whose Cholesky factorisation ends on symmetric patterns only.
+
+    That of joints which can slide has slips coupled with openings, but not these with those.
+    """
+    half = matrix.tocoo()
+    places = (np.append(half.row, half.col), np.append(half.col, half.row))
+    whole = sparse.csr_matrix((0.5 * np.append(half.data, half.data), places), matrix.shape)
+    made = PETSc.Mat().createAIJ(whole.shape, csr=(whole.indptr, whole.indices, whole.data))
     made.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     return made
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.points import JointPoints, law_of
+from archfem.joints.integration import law_of
+from archfem.joints.points import JointPoints
 
 
 def facet(rule, cells=1):
