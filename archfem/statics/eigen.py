@@ -69,6 +69,8 @@ def lowest(
         DidNotConverge: K is singular or negative, or SLEPc did not find all pairs.
     """
     zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
+    if zero <= 0.0:
+        raise _mechanism(0.0, zero)
     solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
     solver.solve()
@@ -82,11 +84,7 @@ def lowest(
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
-        raise DidNotConverge(
-            f"the stiffness is singular or negative, with ω² = {squares[0]:.1e} 1/s² where "
-            f"rounding makes up to {zero:.0e}: a mechanism; check supports and joints, or take "
-            "another state"
-        )
+        raise _mechanism(float(squares[0]), zero)
     edge = float(squares[-1]) * (1.0 - APART)
     below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
     if there != below:
@@ -95,6 +93,14 @@ def lowest(
             f"are {there}: ask for a few more or fewer"
         )
     return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
+
+
+def _mechanism(square: float, zero: float) -> DidNotConverge:
+    """What to say where nothing holds something."""
+    return DidNotConverge(
+        f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
+        f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
+    )
 
 
 def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
