@@ -70,7 +70,7 @@ def lowest(
     """
     zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
     if zero <= 0.0:
-        raise _mechanism(0.0, zero)
+        raise DidNotConverge(_mechanism(0.0, zero))
     solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
     solver.solve()
@@ -84,7 +84,7 @@ def lowest(
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
-        raise _mechanism(float(squares[0]), zero)
+        raise DidNotConverge(_mechanism(float(squares[0]), zero))
     edge = float(squares[-1]) * (1.0 - APART)
     below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
     if there != below:
@@ -95,19 +95,18 @@ def lowest(
     return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
 
 
-def _mechanism(square: float, zero: float) -> DidNotConverge:
+def _mechanism(square: float, zero: float) -> str:
     """What to say where nothing holds something."""
-    return DidNotConverge(
+    return (
         f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
         f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
     )
 
 
 def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """A matrix for PETSc, whose Cholesky factorisation ends on symmetric patterns only.
-
-    That of joints which can slide has slips coupled with openings, but not these with those.
-    """
+    """A matrix as PETSc takes it, on a symmetric pattern."""
+    # Cholesky's factorisation does not end on another, and where joints can slide the pattern has
+    # slips coupled with openings, but not openings with slips.
     half = matrix.tocoo()
     places = (np.append(half.row, half.col), np.append(half.col, half.row))
     whole = sparse.csr_matrix((0.5 * np.append(half.data, half.data), places), matrix.shape)

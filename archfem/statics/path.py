@@ -271,10 +271,8 @@ class SupportPath:
         return True
 
     def _ahead(self, part: float) -> Array:
-        """Coordinates if the structure went on as in its last step, a first guess (n,).
-
-        Without it all of the motion would fall to the joint at the support, and let it slide.
-        """
+        """Coordinates if the structure went on as in its last step, a first guess (n,)."""
+        # From the last state all of the motion would fall to the joint at the support: it slides.
         last = self.states[-1]
         if len(self.parts) < 2:
             return last

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from glued import glued
 from scipy import sparse
 
 import archfem as af
-from glued import glued
 
 
 @pytest.fixture(params=["lobatto", "exact"])

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from glued import glued
 
 import archfem as af
-from glued import glued
 
 
 def test_unchanged_tangents_are_factorised_once(ring):

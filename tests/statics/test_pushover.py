@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from glued import glued
 
 import archfem as af
 from archfem.limit.blocks import RigidBlocks
 from archfem.statics.pushover import CONTROLS, Stop, pushover
-from glued import glued
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
