@@ -2,8 +2,12 @@
 
     law         tractions from opening and slip
     quadrature  rules that integrate the traction along a joint
-    points      points on the joints, and forces there by springs or exact integrals
+    points      points on the joints, where openings and slips are taken
+    springs     normal forces of points that are springs of their own
+    facets      normal forces of facets, integrated exactly
+    integration which of both a quadrature rule asks for
     operator    the joint operator G, from coordinates to forces
+    passage     a step of the joints: means of their forces, and what they remember
     faces       opening, rotation and slip of whole joints
     given_limits  joints whose limits of friction stay as they are
     rigid       G of rigid blocks

@@ -1,7 +1,8 @@
 """Tractions of a dry joint from its opening and slip, at an instant and over a step.
 
 Written with arithmetic and `abs` alone, so that one definition serves NumPy arrays and UFL
-expressions. Openings are positive where the joint is open, tractions where they pull.
+expressions; only statuses and derivatives, which UFL finds for itself, are for arrays alone.
+Openings are positive where the joint is open, tractions where they pull.
 
 Over a step opening and slip go straight from their start to their end, and tractions are averaged
 on the way: the mean of a force along its path is what makes the work of a step the change of the
@@ -119,3 +120,39 @@ def is_closed(opening: NDArray[np.float64]) -> NDArray[np.bool_]:
         opening: gaps, of any shape [m].
     """
     return opening <= 0.0
+
+
+def mean_closing_rate(
+    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Return the derivative of `mean_closing` by a parameter on which both gaps depend [-].
+
+    Args:
+        start: gaps at the start of the step, of any shape [m].
+        end: gaps at its end, of the same [m].
+        rates: change of both per change of the parameter [-].
+    """
+    time = closed_time(start, end)
+    time = np.where(is_closed(start) & is_closed(end), 1.0, time)  # also where both just touch
+    square = 0.5 * time**2
+    by_start = np.where(is_closed(start), time - square, square)
+    by_end = np.where(is_closed(end), time - square, square)
+    rate: NDArray[np.float64] = rates[0] * by_start + rates[1] * by_end
+    return rate
+
+
+def closed_time_rate(
+    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Return the derivative of `closed_time` by a parameter on which both gaps depend [1/m].
+
+    Args:
+        start: gaps at the start of the step, of any shape [m].
+        end: gaps at its end, of the same [m].
+        rates: change of both per change of the parameter [-].
+    """
+    time, turns = closed_time(start, end), is_closed(start) != is_closed(end)
+    whole = np.where(turns, abs(start) + abs(end), np.inf)
+    by_start, by_end = (np.where(is_closed(each), 1.0 - time, time) for each in (start, end))
+    rate: NDArray[np.float64] = -(rates[0] * by_start + rates[1] * by_end) / whole
+    return rate

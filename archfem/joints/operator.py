@@ -3,7 +3,8 @@
 With G the sparse operator that takes generalised coordinates q to (opening, slip) at points along
 the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G. Whatever the
 coordinates are (nodes, rigid motions, modes), the rest is the same. How openings become normal
-forces is told in `points`; how slips become shear, and what of it friction holds, in `law`.
+forces is told in `springs` and `facets`; how slips become shear, and what of it friction holds, in
+`law`.
 
 Joints have memory: how far each point has slid for good. It belongs to the operator, whose forces
 are those after a load has changed since; `remembered` takes in what has slid meanwhile.
@@ -18,8 +19,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.facets import Facets
+from archfem.joints.integration import Law
 from archfem.joints.law import held, is_closed
-from archfem.joints.points import Facets, JointPoints, Law
+from archfem.joints.points import JointPoints
 from archfem.joints.sparsity import Pattern
 
 Status = NDArray[np.bool_]
@@ -115,7 +118,7 @@ class JointOperator:
             closed: area on which each point is closed (p,) [m²].
         """
         slides, points = self.points.slides, self.points
-        found = points.cohesion * closed
+        found: Array = points.cohesion * closed
         found[slides] -= points.friction[slides] * normal[slides]
         return np.where(slides, found, 0.0)
 
@@ -167,7 +170,8 @@ class JointOperator:
             q: coordinates (n,).
         """
         further = (self.elastic(q) - self.tractions(q)[1]) / self.points.shear
-        return self.memory + np.where(self.points.slides, further, 0.0)
+        slid: Array = self.memory + np.where(self.points.slides, further, 0.0)
+        return slid
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).
@@ -222,7 +226,9 @@ class JointOperator:
         """
         first, second = self.law.entries
         across = self.law.stiffness(np.full(len(self.points.arm), -1.0)) * gaps[0][second]
-        return np.bincount(first, across, len(gaps[0])), self.points.shear * gaps[1]
+        normal = np.zeros_like(gaps[0])
+        np.add.at(normal, first, across)
+        return normal, self.points.shear * gaps[1]
 
     def glued(self) -> Array:
         """Return what `stiffness` is where all is closed and nothing slides (m,) [N/m]."""

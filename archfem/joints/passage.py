@@ -81,7 +81,8 @@ class Passage:
         """
         operator, points = self.operator, self.operator.points
         further = (operator.elastic(q) - self._over(q)[3]) / points.shear
-        return operator.memory + np.where(points.slides, further, 0.0)
+        slid: Array = operator.memory + np.where(points.slides, further, 0.0)
+        return slid
 
     def lost(self, q: Array) -> float:
         """Return the energy that friction and the lag of damping take [J]; never negative.

@@ -4,8 +4,9 @@ import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.integration import law_of
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import JointPoints, law_of
+from archfem.joints.points import JointPoints
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
-from archfem.joints.points import Facets
+from archfem.joints.facets import Facets
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
 from archfem.models.jointed import Jointed

@@ -69,6 +69,8 @@ def lowest(
         DidNotConverge: K is singular or negative, or SLEPc did not find all pairs.
     """
     zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
+    if zero <= 0.0:
+        raise DidNotConverge(_mechanism(0.0, zero))
     solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
     solver.solve()
@@ -82,11 +84,7 @@ def lowest(
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
-        raise DidNotConverge(
-            f"the stiffness is singular or negative, with ω² = {squares[0]:.1e} 1/s² where "
-            f"rounding makes up to {zero:.0e}: a mechanism; check supports and joints, or take "
-            "another state"
-        )
+        raise DidNotConverge(_mechanism(float(squares[0]), zero))
     edge = float(squares[-1]) * (1.0 - APART)
     below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
     if there != below:
@@ -97,8 +95,22 @@ def lowest(
     return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
 
 
+def _mechanism(square: float, zero: float) -> str:
+    """What to say where nothing holds something."""
+    return (
+        f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
+        f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
+    )
+
+
 def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    made = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data))
+    """A matrix as PETSc takes it, on a symmetric pattern."""
+    # Cholesky's factorisation does not end on another, and where joints can slide the pattern has
+    # slips coupled with openings, but not openings with slips.
+    half = matrix.tocoo()
+    places = (np.append(half.row, half.col), np.append(half.col, half.row))
+    whole = sparse.csr_matrix((0.5 * np.append(half.data, half.data), places), matrix.shape)
+    made = PETSc.Mat().createAIJ(whole.shape, csr=(whole.indptr, whole.indices, whole.data))
     made.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     return made
 

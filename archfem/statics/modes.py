@@ -109,7 +109,7 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
 
 
 def _tangent(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:
-    """Stiffness with joints as in a state."""
+    """Stiffness with joints as in a state; what slides there holds as soon as it moves back."""
     if about is None:
         return model.closed()
     if about.model.fidelity != model.fidelity or len(about.q) != model.size:
@@ -117,7 +117,7 @@ def _tangent(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:
             f"the state is of a model '{about.model.fidelity}' with {len(about.q)} coordinates, "
             f"the modes of '{model.fidelity}' with {model.size}: give the same model's"
         )
-    return about.model.tangent(about.q)
+    return about.model.remembering(about.model.remembered(about.q)).tangent(about.q)
 
 
 def _sense(shapes: Array, participation: Array, masses: Array) -> Array:

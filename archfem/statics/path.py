@@ -275,7 +275,7 @@ class SupportPath:
             solved = Solver(model.size).solve(
                 lambda q: model.force(q) - self.dead,
                 model.tangent,
-                self.states[-1],
+                self._ahead(part),
                 magnitude(self.dead),
             )
         except DidNotConverge:
@@ -290,6 +290,16 @@ class SupportPath:
             change = abs(float(after - before))
             self.unit = (self.unit[0], change if change > TOLERANCE * abs(before) else np.inf)
         return True
+
+    def _ahead(self, part: float) -> Array:
+        """Coordinates if the structure went on as in its last step, a first guess (n,)."""
+        # From the last state all of the motion would fall to the joint at the support: it slides.
+        last = self.states[-1]
+        if len(self.parts) < 2:
+            return last
+        going = (last - self.states[-2]) / (self.parts[-1] - self.parts[-2])
+        ahead: Array = last + (part - self.parts[-1]) * going
+        return ahead
 
     def _moved(self, part: float) -> Model:
         """The model with its support moved by a multiple of the motion."""

@@ -74,7 +74,7 @@ def joint_stress(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
         σ = N / (w h) (1 + 6 |e|)   for |e| <= 1/6,   σ = 2 N / (3 w h (1/2 - |e|))   above.
 
     In a ring it lies some per cent above the peak of a converged field, 5 % at |e| = 0.4, where a
-    field on 4 × 4 cells a stone is 18 % below. It grows without bound as |e| nears 0.5: a block
+    field on 4 × 4 cells a stone is 20 % below. It grows without bound as |e| nears 0.5: a block
     that turns about a line. In an open joint it is zero.
 
     Args:

@@ -111,7 +111,8 @@ def test_as_dense_lapack_about_dead_load(ring, fidelity):
     model = af.build(ring, fidelity=fidelity, cells=(2, 2))
     dead = af.dead_load(model)
     found = modes(model, 12, about=dead)
-    stiffness, mass = model.tangent(dead.q).toarray(), model.mass.toarray()
+    stiffness, mass = dead.model.tangent(dead.q).toarray(), model.mass.toarray()
+    assert stiffness == pytest.approx(stiffness.T, abs=1e-12 * stiffness.max())
     squares, shapes = eigh(stiffness, mass, subset_by_index=[0, 11])
     assert found.frequencies == pytest.approx(hertz(squares), rel=SAME)
     assert found.shapes.T @ mass @ found.shapes == pytest.approx(np.eye(12), abs=1e-8)
@@ -131,7 +132,10 @@ def test_open_joints_lower_the_first_frequency(ring):
 
 
 def test_monolithic_as_full(ring):
-    both = [af.build(ring, fidelity=rung, cells=(2, 2)) for rung in ("full", "monolithic")]
+    both = [
+        af.build(ring, fidelity=rung, cells=(2, 2), quadrature="lobatto")
+        for rung in ("full", "monolithic")
+    ]
     full, slow = (modes(model, 6, about=af.dead_load(model)) for model in both)
     assert slow.frequencies == pytest.approx(full.frequencies, rel=SAME)
     assert slow.mass_ratios == pytest.approx(full.mass_ratios, abs=1e-7)

@@ -17,7 +17,9 @@ from archfem.dynamics.stepping.newmark import follow, numbers_of
 from archfem.dynamics.stepping.open_points import release
 from archfem.dynamics.stepping.panels import backward, factorised, forward
 from archfem.dynamics.stepping.sparse import Sparse
-from archfem.joints.points import Facets, JointPoints, Springs
+from archfem.joints.facets import Facets
+from archfem.joints.points import JointPoints
+from archfem.joints.springs import Springs
 
 TIGHT = af.statics.Newton(tolerance=1e-13)
 STRONG = af.Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)

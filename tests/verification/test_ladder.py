@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.points import Facets, JointPoints, Springs
+from archfem.joints.facets import Facets
+from archfem.joints.points import JointPoints
+from archfem.joints.springs import Springs
 
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.5, seed=5)
 TIGHT = af.statics.Newton(tolerance=1e-13)

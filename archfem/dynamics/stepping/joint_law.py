@@ -13,8 +13,8 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
+from archfem.joints.facets import Facets
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import Facets
 
 
 class Law(NamedTuple):

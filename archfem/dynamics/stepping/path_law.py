@@ -7,7 +7,7 @@ forces are linear in them. The law takes out of those
     λ = K z - f̄(z),
 
 z the gaps at the middle of the path that the joints feel, which is zero where a joint stays closed
-and holds. A facet is cut where it opens or closes at either end of the path, as in `points.Facets`.
+and holds. A facet is cut where it opens or closes at either end of the path, as in `facets.Facets`.
 """
 
 from typing import Any, NamedTuple
@@ -19,8 +19,8 @@ from scipy import sparse
 from archfem.arrays import Array
 from archfem.dynamics.stepping.joint_law import Law, law_of
 from archfem.dynamics.stepping.newmark import Numbers
+from archfem.joints.facets import PLACES, SHARES
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import PLACES, SHARES
 
 SAME = 1e-9
 """Difference of two rows of slips, relative to the largest entry, below which they are one."""

@@ -148,7 +148,7 @@ class Faces:
     def _left(self, u: Any, shear: Any) -> Any:
         """That part of the slip which the elastic traction does not ask for [m]."""
         if not self.patch.contact.slides:
-            return 0.0 * shear
+            return self.facets.carried(self.patch.colour)
         return self.slip(u) - shear / self._stiffness[1]
 
     def _path(self, step: Fields, late: Any) -> Fields:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.integration import law_of
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import JointPoints, law_of
+from archfem.joints.points import JointPoints
 from archfem.joints.quadrature import Quadrature
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.mesh import Mesh
