@@ -24,9 +24,8 @@ class Strategy(Protocol):
     energies. Nothing is presupposed of them: gaps need not be linear in the coordinates, and
     joints may have memory. `begin` is given what they remember, `measure` tells what they do after
     each step, so that a run can go on from any, and SNES can take a step that `settle` gives up.
-    Where all is linear but the
-    joints, overload `linear.solve` alone and give the system a field `linear`. To be chosen by
-    "auto" it is listed in `choice.STRATEGIES`.
+    Where all is linear but the joints, overload `linear.solve` alone and give the system a field
+    `linear`. To be chosen by "auto" it is listed in `choice.STRATEGIES`.
 
     Attributes:
         name: as users give it.
