@@ -25,9 +25,9 @@ def run(model, motion):
 def breaking():
     """A function that gives a stepper whose attempts fail where `breaks(time, dt)` says so."""
 
-    def stepper(model, motion, breaks, scheme=af.dynamics.Conserving()):
+    def stepper(model, motion, breaks, scheme=None):
         damping = af.Rayleigh(0.05, (8.0, 16.0))
-        equation = af.dynamics.Equation(model, motion, damping, scheme)
+        equation = af.dynamics.Equation(model, motion, damping, scheme or af.dynamics.Conserving())
         real = af.dynamics.Exact(equation)
         tried = real.averaged if equation.conserving else real.attempt
 

@@ -7,6 +7,7 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     equation         of motion, and how time is discretised
     exact            every scheme, step by step by SNES
     stepper          many steps at a time by a strategy, by SNES what that gives up
+    pace             steps of lengths of their own, as an error allows
     strategy         what a strategy has to provide
     choice           which strategy takes a run
     loop             the one compiled loop over steps
