@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 import xarray as xr
+from scipy.sparse.linalg import splu
 
 from archfem.arguments import instance
 from archfem.arrays import Array
@@ -15,6 +16,9 @@ from archfem.masonry.actions import BodyForce
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model, check_model
 from archfem.statics.newton import Newton, Solved, Solver, magnitude
+
+A_LITTLE = 1e-9
+"""Motion of supports by which the force that they exert on a structure is found [m]."""
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -128,7 +132,7 @@ def _grown(
         model, load = at(target)
         model = model.remembering(found.model.memory)
         try:
-            solved = _solve(solver, model, load, found.q)
+            solved = _solve(solver, model, load, _followed(found, model))
         except DidNotConverge as error:
             step /= 2.0
             if step >= SMALLEST_STEP:
@@ -142,6 +146,22 @@ def _grown(
         found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
         factor = target
     return found
+
+
+def _followed(found: Equilibrium, model: Model) -> Array:
+    """Coordinates if the structure follows its supports, with its joints as they are now (n,)."""
+    before, q = found.model, found.q
+    moved = model.supports - before.supports
+    if not moved.any():
+        return q
+    part = A_LITTLE / np.abs(moved).max()
+    ahead = before.moved(before.supports + part * moved).remembering(before.memory)
+    change = (ahead.force(q) - before.force(q)) / part
+    try:
+        followed = q - splu(before.tangent(q).tocsc()).solve(change)
+    except RuntimeError:  # the tangent is singular
+        return q
+    return followed
 
 
 def _solve(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
