@@ -62,15 +62,24 @@ def test_monolithic_history_is_that_of_full(ring):
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-def test_errors_fall_up_the_ladder(ring, full):
-    """Against all nodes on the same mesh; bounds about twice what was found on this motion."""
-    reference = envelope(full)
+@pytest.mark.parametrize(
+    ("slides", "bounds"), [(False, (2e-5, 0.005, 0.02)), (True, (2e-5, 0.08, 0.09))]
+)
+def test_errors_fall_up_the_ladder(ring, slides, bounds):
+    """Against all nodes on the same mesh; bounds about twice what was found on this motion.
+
+    Where joints slide, edges that are pressed little slide first. Rungs that know of a joint's
+    two ends alone see less of that, and err by 0.04 instead of 0.002 and 0.007.
+    """
+    structure = ring if slides else glued(ring)
+    reference = envelope(af.build(structure, cells=(4, 4)))
     off = {
-        rung: np.abs(envelope(af.build(ring, fidelity=rung)) - reference).max()
+        rung: np.abs(envelope(af.build(structure, fidelity=rung)) - reference).max()
         for rung in ("rigid", "faces", "condensed")
     }
-    assert off["condensed"] < 2e-5 < off["faces"] < off["rigid"] < 0.02
-    assert off["faces"] < 0.005
+    assert off["condensed"] < off["faces"] < off["rigid"]
+    assert off["condensed"] < bounds[0] < off["faces"] < bounds[1]
+    assert off["rigid"] < bounds[2]
 
 
 SCHEMES = [
@@ -145,10 +154,11 @@ def test_damping_on_the_blocks_alone(ring, scheme, method):
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-def test_rungs_may_differ_from_block_to_block(ring, full):
-    mixed = af.build(ring, fidelity={"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"})
+def test_rungs_may_differ_from_block_to_block(ring):
+    rungs, structure = {"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"}, glued(ring)
+    mixed = af.build(structure, fidelity=rungs)
     assert mixed.size == 15 * 6 + 50 + 3
-    off = np.abs(envelope(mixed) - envelope(full)).max()
+    off = np.abs(envelope(mixed) - envelope(af.build(structure, cells=(4, 4)))).max()
     assert off < 0.003
     with pytest.raises(af.InvalidInput, match="no blocks or parts"):
         af.build(ring, fidelity={"voussoir 99": "full"})
@@ -209,21 +219,17 @@ def test_joint_forces_integrate_the_traction(rule):
 
 
 def test_exact_facets_are_the_limit_of_quadrature(ring):
-    """On one mesh, rules with more and more points approach the closed form."""
-    exact = af.dead_load(af.build(ring, fidelity="rigid", quadrature="exact")).joints[
-        "eccentricity"
-    ]
-    off = [
-        float(
-            abs(
-                af.dead_load(af.build(ring, fidelity="rigid", points=n, cells=(8, 1))).joints[
-                    "eccentricity"
-                ]
-                - exact
-            ).max()
-        )
-        for n in (2, 4, 8)
-    ]
+    """On one mesh, rules with more and more points approach the closed form.
+
+    Of joints that hold: where they slide, exact facets carry shear at their ends alone.
+    """
+
+    def dead(**given):
+        model = af.build(glued(ring), fidelity="rigid", **given)
+        return af.dead_load(model).joints["eccentricity"].values
+
+    exact = dead(quadrature="exact")
+    off = [np.abs(dead(points=n, cells=(8, 1)) - exact).max() for n in (2, 4, 8)]
     assert off[2] < off[1] < off[0]
     assert off[2] < 1e-4
 
