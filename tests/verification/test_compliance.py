@@ -53,7 +53,7 @@ def filled():
 def test_history_is_that_of_snes(filled, rule, joints, scheme):
     """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too.
 
-    A few steps in which exact facets slide do not settle (8 of 120 were found), and are left to SNES.
+    A few steps in which exact facets slide, 8 of 120, do not settle and are left to SNES.
     """
     structure = filled if scheme == CONSERVING else glued(filled)
     model = af.build(structure, quadrature=rule, cells=(2, 2))
