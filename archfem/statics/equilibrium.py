@@ -158,7 +158,7 @@ def _followed(found: Equilibrium, model: Model) -> Array:
     ahead = before.moved(before.supports + part * moved).remembering(before.memory)
     change = (ahead.force(q) - before.force(q)) / part
     try:
-        followed = q - splu(before.tangent(q).tocsc()).solve(change)
+        followed: Array = q - splu(before.tangent(q).tocsc()).solve(change)
     except RuntimeError:  # the tangent is singular
         return q
     return followed
