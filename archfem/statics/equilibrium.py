@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 import xarray as xr
+from scipy.sparse.linalg import splu
 
 from archfem.arguments import instance
 from archfem.arrays import Array
@@ -19,6 +20,9 @@ from archfem.models.model import Model, check_model
 from archfem.models.unfinished import Unfinished
 from archfem.statics.newton import Newton, Solved, Solver, magnitude
 from archfem.statics.relaxation import relaxed
+
+A_LITTLE = 1e-9
+"""Motion of supports by which the force that they exert on a structure is found [m]."""
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -202,7 +206,7 @@ def _grown(
         model, load = at(target)
         model = model.remembering(found.model.memory)
         try:
-            model, solved = find(solver, model, load, found.q)
+            model, solved = find(solver, model, load, _followed(found, model))
         except DidNotConverge as error:
             step, find = step / 2.0, _found
             if step >= SMALLEST_STEP:
@@ -231,3 +235,19 @@ def _found_or_crept(
         return _found(solver, model, load, start)
     except DidNotConverge:
         return relaxed(solver, model, load, start)
+
+
+def _followed(found: Equilibrium, model: Model) -> Array:
+    """Coordinates if the structure follows its supports, with its joints as they are now (n,)."""
+    before, q = found.model, found.q
+    moved = model.supports - before.supports
+    if not moved.any():
+        return q
+    part = A_LITTLE / np.abs(moved).max()
+    ahead = before.moved(before.supports + part * moved).remembering(before.memory)
+    change = (ahead.force(q) - before.force(q)) / part
+    try:
+        followed: Array = q - splu(before.tangent(q).tocsc()).solve(change)
+    except RuntimeError:  # the tangent is singular
+        return q
+    return followed

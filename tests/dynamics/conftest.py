@@ -18,21 +18,23 @@ def motion():
 @pytest.fixture(scope="session")
 def run(model, motion):
     damping, record = af.Rayleigh(0.05, (8.0, 16.0)), af.Record(fields_every=50)
-    return af.time_history(model, motion, damping=damping, record=record)
+    return af.time_history(model, motion, dt=0.005, damping=damping, record=record)
 
 
 @pytest.fixture(scope="session")
 def breaking():
     """A function that gives a stepper whose attempts fail where `breaks(time, dt)` says so."""
 
-    def stepper(model, motion, breaks):
-        equation = af.dynamics.Equation(model, motion, af.Rayleigh(0.05, (8.0, 16.0)))
+    def stepper(model, motion, breaks, scheme=None):
+        damping = af.Rayleigh(0.05, (8.0, 16.0))
+        equation = af.dynamics.Equation(model, motion, damping, scheme or af.dynamics.Conserving())
         real = af.dynamics.Exact(equation)
+        tried = real.averaged if equation.conserving else real.attempt
 
         def attempt(state, dt):
             if breaks(state.time, dt):
                 raise af.DidNotConverge("made to fail")
-            return real.attempt(state, dt)
+            return tried(state, dt)
 
         return af.dynamics.Stepper(equation, exact=af.dynamics.Exact(equation, attempts=attempt))
 

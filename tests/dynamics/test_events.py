@@ -84,9 +84,9 @@ def test_a_run_ends_when_its_blocks_can_move():
     model = af.build(ring(), fidelity="rigid")
     motion = af.Motion.synthetic(duration=3.0, pga=6.0, seed=2)
     damping = af.Rayleigh(0.05, (8.0, 16.0))
-    whole = af.time_history(model, motion, damping=damping)
+    whole = af.time_history(model, motion, dt=0.005, damping=damping)
     expected = whole.verified
-    halted = af.time_history(model, motion, damping=damping, until=MovingMechanism())
+    halted = af.time_history(model, motion, dt=0.005, damping=damping, until=MovingMechanism())
     assert halted.time[-1] == pytest.approx(expected.moved.time)
     assert "a mechanism that moves" in halted.outcome
     assert str(expected) in halted.outcome

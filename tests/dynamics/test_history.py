@@ -72,7 +72,7 @@ def test_a_history_knows_what_can_move(run, model, motion, tmp_path):
     assert before == ["none"] * 40 + ["local"]
     assert run.verified.moved.blocks
     assert run.verified is run.verified
-    calm = af.time_history(model, motion.scaled(0.1), damping=DAMPING)
+    calm = af.time_history(model, motion.scaled(0.1), dt=0.005, damping=DAMPING)
     assert calm.verified is None
     assert calm.mechanism is None
 

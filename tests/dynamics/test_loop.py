@@ -21,7 +21,6 @@ class SlidingSystem(NamedTuple):
 
     mass: float
     dt: float
-    slid: np.ndarray
 
 
 class Sliding:
@@ -32,7 +31,6 @@ class Sliding:
 
     def __init__(self, equation):
         self.mass = equation.model.mass[0, 0]
-        self.slid = np.zeros(1)
 
     @classmethod
     def of(cls, equation):
@@ -45,7 +43,7 @@ class Sliding:
         return np.hstack([vectors, np.zeros((3, 2))])
 
     def system(self, dt):
-        return SlidingSystem(self.mass, dt, self.slid)
+        return SlidingSystem(self.mass, dt)
 
 
 def slides(system):
@@ -53,9 +51,10 @@ def slides(system):
 
 
 @overload(begin)
-def _begin(system, state):
+def _begin(system, state, memory):
     if slides(system):
-        return lambda system, state: np.zeros(1)  # the friction that acts
+        # the friction that acts, and how far the block has slid, there and back
+        return lambda system, state, memory: np.array([0.0, memory[0]])
 
 
 @overload(settle)
@@ -70,17 +69,19 @@ def _settle(system, kept, step, states, ground):
             after[0, 0] = before[0, 0] + moved
             after[2, 0] = (after[1, 0] - before[1, 0]) / dt
             kept[0] = -system.mass * (after[2, 0] + ground[0])
-            system.slid[0] += abs(moved)
+            kept[1] += abs(moved)
             return 1
 
         return slide
 
 
 @overload(measure)
-def _measure(system, kept, step, states, ground, resultants, energy):
+def _measure(system, kept, step, states, ground, results, memory):
     if slides(system):
 
-        def measured(system, kept, step, states, ground, resultants, energy):
+        def measured(system, kept, step, states, ground, results, memory):
+            resultants, energy = results
+            memory[:] = kept[1]
             moved = states[1, 0, 0] - states[0, 0, 0]
             resultants[0, 0] = system.mass * GRAVITY
             resultants[0, 1] = kept[0]
@@ -107,10 +108,13 @@ def test_a_strategy_with_memory_and_friction_is_stepped_by_the_same_loop():
     assert len(run.time) > 10 * BATCH
     assert run.dataset.attrs["method"] == "sliding"
     assert run.dataset["last_q"].values[0] == pytest.approx(slid, rel=1e-3)
-    assert sliding.slid[0] == pytest.approx(slid, rel=1e-3)
     assert np.abs(run.joints["V"]).max() <= FRICTION * run.joints["N"].max() * (1.0 + 1e-9)
     lost = FRICTION * sliding.mass * GRAVITY * slid
     assert abs(run.dataset["energy_drift"].values[-1]) < 0.01 * lost
+    *_, last = stepper.batches(equation.at_rest(af.dead_load(model).q), dt, ground.size * dt - dt)
+    state = last.state(len(last.times) - 1)
+    assert state.time == pytest.approx(1.0)
+    assert state.memory == pytest.approx(slid, rel=1e-3)  # through all batches, at each point
 
 
 def test_compiled_code_older_than_any_source_is_forgotten(tmp_path):

@@ -30,14 +30,14 @@ def test_the_first_record_is_the_dead_load(run, model):
 
 def test_fields_are_kept_only_on_demand(model, motion):
     short = af.time_history(
-        model, motion.cut(0.0, 0.5), damping=DAMPING, record=af.Record(every=10)
+        model, motion.cut(0.0, 0.5), dt=0.005, damping=DAMPING, record=af.Record(every=10)
     )
     assert "q" not in short.dataset
     assert short.joints.sizes["time"] == 11
 
 
 def test_every_third_step_is_the_same_run(run, model, motion):
-    sparse = af.time_history(model, motion, damping=DAMPING, record=af.Record(every=3))
+    sparse = af.time_history(model, motion, dt=0.005, damping=DAMPING, record=af.Record(every=3))
     assert sparse.joints["M"].values == pytest.approx(run.joints["M"].values[::3], abs=1e-6)
 
 
@@ -51,8 +51,8 @@ def test_the_step_that_ends_a_run_is_kept(model, motion, every):
 
 
 def test_effort_between_records_is_kept(model):
-    every = af.time_history(model, MOTION, damping=DAMPING)
-    third = af.time_history(model, MOTION, damping=DAMPING, record=af.Record(every=4))
+    every = af.time_history(model, MOTION, dt=0.005, damping=DAMPING)
+    third = af.time_history(model, MOTION, dt=0.005, damping=DAMPING, record=af.Record(every=4))
     assert third.dataset["iterations"].sum() == every.dataset["iterations"].sum()
     drift = every.dataset["energy_drift"].values[::4]
     assert third.dataset["energy_drift"].values == pytest.approx(drift, rel=1e-12)

@@ -2,8 +2,10 @@
 
 import time
 
+import numba
 import numpy as np
 import pytest
+from glued import glued
 from scipy import sparse
 
 import archfem as af
@@ -14,8 +16,8 @@ from archfem.dynamics.stepping.joint_law import Law
 from archfem.dynamics.stepping.loop import advance
 from archfem.dynamics.stepping.modal import Modal
 from archfem.dynamics.stepping.newmark import follow, numbers_of
-from archfem.dynamics.stepping.open_points import release
 from archfem.dynamics.stepping.panels import backward, factorised, forward
+from archfem.dynamics.stepping.small_problem import release
 from archfem.dynamics.stepping.sparse import Sparse
 from archfem.joints.facets import Facets
 from archfem.joints.points import JointPoints
@@ -23,6 +25,13 @@ from archfem.joints.springs import Springs
 
 TIGHT = af.statics.Newton(tolerance=1e-13)
 STRONG = af.Motion.synthetic(duration=4.0, pga=5.0, seed=5).cut(1.0, 1.6)
+NEWMARK, CONSERVING = af.dynamics.Newmark(), af.dynamics.Conserving()
+
+
+@numba.njit
+def released(law, start, rows, compliance, force, enough):
+    """`release` by the type of the law, which is chosen where it is compiled."""
+    return release(law, start, rows, compliance, force, enough)
 
 
 @pytest.fixture(scope="module")
@@ -34,22 +43,35 @@ def filled():
 
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
 @pytest.mark.parametrize(
-    ("joints", "scheme"), [("closed", None), ("initial", af.HHT(-0.1)), ("none", af.HHT(-0.2))]
+    ("joints", "scheme"),
+    [
+        ("closed", CONSERVING),
+        ("closed", NEWMARK),
+        ("initial", af.HHT(-0.1)),
+        ("none", CONSERVING),
+        ("none", af.HHT(-0.2)),
+    ],
 )
 def test_history_is_that_of_snes(filled, rule, joints, scheme):
-    """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too."""
-    model = af.build(filled, quadrature=rule, cells=(2, 2))
+    """To 1e-8 of the largest, with a sixth of the joint points open, and the energies too.
+
+    A few steps in which exact facets slide, 8 of 120, do not settle and are left to SNES.
+    """
+    structure = filled if scheme == CONSERVING else glued(filled)
+    model = af.build(structure, quadrature=rule, cells=(2, 2))
     given = {
         "start": af.dead_load(model, TIGHT),
         "damping": af.Rayleigh(0.05, (4.0, 20.0), joints),
         "scheme": scheme,
         "newton": TIGHT,
+        "dt": 0.005,
     }
     slow, fast = (
         af.time_history(model, STRONG, method=method, **given) for method in ("snes", "compliance")
     )
     assert fast.dataset.attrs["method"] == "compliance"
-    assert fast.dataset.attrs["fallback_steps"] == 0
+    hard = rule == "exact" and scheme == CONSERVING
+    assert fast.dataset.attrs["fallback_steps"] <= (0.1 * len(fast.time) if hard else 0)
     last = model.operator.openings(fast.dataset["last_q"].values)
     assert np.mean(last > 0.0) > 1.0 / 6.0
     for key in ("N", "V", "M"):
@@ -63,17 +85,17 @@ def test_steps_that_do_not_settle_are_left_to_snes(filled):
     model = af.build(filled, fidelity="rigid")
     equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (4.0, 20.0)))
 
-    def impatient(series, results, ground, system):
-        count = advance(series, results, ground, system)
+    def impatient(series, memories, results, ground, system):
+        count = advance(series, memories, results, ground, system)
         many = np.flatnonzero(results[1][:count] > 4)
         return int(many[0]) if len(many) else count
 
     solves = af.dynamics.Exact(equation, TIGHT)
-    exact = af.time_history(
-        model, STRONG, method=af.dynamics.Stepper(equation, exact=solves), newton=TIGHT
-    )
+    given = {"newton": TIGHT, "dt": 0.005}
+    alone = af.dynamics.Stepper(equation, exact=solves)
+    exact = af.time_history(model, STRONG, method=alone, **given)
     stepper = af.dynamics.Stepper(equation, Sparse.of(equation), exact=solves, advance=impatient)
-    run = af.time_history(model, STRONG, method=stepper, newton=TIGHT)
+    run = af.time_history(model, STRONG, method=stepper, **given)
     assert run.dataset.attrs["fallback_steps"] > 3
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
@@ -94,24 +116,25 @@ class Laborious(Sparse):
 
 
 def test_the_fastest_strategy_is_taken_and_remembered(ring):
-    model = af.build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
-    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)))
+    model = af.build(glued(ring), fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)), NEWMARK)
     start, dt = equation.at_rest(af.dead_load(model).q), STRONG.duration / SHORTEST
     ways = (Laborious, Banded)
     assert isinstance(chosen(equation, start, dt, ways), Banded)
     assert Laborious.tries == 1
-    assert isinstance(
-        chosen(af.dynamics.Equation(model, STRONG, equation.damping), start, dt, ways), Banded
-    )
+    again = af.dynamics.Equation(model, STRONG, equation.damping, NEWMARK)
+    assert isinstance(chosen(again, start, dt, ways), Banded)
     assert Laborious.tries == 1  # the motion may be another
     assert isinstance(chosen(equation, start, 0.99 * dt, ways), Banded)
     assert Laborious.tries == 2  # the step may not
 
 
 def test_short_runs_take_the_first_that_applies(ring):
-    model = af.build(ring, fidelity="rigid")
-    equation = af.dynamics.Equation(model, STRONG)
+    model = af.build(glued(ring), fidelity="rigid")
+    equation = af.dynamics.Equation(model, STRONG, scheme=NEWMARK)
     start = equation.at_rest(af.dead_load(model).q)
+    averaged = af.dynamics.Equation(model, STRONG)
+    assert isinstance(chosen(averaged, start, 0.005, (Banded, Sparse)), Sparse)
     assert isinstance(chosen(equation, start, 0.005, (Banded, Sparse)), Banded)
     undamped = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0), "none"))
     assert isinstance(chosen(undamped, start, 0.005, (Modal, Sparse)), Sparse)
@@ -121,8 +144,8 @@ def test_short_runs_take_the_first_that_applies(ring):
 
 def test_what_is_timed_does_not_settle(ring):
     """A strategy that gives up steps about the peak is not taken, whatever it costs."""
-    model = af.build(ring, fidelity="rigid", cells=(1, 1), quadrature="exact")
-    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)))
+    model = af.build(glued(ring), fidelity="rigid", cells=(1, 1), quadrature="exact")
+    equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)), NEWMARK)
     start, dt = equation.at_rest(af.dead_load(model).q), STRONG.duration / SHORTEST
 
     class Indefinite(Banded):
@@ -133,11 +156,14 @@ def test_what_is_timed_does_not_settle(ring):
     assert isinstance(chosen(equation, start, dt, (Indefinite, Sparse)), Sparse)
 
 
-def test_supports_that_have_moved_are_refused(ring):
-    model = af.build(ring, fidelity="rigid")
+def test_supports_that_have_moved_are_refused_by_schemes_at_an_instant(ring):
+    model = af.build(glued(ring), fidelity="rigid")
     moved = model.settled(af.Settlement(0, (0.0, -1e-3, 0.0)))
+    equation = af.dynamics.Equation(moved, STRONG, scheme=NEWMARK)
     with pytest.raises(af.InvalidInput, match="supports have not moved"):
-        stepper_for("compliance", af.dynamics.Equation(moved, STRONG), None, 0.005)
+        stepper_for("compliance", equation, None, 0.005)
+    averaged = af.dynamics.Equation(moved, STRONG)
+    assert stepper_for("compliance", averaged, None, 0.005).name == "compliance"
 
 
 def laplacian(side):
@@ -192,8 +218,9 @@ def test_matrix_that_is_not_definite_is_refused():
 def test_released_forces_leave_no_tension(rule):
     """Against the joint law as SNES has it: closed stiffness less λ is the law's own force."""
     rng = np.random.default_rng(3)
+    one = np.ones(40)
     points = JointPoints(
-        np.zeros(40, dtype=int), np.zeros(40), np.full(40, 0.5), np.full(40, 2.0), np.ones(40), 1
+        np.zeros(40, int), 0.0 * one, 0.5 * one, 2.0 * one, one, np.inf * one, 0.0 * one, 1
     )
     facets = rule == "facets"
     law = Facets(points) if facets else Springs(points)
@@ -203,7 +230,7 @@ def test_released_forces_leave_no_tension(rule):
     start, force = rng.standard_normal(40), np.zeros(40)
     rows, stiffness = np.arange(40), np.full(40, 2.0 if facets else 1.0)
     compiled = Law(facets, stiffness, points.arm, points.joint)
-    passes = release(start, rows, compliance, compiled, force, 1e-13)
+    passes = released(compiled, start, rows, compliance, force, 1e-13)
     gap = start + compliance @ force
     first, second = law.entries
     closed = sparse.csr_matrix((law.stiffness(np.full(40, -1.0)), (first, second)))
@@ -220,7 +247,7 @@ def test_a_facet_that_hardly_opens_is_released(others):
     start, force, rows = np.full(size, -1.0), np.zeros(size), np.arange(size)
     for part in np.geomspace(1e-9, 1e-5, 200):
         start[0], start[1] = -1.0, part / (1.0 - part)
-        assert release(start, rows, 0.1 * np.eye(size), law, force, 1e-13) > 0
+        assert released(law, start, rows, 0.1 * np.eye(size), force, 1e-13) > 0
         assert force == pytest.approx(0.0, abs=2.0 * part)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from glued import glued
 
 import archfem as af
 from archfem.joints.facets import Facets
@@ -12,11 +13,12 @@ from archfem.joints.springs import Springs
 
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.5, seed=5)
 TIGHT = af.statics.Newton(tolerance=1e-13)
+NEWMARK, CONSERVING = af.dynamics.Newmark(), af.dynamics.Conserving()
 
 
 def envelope(model, **given):
     """Largest |e| of every joint over a run."""
-    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), **given}
+    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), "dt": 0.005, **given}
     run = af.time_history(model, MOTION, **given)
     return abs(run.joints["eccentricity"]).max("time").values
 
@@ -54,52 +56,69 @@ def test_monolithic_is_full(ring, rule):
 
 
 def test_monolithic_history_is_that_of_full(ring):
-    short = MOTION.cut(1.0, 1.2)
-    runs = [
-        af.time_history(
-            af.build(ring, cells=(2, 2), fidelity=rung), short, newton=TIGHT, method="snes"
-        ).joints["M"]
-        for rung in ("full", "monolithic")
-    ]
+    short, given = MOTION.cut(1.0, 1.2), {"newton": TIGHT, "method": "snes", "dt": 0.005}
+    runs = []
+    for rung in ("full", "monolithic"):
+        model = af.build(ring, cells=(2, 2), fidelity=rung, quadrature="lobatto")
+        runs.append(af.time_history(model, short, **given).joints["M"])
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-def test_errors_fall_up_the_ladder(ring, full):
-    """Against all nodes on the same mesh; bounds about twice what was found on this motion."""
-    reference = envelope(full)
+@pytest.mark.parametrize(
+    ("slides", "bounds"), [(False, (2e-5, 0.005, 0.02)), (True, (2e-5, 0.08, 0.09))]
+)
+def test_errors_fall_up_the_ladder(ring, slides, bounds):
+    """Against all nodes on the same mesh; bounds about twice what was found on this motion.
+
+    Where joints slide, edges that are pressed little slide first. Rungs that know of a joint's
+    two ends alone see less of that, and err by 0.04 instead of 0.002 and 0.007.
+    """
+    structure = ring if slides else glued(ring)
+    reference = envelope(af.build(structure, cells=(4, 4)))
     off = {
-        rung: np.abs(envelope(af.build(ring, fidelity=rung)) - reference).max()
+        rung: np.abs(envelope(af.build(structure, fidelity=rung)) - reference).max()
         for rung in ("rigid", "faces", "condensed")
     }
-    assert off["condensed"] < 2e-5 < off["faces"] < off["rigid"] < 0.02
-    assert off["faces"] < 0.005
+    assert off["condensed"] < off["faces"] < off["rigid"]
+    assert off["condensed"] < bounds[0] < off["faces"] < bounds[1]
+    assert off["rigid"] < bounds[2]
 
 
+SCHEMES = [
+    ("closed", CONSERVING),
+    ("initial", CONSERVING),
+    ("closed", NEWMARK),
+    ("initial", af.HHT(-0.1)),
+]
+
+
+@pytest.mark.parametrize(("joints", "scheme"), SCHEMES)
 @pytest.mark.parametrize("rule", ["nodal", "lobatto", "gauss", "exact"])
 @pytest.mark.parametrize("rung", ["rigid", "faces", "condensed"])
-def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule):
-    """To 1e-8 of the largest, joints opening and closing, either damping, Newmark and HHT."""
-    model = af.build(ring, fidelity=rung, quadrature=rule, cells=(2, 2))
-    dead = af.dead_load(model, TIGHT)
+def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, scheme):
+    """To 1e-8 of the largest, joints opening and closing, and sliding where the scheme allows."""
+    slides = scheme == CONSERVING
+    structure = ring if slides else glued(ring)
+    model = af.build(structure, fidelity=rung, quadrature=rule, cells=(2, 2))
+    given = {
+        "start": af.dead_load(model, TIGHT),
+        "damping": af.Rayleigh(0.05, (8.0, 16.0), joints),
+        "scheme": scheme,
+        "newton": TIGHT,
+        "dt": 0.005,
+    }
     short = MOTION.cut(0.8, 2.3)
-    for joints, scheme in (("closed", None), ("initial", af.HHT(-0.1))):
-        given = {
-            "start": dead,
-            "damping": af.Rayleigh(0.05, (8.0, 16.0), joints),
-            "scheme": scheme,
-            "newton": TIGHT,
-        }
-        slow = af.time_history(model, short, method="snes", **given)
-        for method in ("contact", "chain", "compliance"):
-            fast = af.time_history(model, short, method=method, **given)
-            assert fast.dataset.attrs["method"] == method
-            assert fast.dataset.attrs["fallback_steps"] == 0
-            assert fast.dataset["iterations"].max() > 1  # points have opened
-            for key in ("N", "V", "M"):
-                off = np.abs(fast.joints[key] - slow.joints[key]).max()
-                assert off < 1e-8 * np.abs(slow.joints[key]).max()
-            drift = fast.dataset["energy_drift"].values - slow.dataset["energy_drift"].values
-            assert np.abs(drift).max() < 1e-6  # of a joule, where a hundred are exchanged
+    slow = af.time_history(model, short, method="snes", **given)
+    for method in ("contact", "compliance", *(() if slides else ("chain",))):
+        fast = af.time_history(model, short, method=method, **given)
+        assert fast.dataset.attrs["method"] == method
+        assert fast.dataset.attrs["fallback_steps"] == 0
+        assert fast.dataset["iterations"].max() > 1  # points have opened
+        for key in ("N", "V", "M"):
+            off = np.abs(fast.joints[key] - slow.joints[key]).max()
+            assert off < 1e-8 * np.abs(slow.joints[key]).max()
+        drift = fast.dataset["energy_drift"].values - slow.dataset["energy_drift"].values
+        assert np.abs(drift).max() < 1e-6  # of a joule, where a hundred are exchanged
 
 
 @pytest.mark.parametrize("stones", [2, 16, 34])
@@ -115,26 +134,33 @@ def test_a_joint_at_the_crown(stones, rung):
 def test_contact_stepper_refuses_what_does_not_fall_into_modes(ring, full):
     with pytest.raises(af.InvalidInput, match="use method='snes'"):
         af.time_history(full, MOTION, damping=af.Rayleigh(0.05, (8, 16), "none"), method="contact")
-    slow = af.build(ring, cells=(1, 1), fidelity="monolithic")
-    with pytest.raises(af.InvalidInput, match="bandwidth up to"):
-        af.time_history(slow, MOTION, method="chain")
+    slow = af.build(glued(ring), cells=(1, 1), fidelity="monolithic")
+    for model, scheme in ((slow, NEWMARK), (full, CONSERVING)):
+        with pytest.raises(af.InvalidInput, match="bandwidth up to 64 and Newmark's"):
+            af.time_history(model, MOTION, scheme=scheme, method="chain")
     with pytest.raises(af.InvalidInput, match="method 'fast' is not known"):
         af.time_history(full, MOTION, method="fast")
 
 
-@pytest.mark.parametrize("method", ["chain", "compliance"])
-def test_damping_on_the_blocks_alone(ring, method):
-    model = af.build(ring, fidelity="faces", cells=(2, 2), quadrature="nodal")
-    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0), "none"), "newton": TIGHT}
+@pytest.mark.parametrize(
+    ("scheme", "method"),
+    [(NEWMARK, "chain"), (NEWMARK, "compliance"), (CONSERVING, "compliance")],
+)
+def test_damping_on_the_blocks_alone(ring, scheme, method):
+    structure = ring if scheme == CONSERVING else glued(ring)
+    model = af.build(structure, fidelity="faces", cells=(2, 2), quadrature="nodal")
+    damping = af.Rayleigh(0.05, (8.0, 16.0), "none")
+    given = {"damping": damping, "scheme": scheme, "newton": TIGHT, "dt": 0.005}
     short = MOTION.cut(0.8, 1.6)
     runs = [af.time_history(model, short, method=m, **given).joints["M"] for m in ("snes", method)]
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-def test_rungs_may_differ_from_block_to_block(ring, full):
-    mixed = af.build(ring, fidelity={"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"})
+def test_rungs_may_differ_from_block_to_block(ring):
+    rungs, structure = {"voussoir 5": "full", "voussoir 9": "rigid", "rest": "faces"}, glued(ring)
+    mixed = af.build(structure, fidelity=rungs)
     assert mixed.size == 15 * 6 + 50 + 3
-    off = np.abs(envelope(mixed) - envelope(full)).max()
+    off = np.abs(envelope(mixed) - envelope(af.build(structure, cells=(4, 4)))).max()
     assert off < 0.003
     with pytest.raises(af.InvalidInput, match="no blocks or parts"):
         af.build(ring, fidelity={"voussoir 99": "full"})
@@ -179,6 +205,8 @@ def test_joint_forces_integrate_the_traction(rule):
         np.array([0.25, 0.25]),
         np.full(2, 2e9),
         np.full(2, 1e9),
+        np.full(2, np.inf),
+        np.zeros(2),
         1,
     )
     law = Facets(points) if rule == "exact" else Springs(points)
@@ -193,21 +221,17 @@ def test_joint_forces_integrate_the_traction(rule):
 
 
 def test_exact_facets_are_the_limit_of_quadrature(ring):
-    """On one mesh, rules with more and more points approach the closed form."""
-    exact = af.dead_load(af.build(ring, fidelity="rigid", quadrature="exact")).joints[
-        "eccentricity"
-    ]
-    off = [
-        float(
-            abs(
-                af.dead_load(af.build(ring, fidelity="rigid", points=n, cells=(8, 1))).joints[
-                    "eccentricity"
-                ]
-                - exact
-            ).max()
-        )
-        for n in (2, 4, 8)
-    ]
+    """On one mesh, rules with more and more points approach the closed form.
+
+    Of joints that hold: where they slide, exact facets carry shear at their ends alone.
+    """
+
+    def dead(**given):
+        model = af.build(glued(ring), fidelity="rigid", **given)
+        return af.dead_load(model).joints["eccentricity"].values
+
+    exact = dead(quadrature="exact")
+    off = [np.abs(dead(points=n, cells=(8, 1)) - exact).max() for n in (2, 4, 8)]
     assert off[2] < off[1] < off[0]
     assert off[2] < 1e-4
 

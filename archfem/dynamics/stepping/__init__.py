@@ -3,4 +3,27 @@
 `equation` is what is solved, `exact` solves it step by step by SNES, `stepper` takes many steps at
 a time in the compiled `loop` by a strategy: `modal`, `banded` or `sparse`; `choice` says which.
 Start reading at `stepper`, then `strategy` for what a further one has to provide.
+
+    equation         of motion, and how time is discretised
+    exact            every scheme, step by step by SNES
+    stepper          many steps at a time by a strategy, by SNES what that gives up
+    pace             steps of lengths of their own, as an error allows
+    strategy         what a strategy has to provide
+    choice           which strategy takes a run
+    loop             the one compiled loop over steps
+    newmark          the formulas of all schemes, compiled
+    linear           a step of what is linear but for its joints, written at an instant
+    passing          the same with the means over a step, of joints that open, close and slide
+    joint_law        what joints do not carry at an instant, compiled
+    path_law         the same on the mean of a step
+    small_problem    of the joint points that open or slide: what solves it
+    open_points      its solution at an instant
+    sliding_points   its solution over a step
+    modal            the strategy in the modes of the closed structure
+    banded           the strategy for chains of blocks, with a banded factor
+    band             that factor
+    sparse           the strategy for large structures, with one sparse factor
+    panels           that factor, dense block by dense block
+    elimination      the order in which its unknowns are eliminated
+    sparse_rows      compiled products of matrices and vectors
 """

@@ -102,7 +102,7 @@ class Banded(Reordered):
             + numbers.rate * equation.rest
         ).tocsr()
         band = banded(without[order][:, order], self._width)
-        points = (len(linear.law.stiffness), 2)
+        points = (len(joints.points.arm), 2)
         return BandedSystem(
             linear,
             band,

@@ -89,8 +89,8 @@ def stepper_for(
                 f"the {method} stepper does not apply to a '{equation.model.fidelity}' model of "
                 f"{equation.model.size} coordinates under this damping: contact needs at most "
                 f"{LARGEST} of them and damping on closed or initial joints, chain a bandwidth up "
-                f"to {WIDEST}, and all three joints whose supports have not moved; use "
-                "method='snes'"
+                f"to {WIDEST} and Newmark's method or HHT, with which all three need joints whose "
+                "supports have not moved; no monolithic model has one; use method='snes'"
             )
     return Stepper(equation, strategy, exact=Exact(equation, newton))
 

@@ -88,6 +88,9 @@ class Exact:
             state: from which it goes.
             dt: its length [s].
 
+        Returns:
+            The step, with the resultants at its end.
+
         Raises:
             DidNotConverge: there was no equilibrium to be found.
         """
@@ -114,8 +117,8 @@ class Exact:
         solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
         new = end(solved.q)
         ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
-        before, after = (state.q, state.velocity), (new.q, new.velocity)
-        energy = equation.meter.step(before, after, ground)
+        ends = (state.q, state.velocity), (new.q, new.velocity)
+        energy = equation.meter.step(*ends, ground)
         resultants = equation.model.resultants(equation.contact(new))
         return Step(new, resultants, solved.iterations, dt, energy)
 
@@ -125,6 +128,9 @@ class Exact:
         Args:
             state: from which it goes.
             dt: its length [s].
+
+        Returns:
+            The step, with the resultants on its mean.
 
         Raises:
             DidNotConverge: there was no equilibrium to be found.

@@ -169,7 +169,8 @@ def law_type(system: types.Type) -> types.Type | None:
     if not isinstance(system, types.NamedTuple) or "linear" not in system.fields:
         return None
     linear = system.types[system.fields.index("linear")]
-    return linear.types[linear.fields.index("law")]
+    law: types.Type = linear.types[linear.fields.index("law")]
+    return law
 
 
 @overload(begin)

@@ -14,6 +14,8 @@ lie between 0 and 1, few of them near 0, so conjugate gradients take a few produ
 from the gaps of the last pass, and those of the first pass from the λ of the last step.
 """
 
+from typing import Any
+
 import numba
 import numpy as np
 from numba.extending import overload
@@ -60,11 +62,11 @@ def _largest(law, gap):  # type: ignore
     return None
 
 
-def is_law(law):  # type: ignore
+def is_law(law: Any) -> bool:
     """Return whether this is the type of a law at an instant.
 
     Args:
-        law: as numba types it.
+        law: as numba types it, or None where there is none.
     """
     return getattr(law, "instance_class", None) is Law
 

@@ -136,12 +136,13 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
 
 def _room(points: int, rows: int) -> Work:
     """Room for what joints do over a step."""
-    one, two = (lambda: np.zeros(points)), (lambda: np.zeros((points, 2)))
-    return Work(one(), one(), np.zeros(rows), two(), one(), one(), two(), one())
+    normal, area, shear, slid, lost = np.zeros((5, points))
+    rate, rates = np.zeros((2, points, 2))
+    return Work(normal, area, np.zeros(rows), rate, shear, slid, rates, lost)
 
 
 def _slips(joints: JointOperator) -> tuple[Any, Any]:
-    """Points whose slips differ from those of all before them on the joint; whose each point has."""
+    """Points whose slips differ from those before them on the joint; whose each point has."""
     kept: list[int] = []
     group = np.empty(len(joints.points.arm), int)
     for joint in range(joints.points.count):

@@ -11,6 +11,8 @@ stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (
 they are many. Where the passes go round in a circle of holding and sliding they go less far.
 """
 
+from typing import Any
+
 import numba
 import numpy as np
 from numba.extending import overload
@@ -44,11 +46,11 @@ ROUGH = 1e-3
 """Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
 
 
-def is_path_law(law):  # type: ignore
+def is_path_law(law: Any) -> bool:
     """Return whether this is the type of a law over a step.
 
     Args:
-        law: as numba types it.
+        law: as numba types it, or None where there is none.
     """
     return getattr(law, "instance_class", None) is PathLaw
 
@@ -165,7 +167,7 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
 @numba.njit(cache=True)
 def _taken(law, gaps, rows, local, wanted, entries):  # type: ignore
     """λ of the rows, and its derivatives as entries of a matrix; returns how many those are."""
-    (gap, z), (places, values), points = gaps, entries, len(law.group)
+    (gap, z), points = gaps, len(law.group)
     for k in range(len(rows)):
         gap[rows[k]] = z[k]
     count, facets, work = 0, law.still.facets, law.work

@@ -22,10 +22,10 @@ class Strategy(Protocol):
     `numba.extending.overload`) of the three functions that the loop calls: `begin` says what is
     carried from step to step, `settle` finds the state after a step, `measure` its resultants and
     energies. Nothing is presupposed of them: gaps need not be linear in the coordinates, and
-    joints may have memory, in an array of the system that `settle` writes. A step that `settle`
-    gives up must leave that memory as it was, since SNES takes the step instead; what the joints
-    remember is told after each step, so that a run can go on from any. Where all is linear but the
-    joints, overload `linear.solve` alone and give the system a field `linear`. To be chosen by "auto" it is listed in `choice.STRATEGIES`.
+    joints may have memory. `begin` is given what they remember, `measure` tells what they do after
+    each step, so that a run can go on from any, and SNES can take a step that `settle` gives up.
+    Where all is linear but the joints, overload `linear.solve` alone and give the system a field
+    `linear`. To be chosen by "auto" it is listed in `choice.STRATEGIES`.
 
     Attributes:
         name: as users give it.
