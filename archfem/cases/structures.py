@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from archfem.cases.settings import Table, checked, chosen
+from archfem.cases.settings import NumberOr, Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
 from archfem.masonry.shapes.bridges import bridge
@@ -93,7 +93,13 @@ FILL = {
 }
 PAVING = {"thickness": "m", "length": "m"}
 MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": "Pa"}
-CONTACT = {"normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "friction": "1"}
+CONTACT = {
+    "normal_stiffness": "Pa/m",
+    "shear_stiffness": "Pa/m",
+    "friction": NumberOr("1", {"none": None}),
+    "cohesion": "Pa",
+}
+"""A friction of "none" is that of a joint that never slides."""
 
 
 def planned(settings: Table, folder: Path = Path()) -> Structure:
