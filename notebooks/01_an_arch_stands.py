@@ -35,8 +35,9 @@ af.view.draw_structure(ring)
 #
 # Stones are elastic. A joint resists only what closes it: where the stones on its two sides have
 # come nearer by $\delta$ and slipped by $s$, it presses back with $t_n = k_n \max(\delta, 0)$ and,
-# while closed, holds with $t_s = k_s s$, until it slides at $|t_s| = \mu\, t_n$. The displacement $u$ may jump across joints, and is such
-# that for each small movement $v$ the work of the stresses, of the joints and of gravity balance:
+# while closed, holds with $t_s = k_s s$, until it slides at $|t_s| = \mu\, t_n$. The displacement
+# $u$ may jump across joints, and is such that for each small movement $v$ the work of the stresses,
+# of the joints and of gravity balance:
 #
 # $$ \int_\text{stones} \sigma(u) : \varepsilon(v)
 #  \;+\; \int_\text{joints} t_n(u)\, \delta(v) + t_s(u)\, s(v)

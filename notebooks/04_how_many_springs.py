@@ -28,7 +28,7 @@ import archfem as af
 # %% [markdown]
 # ## The structure
 #
-# The ring of the paper, loaded at both edges of its keystone until it fails. Its joints never slide.
+# The ring of the paper, loaded at both edges of its keystone until it fails; joints never slide.
 
 # %%
 ROUGH = replace(af.masonry.STONE_TO_STONE, friction=None)

@@ -22,7 +22,7 @@ LONGEST = 0.75
 """Length of the largest force beside the block, relative to the block."""
 
 NOTHING = 1e-12
-"""Part of the largest force up to which another is round-off, as of a joint that all but touches."""
+"""Part of the largest force up to which another is round-off, as where a joint barely touches."""
 
 WIDTH, PANEL, LINE = 9.6, 5.0, 0.18
 """Width of the page, height of its panels and of a line below them [inch]."""

@@ -79,7 +79,7 @@ def test_refusals_name_the_key(change, says):
 
 @pytest.mark.parametrize("scheme", ["newmark", "hht"])
 def test_schemes_that_follow_no_sliding_are_refused_where_joints_slide(scheme):
-    """Before the dead load, and in the words of the file; a joint that never slides may have any."""
+    """Before the dead load, and in the words of the file; joints that never slide may have any."""
     change = f"analysis.scheme={scheme}"
     says = f"ring.toml: analysis.scheme = '{scheme}': .* follows no sliding.* friction = \"none\""
     with pytest.raises(af.InvalidInput, match=says):
