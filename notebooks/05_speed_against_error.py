@@ -51,8 +51,8 @@ for rung in ("rigid", "faces", "condensed", "full"):
 springs = af.build(ring, fidelity="full", quadrature="nodal")
 stones = af.build(ring, fidelity="rigid", quadrature="exact")
 runs = {
-    "all nodes, five springs": af.time_history(springs, motion, damping=damping),
-    "rigid stones, exact joints": af.time_history(stones, motion, damping=damping),
+    "all nodes, five springs": af.time_history(springs, motion, damping=damping, dt=0.005),
+    "rigid stones, exact joints": af.time_history(stones, motion, damping=damping, dt=0.005),
 }
 af.view.draw_envelope(runs, dead=af.dead_load(stones).joints)
 

@@ -18,7 +18,15 @@ from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.cases.structures import planned
-from archfem.dynamics.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
+from archfem.dynamics.schemes import (
+    HHT,
+    Conserving,
+    EffectiveRayleigh,
+    Newmark,
+    Rayleigh,
+    Scheme,
+    check_sliding,
+)
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -166,6 +174,7 @@ class Case:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
+        self._check_scheme()
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
@@ -176,6 +185,17 @@ class Case:
     def stages(self) -> Sequence[Stage] | None:
         """In which the structure is built; None where it is in one go."""
         return stages_asked(self.settings.get("dead_load", {}), self.structure)
+
+    def _check_scheme(self) -> None:
+        """Refuse a scheme that cannot follow what the contacts say, in the words of the file."""
+        try:
+            check_sliding(self.scheme, self.structure.friction)
+        except InvalidInput as error:
+            name = self.analysis["scheme"]
+            raise InvalidInput(
+                f'analysis.scheme = {name!r}: {error}; in a case file, scheme = "conserving", or '
+                'friction = "none" in the table of each of its [contacts]'
+            ) from error
 
     @property
     def chooses(self) -> bool:
@@ -220,14 +240,14 @@ class Case:
     @property
     def scheme(self) -> Scheme:
         """Time stepping of the time history."""
-        name, alpha = self.analysis.get("scheme", "newmark"), self.analysis.get("alpha")
-        if name == "hht":
-            return HHT() if alpha is None else HHT(alpha)
-        if name != "newmark" or alpha is not None:
+        name, alpha = self.analysis.get("scheme", "conserving"), self.analysis.get("alpha")
+        known = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
+        if name not in known or (alpha is not None and name != "hht"):
             raise InvalidInput(
-                f"analysis.scheme = {name!r} with alpha {alpha}: use 'newmark', or 'hht' and alpha"
+                f"analysis.scheme = {name!r} with alpha {alpha}: use 'conserving', 'newmark', or "
+                "'hht' and alpha"
             )
-        return Newmark()
+        return known[name]() if alpha is None else HHT(alpha)
 
     def ground_motion(self) -> Motion:
         """Return the ground motion, read or made.

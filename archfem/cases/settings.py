@@ -1,11 +1,12 @@
 """Tables of a case file: which keys they have, what the keys hold, and changes to them.
 
-What a key may hold is written as a unit for a number, a Python type or several, or a list of one
-unit or type for a list.
+What a key may hold is written as a unit for a number, `NumberOr` for a number or one of a few
+words, a Python type or several, or a list of one unit or type for a list.
 """
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from archfem.errors import InvalidInput
@@ -15,6 +16,19 @@ from archfem.units import in_unit
 Table = Mapping[str, Any]
 
 _WORDS = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
+
+
+@dataclass(frozen=True)
+class NumberOr:
+    """What a key may hold that takes a number, or a word in its place.
+
+    Attributes:
+        unit: of the number.
+        words: what each word stands for.
+    """
+
+    unit: str
+    words: Mapping[str, Any]
 
 
 def checked(given: Any, keys: Table, section: str) -> dict[str, Any]:
@@ -135,6 +149,8 @@ def _value(value: Any, kind: Any, key: str) -> Any:
     """Turn one value into what its key must hold."""
     if isinstance(kind, str):
         return in_unit(value, kind, key)
+    if isinstance(kind, NumberOr):
+        return _number_or_word(value, kind, key)
     if isinstance(kind, list):
         if not isinstance(value, list):
             raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
@@ -144,3 +160,14 @@ def _value(value: Any, kind: Any, key: str) -> Any:
         wanted = " or ".join(_WORDS[each] for each in kinds)
         raise InvalidInput(f"{key} = {value!r} is not {wanted}")
     return value
+
+
+def _number_or_word(value: Any, kind: NumberOr, key: str) -> Any:
+    """Turn one value into a number, or what its word stands for."""
+    if isinstance(value, str) and value in kind.words:
+        return kind.words[value]
+    try:
+        return in_unit(value, kind.unit, key)
+    except InvalidInput as error:
+        words = " or ".join(f'"{word}"' for word in kind.words)
+        raise InvalidInput(f"{error}, or {words}") from error

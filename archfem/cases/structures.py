@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from archfem.cases.settings import Table, checked, chosen
+from archfem.cases.settings import NumberOr, Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.masonry.fill import jointed_fill
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
@@ -100,9 +100,10 @@ MATERIAL = {"young": "Pa", "poisson": "1", "unit_weight": "N/m**3", "strength": 
 CONTACT = {
     "normal_stiffness": "Pa/m",
     "shear_stiffness": "Pa/m",
-    "friction": "1",
+    "friction": NumberOr("1", {"none": None}),
     "cohesion": "Pa",
 }
+"""A friction of "none" is that of a joint that never slides."""
 
 
 def planned(settings: Table, folder: Path = Path()) -> Structure:

@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
+
 from archfem.arguments import real, reals
+from archfem.arrays import Array
 from archfem.errors import InvalidInput
 
 JOINTS = ("closed", "initial", "none")
@@ -157,3 +160,21 @@ class Conserving:
 
 
 Scheme = Newmark | HHT | Conserving
+
+
+def check_sliding(scheme: Scheme, friction: Array) -> None:
+    """Refuse schemes that write the equation at an instant where joints can slide.
+
+    Args:
+        scheme: of the run to come.
+        friction: coefficients of the joints, infinite where one never slides (n_joints,) [-].
+
+    Raises:
+        InvalidInput: joints can slide, and the scheme has no memory.
+    """
+    if not isinstance(scheme, Conserving) and np.isfinite(friction).any():
+        raise InvalidInput(
+            f"{type(scheme).__name__} follows no sliding, and joints slide at "
+            f"μ = {np.min(friction):g}: use scheme=Conserving(), the default, or joints that never "
+            "slide, Contact(friction=None)"
+        )

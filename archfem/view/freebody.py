@@ -21,6 +21,9 @@ MOST = 12
 LONGEST = 0.75
 """Length of the largest force beside the block, relative to the block."""
 
+NOTHING = 1e-12
+"""Part of the largest force up to which another is round-off, as where a joint barely touches."""
+
 WIDTH, PANEL, LINE = 9.6, 5.0, 0.18
 """Width of the page, height of its panels and of a line below them [inch]."""
 
@@ -72,7 +75,7 @@ def _words(body: FreeBody, joints: xr.Dataset) -> list[str]:
     words = []
     for name, number, size in zip(body.names, (*body.joints, -1), body.sizes / kN, strict=True):
         words.append(f"{name}: {size:.1f} kN")
-        if number >= 0 and size == 0.0:
+        if number >= 0 and size <= NOTHING * body.sizes.max() / kN:
             words[-1] = f"{name}: open"
         elif number >= 0:
             own = joints.isel(joint=number)
@@ -98,7 +101,7 @@ def _block(axes: Axes, structure: Structure, body: FreeBody, colours: list[str])
     heads[-1] += length * body.forces[-1]
     tails = heads - length * body.forces
     for k, (tail, head, colour) in enumerate(zip(tails, heads, colours, strict=True)):
-        if not body.sizes[k]:  # an open joint
+        if body.sizes[k] <= NOTHING * body.sizes.max():  # an open joint
             continue
         _arrow(axes, tail, head, colour)
         away = (tail - head) / np.linalg.norm(tail - head) if k < len(tails) - 1 else [1.0, 0.0]
@@ -116,7 +119,7 @@ def _polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
     axes.set_aspect("equal")
     forces = body.forces / kN
     order = np.argsort(np.arctan2(forces[:, 1], forces[:, 0]), kind="stable")
-    order = order[body.sizes[order] > 0.0]
+    order = order[body.sizes[order] > NOTHING * body.sizes.max()]
     corners = np.concatenate([np.zeros((1, 2)), np.cumsum(forces[order], axis=0)])
     span = float(np.ptp(corners, axis=0).max())
     for k, tail, head in zip(order, corners[:-1], corners[1:], strict=True):

@@ -3,6 +3,7 @@
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import archfem as af
@@ -11,8 +12,14 @@ from archfem.cases.case import MODEL
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
 
+GLUED = "contacts.stone to stone.friction=none"
+"""Joints that never slide, which Newmark and HHT ask for."""
+
+
 def test_shipped_case():
     case = af.Case.read(RING)
+    assert case.scheme == af.Conserving()
+    assert case.structure.friction == pytest.approx(0.60)
     assert case.structure.joints[8].depth == pytest.approx(0.55)
     assert case.structure.joints[0].contact.normal_stiffness == pytest.approx(1.48e9)
     assert case.damping.frequencies == (8.0, 16.0)
@@ -22,7 +29,7 @@ def test_shipped_case():
 
 def test_changes_from_the_command_line():
     changes = ["structure.thickness=0.6", "analysis.scheme=hht", "motion.scale=0.5", "title=x y"]
-    case = af.Case.read(RING, changes)
+    case = af.Case.read(RING, [*changes, GLUED])
     assert case.structure.joints[0].depth == pytest.approx(0.6)
     assert case.scheme == af.HHT()
     assert case.title == "x y"
@@ -50,7 +57,11 @@ def test_changes_from_the_command_line():
         ("model.tolerance=2", "ring.toml: tolerance 2 on .e. is not between 0 and 1"),
         ("model.fidelity=modal", "'modal' is no longer known, for 'faces' is faster"),
         ("analysis.damping={ratio=0.05}", "give a ratio and two frequencies"),
-        ("analysis.scheme=euler", "use 'newmark', or 'hht'"),
+        ("analysis.scheme=euler", "use 'conserving', 'newmark', or 'hht'"),
+        ("analysis.alpha=-0.1", "'conserving' with alpha -0.1: use .* 'hht' and alpha"),
+        ("contacts.stone to stone.friction=nun", "friction = 'nun' is not .*, or \"none\""),
+        ("contacts.stone to stone.cohesion='5 kN'", "cohesion = '5 kN' is not in a unit like Pa"),
+        ("contacts.stone to stone.cohesion=-1", "cohesion -1 Pa of 'stone to stone' is not betw"),
         ("analysis.halt=maybe", "not true or false"),
         ("criteria.hinge=0.7", "criteria hinge = 0.7: .* at most 0.5"),
         ("criteria.limit=0.4", "unknown key 'criteria.limit'"),
@@ -64,6 +75,37 @@ def test_changes_from_the_command_line():
 def test_refusals_name_the_key(change, says):
     with pytest.raises((af.InvalidInput, af.InvalidStructure), match=says):
         af.Case.read(RING, [change])
+
+
+@pytest.mark.parametrize("scheme", ["newmark", "hht"])
+def test_schemes_that_follow_no_sliding_are_refused_where_joints_slide(scheme):
+    """Before the dead load, and in the words of the file; joints that never slide may have any."""
+    change = f"analysis.scheme={scheme}"
+    says = f"ring.toml: analysis.scheme = '{scheme}': .* follows no sliding.* friction = \"none\""
+    with pytest.raises(af.InvalidInput, match=says):
+        af.Case.read(RING, [change])
+    scheme = af.Case.read(RING, [change, GLUED]).scheme
+    assert scheme in (af.dynamics.Newmark(), af.HHT())
+
+
+def test_every_contact_must_be_kept_from_sliding_for_them():
+    bridge, changes = RING.with_name("prusias.toml"), [GLUED, "analysis.scheme=newmark"]
+    with pytest.raises(af.InvalidInput, match="follows no sliding"):
+        af.Case.read(bridge, changes)
+    glued = af.Case.read(bridge, [*changes, "contacts.soil to stone.friction=none"])
+    assert np.isinf(glued.structure.friction).all()
+
+
+def test_joints_of_a_case_slide_by_friction_and_cohesion():
+    plain = af.Case.read(RING).structure.joints[3].contact
+    assert (plain.friction, plain.cohesion) == (0.60, 0.0)
+    table = "contacts.stone to stone"
+    held = af.Case.read(RING, [f"{table}.friction='0.7'", f"{table}.cohesion='5 kPa'"])
+    contact = held.structure.joints[3].contact
+    assert (contact.friction, contact.cohesion) == (0.7, pytest.approx(5e3))
+    glued = af.Case.read(RING, [GLUED])
+    assert not glued.structure.joints[3].contact.slides
+    assert af.Case.of(tomllib.loads(glued.text())).structure == glued.structure
 
 
 def test_geometry_errors_name_the_file():

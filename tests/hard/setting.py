@@ -200,7 +200,7 @@ def ring(**given) -> af.Structure:
     return af.circular_arch(**{**lengths, **given})
 
 
-def joints(stiffer: float = 1.0, friction: float = 0.6) -> af.Contact:
+def joints(stiffer: float = 1.0, friction: float | None = 0.6) -> af.Contact:
     """Dry joints so many times stiffer than those of the validation ring."""
     return replace(
         STONE_TO_STONE,

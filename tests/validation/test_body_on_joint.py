@@ -73,10 +73,13 @@ def test_moment_approaches_its_limit_only_as_rotation_grows():
     assert float(found.joints["M"][0]) == pytest.approx(moment, rel=2e-4)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "full"])
-def test_uplift_at_a_quarter_of_g(fidelity):
+@pytest.mark.parametrize("contact", [JOINT, replace(JOINT, friction=None)], ids=["μ", "glued"])
+@pytest.mark.parametrize(
+    ("fidelity", "rule"), [("rigid", None), ("rigid", "lobatto"), ("full", None)]
+)
+def test_uplift_at_a_quarter_of_g(fidelity, rule, contact):
     """b/h = 0.25: just below, the base is hinged but holds; just above, nothing does."""
-    model = af.build(block(), fidelity=fidelity, cells=(4, 8))
+    model = af.build(block(contact=contact), fidelity=fidelity, cells=(4, 8), quadrature=rule)
     weight = af.statics.self_weight(model)
     held = af.statics.equilibrium_under(model, weight + model.load(af.BodyForce(0.245)))
     assert float(held.joints["eccentricity"][0]) == pytest.approx(2.0 * 0.245, rel=1e-6)
@@ -85,14 +88,29 @@ def test_uplift_at_a_quarter_of_g(fidelity):
         af.statics.equilibrium_under(model, weight + model.load(af.BodyForce(0.255)))
 
 
+def pushed(factor, contact=JOINT):
+    """A flat block on which a part of its weight acts sideways."""
+    model = af.build(block(breadth=4.0, height=0.5, contact=contact), fidelity="rigid")
+    load = af.statics.self_weight(model) + model.load(af.BodyForce(factor))
+    return af.statics.equilibrium_under(model, load).joints
+
+
 def test_sliding_at_the_coefficient_of_friction():
-    model = af.build(block(breadth=4.0, height=0.5), fidelity="rigid")
-    for factor, slides in ((0.59, False), (0.61, True)):
-        found = af.statics.equilibrium_under(
-            model, af.statics.self_weight(model) + model.load(af.BodyForce(factor))
-        )
-        assert float(found.joints["friction"][0]) == pytest.approx(factor, rel=1e-9)
-        assert bool(found.joints["slide"][0]) == slides
+    """Just below it the block stays; just above it nothing holds the block."""
+    found = pushed(0.599)
+    assert float(found["friction"][0]) == pytest.approx(0.599, rel=1e-9)
+    assert not found["slide"][0]
+    with pytest.raises(af.DidNotConverge, match="no equilibrium beyond"):
+        pushed(0.601)
+
+
+@pytest.mark.parametrize(("factor", "slides"), [(0.59, False), (0.61, True)])
+def test_a_joint_that_never_slides_is_judged_by_the_criteria(factor, slides):
+    found = pushed(factor, replace(JOINT, friction=None))
+    assert float(found["friction"][0]) == pytest.approx(factor, rel=1e-9)
+    assert not found["slide"][0]
+    judged = af.joints.criteria.flagged(found, af.Criteria(friction=0.6))
+    assert bool(judged["slide"][0]) == slides
 
 
 def test_rocking_period():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from glued import glued
 
 import archfem as af
 from archfem.dynamics.ladder import Setting, choose, finest
@@ -117,15 +118,20 @@ def test_a_soft_block_keeps_its_nodes():
     assert model.prediction.met
 
 
-def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not():
-    """The error predicted of the model, against all nodes over the whole motion."""
+@pytest.mark.parametrize(("law", "rung"), [(glued, "faces"), (lambda same: same, "condensed")])
+def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not(law, rung):
+    """The error predicted of the model, against all nodes over the whole motion.
+
+    Joints that slide do so where little presses them, near the end of what is closed, and ask for
+    one rung more.
+    """
     arch = af.shapes.Arch(span=5.0, rise=2.0, thickness=0.5, voussoirs=13)
-    structure = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), width=4.0)
+    structure = law(af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), width=4.0))
     motion = af.Motion.synthetic(duration=10.0, pga=2.5, seed=2)
     damping = af.Rayleigh(0.05, (4.0, 20.0))
     given = {"motion": motion, "damping": damping, "dt": 0.005}
     model = af.build(structure, fidelity="auto", tolerance=0.005, **given)
-    assert model.fidelity == "backfill: full, rest: faces"
+    assert model.fidelity == f"backfill: full, rest: {rung}"
     assert model.prediction.met
     assert model.prediction.dt == 0.005
     runs = [
@@ -162,10 +168,14 @@ def test_the_strongest_part_holds_the_peak():
 
 
 def test_study_of_speed_against_error(ring):
-    """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance."""
+    """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance.
+
+    Of joints that never slide: where they do, plane faces with one facet a joint follow the sliding
+    near the end of what is closed to 0.02 only.
+    """
     motion = af.Motion.synthetic(duration=3.0, pga=1.7, seed=1)
     found = af.accuracy(
-        ring,
+        glued(ring),
         motion,
         damping=damping_of(ring),
         rungs=("rigid", "faces"),
@@ -187,14 +197,22 @@ def test_study_of_speed_against_error(ring):
     assert len(found.table().splitlines()) == 9
 
 
-def test_a_setting_that_fails_is_reported_as_such(ring):
-    """Undamped and coarse in time, energy comes from nowhere: no error can be stated."""
-    motion = af.Motion.synthetic(duration=3.0, pga=1.7, seed=1)
-    found = af.accuracy(
-        ring, motion, rungs=("rigid",), cells=((4, 4),), rules=(("nodal", None),), steps=(0.01,)
-    )
-    assert found.trials[0].error == np.inf
-    assert found.chosen is None
+def test_a_setting_that_fails_is_reported_as_such(ring, monkeypatch):
+    """Steps of 10 ms end in an error; what the others find stands."""
+
+    def failing(model, motion, damping, dt):
+        if dt == 0.01:
+            raise af.DidNotConverge("no equilibrium")
+        return peaks(model, motion, damping, dt)
+
+    monkeypatch.setattr("archfem.dynamics.tradeoff.peaks", failing)
+    motion = af.Motion.synthetic(duration=1.0, pga=1.7, seed=1)
+    given = {"rungs": ("rigid",), "cells": ((4, 4),), "rules": (("nodal", None),)}
+    found = af.accuracy(ring, motion, **given, steps=(0.01, 0.005))
+    assert {trial.setting.dt: np.isinf(trial.error) for trial in found.trials} == {
+        0.01: True,
+        0.005: False,
+    }
     assert "failed" in found.table()
 
 

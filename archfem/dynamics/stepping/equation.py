@@ -20,10 +20,9 @@ from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.dynamics.energy import Meter
-from archfem.dynamics.schemes import Conserving, Rayleigh, Scheme
+from archfem.dynamics.schemes import Conserving, Rayleigh, Scheme, check_sliding
 from archfem.dynamics.stepping.newmark import Numbers, numbers_of
 from archfem.dynamics.steps import State
-from archfem.errors import InvalidInput
 from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
 from archfem.motion.averages import mean_accelerations
@@ -52,12 +51,7 @@ class Equation:
 
     def __post_init__(self) -> None:
         """Refuse sliding by schemes that write the equation at an instant."""
-        if not self.conserving and np.isfinite(self.model.structure.friction).any():
-            raise InvalidInput(
-                f"{type(self.scheme).__name__} follows no sliding, and joints slide at "
-                f"μ = {np.min(self.model.structure.friction):g}: use scheme=Conserving(), the "
-                "default, or joints that never slide, Contact(friction=None)"
-            )
+        check_sliding(self.scheme, self.model.structure.friction)
 
     @property
     def conserving(self) -> bool:
