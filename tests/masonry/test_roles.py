@@ -103,13 +103,16 @@ def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
     for names in NAMES.values():
         made = viaduct(*names, fill=None)
         run = af.time_history(
-            af.build(made, fidelity="rigid"), motion, damping=af.Rayleigh(0.05, (4.0, 15.0))
+            af.build(made, fidelity="rigid"),
+            motion,
+            dt=0.005,
+            damping=af.Rayleigh(0.05, (4.0, 15.0)),
         )
         met.append((replace(run.mechanism, part=""), replace(run.verified.moved, part="")))
     assert met[0] == met[1] == met[2]
     assert (met[0][0].kind, told()) == ("global", [])
     blank = af.build(untold(made), fidelity="rigid")
-    run = af.time_history(blank, motion, damping=af.Rayleigh(0.05, (4.0, 15.0)))
+    run = af.time_history(blank, motion, dt=0.005, damping=af.Rayleigh(0.05, (4.0, 15.0)))
     assert replace(run.mechanism, part="") != met[0][0]
     assert len(told()) >= 3
 
