@@ -170,8 +170,14 @@ def _condensed(
 
 
 def _spanned(model: Jointed, plane: set[int]) -> Jointed:
-    """With exact facets, let one facet span each joint between blocks with plane faces."""
+    """With exact facets, let one span each joint between blocks with plane faces that holds.
+
+    Where a joint can slide, each end of a facet does so by itself: more facets are needed.
+    """
     if not isinstance(model.operator.law, Facets):
         return model
-    whole = [set(joint.blocks) <= plane for joint in model.structure.joints]
+    whole = [
+        set(joint.blocks) <= plane and not joint.contact.slides
+        for joint in model.structure.joints
+    ]
     return model.with_operator(model.operator.spanned(whole))

@@ -20,14 +20,15 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
 
     Args:
         structure: what to model.
-        cells: facets on each joint; with exact quadrature one is enough.
+        cells: facets on each joint; with exact quadrature one is enough where nothing slides.
         rule: quadrature on each facet; by default the exact one.
 
     Returns:
         The model, its coordinates in the order of `structure.free`.
     """
     rule = rule or Quadrature("exact")
-    facets = 1 if rule.rule == "exact" else cells  # the gap between rigid faces is linear
+    whole = rule.rule == "exact" and not np.isfinite(structure.friction).any()
+    facets = 1 if whole else cells  # the gap between rigid faces is linear, but friction is not
     free = [structure.blocks[number] for number in structure.free]
     density = np.array([structure.density(block) * structure.width for block in free])
     mass = density * [block.area for block in free]

@@ -25,7 +25,14 @@ from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conse
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, gaps_of, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
+from archfem.dynamics.stepping.small_problem import (
+    SETTLED,
+    exact,
+    expected,
+    largest,
+    release,
+    shift,
+)
 from archfem.dynamics.stepping.sparse_rows import add_rows, times
 
 LARGEST = 1200
@@ -151,6 +158,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
         vector[k] *= system.gain[k]
     start = np.empty(len(gap))
     times(linear.opening, vector, start)
+    shift(law, start)
     gap[:] = start
     passes = 0
     while passes < ITERATIONS:

@@ -30,6 +30,7 @@ from archfem.dynamics.stepping.small_problem import (
     expected,
     largest,
     release,
+    shift,
 )
 
 FEW = 24
@@ -60,6 +61,11 @@ def _largest(law, gap):  # type: ignore
     if is_law(law):
         return lambda law, gap: np.max(law.stiffness * np.abs(gap))
     return None
+
+
+@overload(shift)
+def _shift(law, gap):  # type: ignore
+    return (lambda law, gap: None) if is_law(law) else None
 
 
 def is_law(law: Any) -> bool:

@@ -28,6 +28,7 @@ from archfem.dynamics.stepping.small_problem import (
     expected,
     largest,
     release,
+    shift,
 )
 
 FEW = 60
@@ -75,6 +76,17 @@ def _largest(law, gap):  # type: ignore
     if is_path_law(law):
         return lambda law, gap: np.max(law.still.stiffness * np.abs(gap[: len(law.group)]))
     return None
+
+
+@overload(shift)
+def _shift(law, gap):  # type: ignore
+    return _shifted if is_path_law(law) else None
+
+
+def _shifted(law, gap):  # type: ignore
+    """Add to gaps found from displacements those before anything moves."""
+    for row in range(len(gap)):
+        gap[row] += law.offset[row]
 
 
 def _foreseen(law, gap, before, force):  # type: ignore

@@ -67,6 +67,16 @@ def exact(law: Any, gap: Any, force: Any, near: Any) -> Any:
     raise NotImplementedError
 
 
+def shift(law: Any, gap: Any) -> None:
+    """Add to gaps found from displacements those before anything moves.
+
+    Args:
+        law: of the joints.
+        gap: of all rows, changed (r,) [m].
+    """
+    raise NotImplementedError
+
+
 def largest(law: Any, gap: Any) -> Any:
     """Return the largest force of a point if all joints held tension [N].
 

@@ -23,7 +23,14 @@ from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.panels import Factor, backward, factorised, forward
-from archfem.dynamics.stepping.small_problem import SETTLED, exact, expected, largest, release
+from archfem.dynamics.stepping.small_problem import (
+    SETTLED,
+    exact,
+    expected,
+    largest,
+    release,
+    shift,
+)
 from archfem.dynamics.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 
@@ -129,8 +136,10 @@ def _solved(system, vector, gap, before, force):  # type: ignore
             _know(rows, system, room)
             if fresh:
                 backward(factor, vector, room, _branches(rows, system))
+                start[:] = 0.0
                 for row in rows:
                     start[row] = row_times(opening, row, vector)
+                shift(law, start)
             else:
                 _unload(start, gap, rows, system.compliance, force)
             taken = release(law, start, rows, system.compliance, force, enough)
@@ -144,6 +153,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
                 vector[k] += half[k]
         backward(factor, vector, room, everywhere)
         times(opening, vector, gap)
+        shift(law, gap)
         if exact(law, gap, force, near):
             return passes
         passes, fresh = passes + 1, False
