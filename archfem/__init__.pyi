@@ -16,7 +16,6 @@ from .dynamics.history import History as History
 from .dynamics.ladder import build as build
 from .dynamics.scales import mechanism_scales as mechanism_scales
 from .dynamics.schemes import HHT as HHT
-from .dynamics.schemes import Conserving as Conserving
 from .dynamics.schemes import Rayleigh as Rayleigh
 from .dynamics.time_history import Record as Record
 from .dynamics.time_history import time_history as time_history
@@ -29,7 +28,6 @@ from .errors import InvalidStructure as InvalidStructure
 from .joints.criteria import Criteria as Criteria
 from .limit.collapse import collapse_factor as collapse_factor
 from .limit.collapse import stands as stands
-from .limit.movement import largest_movement as largest_movement
 from .limit.moving import moving_load as moving_load
 from .limit.thickness import minimum_thickness as minimum_thickness
 from .limit.verified import verified_mechanism as verified_mechanism

@@ -177,7 +177,6 @@ def _spanned(model: Jointed, plane: set[int]) -> Jointed:
     if not isinstance(model.operator.law, Facets):
         return model
     whole = [
-        set(joint.blocks) <= plane and not joint.contact.slides
-        for joint in model.structure.joints
+        set(joint.blocks) <= plane and not joint.contact.slides for joint in model.structure.joints
     ]
     return model.with_operator(model.operator.spanned(whole))

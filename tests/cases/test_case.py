@@ -18,7 +18,7 @@ GLUED = "contacts.stone to stone.friction=none"
 
 def test_shipped_case():
     case = af.Case.read(RING)
-    assert case.scheme == af.Conserving()
+    assert case.scheme == af.dynamics.Conserving()
     assert case.structure.friction == pytest.approx(0.60)
     assert case.structure.joints[8].depth == pytest.approx(0.55)
     assert case.structure.joints[0].contact.normal_stiffness == pytest.approx(1.48e9)

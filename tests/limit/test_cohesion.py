@@ -126,7 +126,7 @@ def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
             radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7, contact=contact
         )
         apart = af.Settlement("left abutment", (-4.0, 0.0, 0.0))
-        return af.largest_movement(structure, apart, friction=friction, tolerance=1e-3)
+        return af.limit.largest_movement(structure, apart, friction=friction, tolerance=1e-3)
 
     dry, held, never = spread(0.0), spread(20.0 * kPa), spread(0.0, None)
     assert dry.end is End.SLIDES
