@@ -170,9 +170,16 @@ def _condensed(
 
 
 def _spanned(model: Jointed, plane: set[int]) -> Jointed:
-    """With exact facets, let one span each joint between blocks with plane faces that holds.
+    """With exact facets, let one span each joint that never slides between plane faces.
 
-    Where a joint can slide, each end of a facet does so by itself: more facets are needed.
+    Each end of a facet slides by itself, so that a joint which can slide keeps several.
+
+    Args:
+        model: with all nodes.
+        plane: numbers of the blocks whose faces stay plane.
+
+    Returns:
+        The same model, with fewer joint points where that changes nothing.
     """
     if not isinstance(model.operator.law, Facets):
         return model

@@ -103,9 +103,10 @@ class Pace:
     def _tried(
         self, state: State, dt: float, ends: Array, last: bool
     ) -> tuple[Batch | None, float]:
-        """Steps up to the first that errs too much, and their largest error; None if the first does.
+        """Steps before one that errs too much, and their largest error; all if they are the last.
 
-        Where steps cannot be shorter all are taken.
+        Returns:
+            Without steps None, and infinity: then even the first errs too much.
         """
         batch = self._taken(state, dt, ends, last)
         if batch is None:

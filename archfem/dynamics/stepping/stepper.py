@@ -102,7 +102,7 @@ class Stepper:
             lambda k: State(
                 float(times[k]),
                 *strategy.leave(series[k + 1]),
-                memories[k + 1] if self.equation.remembers else None,
+                memory=memories[k + 1] if self.equation.remembers else None,
             ),
             readings=self._read(series[1 : count + 1, 0]),
         )

@@ -1,0 +1,28 @@
+"""Mean accelerations between instants."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import archfem as af
+from archfem.motion.averages import mean_accelerations
+
+
+@pytest.mark.parametrize("step", [0.002, 0.01, 0.0137, 0.05])
+def test_means_are_those_of_the_straight_lines_between_samples(step):
+    samples = np.random.default_rng(1).standard_normal(30)
+    motion = af.Motion(samples, 0.01, vertical=samples[::-1].copy())
+    times = np.arange(0.0, 0.29, step)
+    found = mean_accelerations(motion, times)
+    for axis in range(2):
+        for k, (start, end) in enumerate(zip(times[:-1], times[1:], strict=True)):
+            kinks = np.arange(30) * 0.01
+            inside = kinks[(kinks > start) & (kinks < end)]
+            wanted = quad(lambda t: motion.at(t)[0, axis], start, end, points=inside)[0]
+            assert found[k, axis] == pytest.approx(wanted / (end - start), abs=1e-7)
+
+
+def test_outside_of_the_record_the_ground_is_still():
+    motion = af.Motion(np.ones(11), 0.01)
+    found = mean_accelerations(motion, np.array([0.0, 0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(found[:, 0], [1.0, 0.0, 0.0], atol=1e-12)
