@@ -18,7 +18,15 @@ from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.cases.structures import planned
-from archfem.dynamics.schemes import HHT, EffectiveRayleigh, Newmark, Rayleigh, Scheme
+from archfem.dynamics.schemes import (
+    HHT,
+    EffectiveDamping,
+    Newmark,
+    Rayleigh,
+    Scheme,
+    StiffnessDamping,
+    Viscous,
+)
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -40,7 +48,15 @@ MODEL = {
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
-DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
+DAMPING = {
+    "ratio": "1",
+    "frequency": "Hz",
+    "frequencies": ["Hz"],
+    "modes": str,
+    "kind": str,
+    "share": "1",
+    "joints": str,
+}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
 OUTPUT = {
@@ -197,19 +213,25 @@ class Case:
         return tolerance
 
     @property
-    def damping(self) -> Rayleigh | EffectiveRayleigh | None:
+    def damping(self) -> Viscous | EffectiveDamping | None:
         """Damping of the time history; its frequencies may be left to the modes."""
         if "damping" not in self.analysis:
             return None
         given = dict(self.analysis["damping"])
-        if set(given) - {"joints", "share"} == {"ratio", "modes"}:
-            if given.pop("modes") == "effective":
-                return EffectiveRayleigh(**given)
-        elif set(given) - {"joints"} == {"ratio", "frequencies"} and len(given["frequencies"]) == 2:
+        keys = set(given) - {"joints"}
+        if {"ratio", "modes"} <= keys <= {"ratio", "modes", "kind", "share"}:
+            if given.pop("modes") == "effective" and (
+                "share" not in given or given.get("kind") == "rayleigh"
+            ):
+                return EffectiveDamping(**given)
+        elif keys == {"ratio", "frequency"}:
+            return StiffnessDamping(**given)
+        elif keys == {"ratio", "frequencies"} and len(given["frequencies"]) == 2:
             return Rayleigh(**{**given, "frequencies": tuple(given["frequencies"])})
         raise InvalidInput(
-            f"analysis.damping = {self.analysis['damping']}: give a ratio and two frequencies, "
-            'e.g. { ratio = 0.05, frequencies = [8.0, 16.0] }, or modes = "effective" for them'
+            f"analysis.damping = {self.analysis['damping']}: give a ratio and a frequency, e.g. "
+            "{ ratio = 0.05, frequency = 8.0 }, two for Rayleigh damping, frequencies = [8.0, "
+            '16.0], or modes = "effective" for them, with kind = "rayleigh" (and a share) for two'
         )
 
     @property
