@@ -41,8 +41,8 @@ LONGEST = 1e-3
 """Step [s] that soft joints are not to exceed."""
 
 RATIOS = (0.05, 3.0)
-"""Least and largest damping of the bounce on the whole base, of critical [-]: below, the joint still
-rings when the next impact comes; above, the swing between impacts loses as much as they do."""
+"""Least and largest damping of the bounce on the whole base, of critical [-]: below, the joint
+still rings when the next impact comes; above, what the swing between loses shows."""
 
 SLENDER = 1.2
 """Least height over breadth: a block as broad as high hardly rocks."""

@@ -18,9 +18,10 @@ EFFECTIVE = 0.90
 class Rayleigh:
     """Damping proportional to mass and stiffness.
 
-    The mass part drags whatever moves against the ground, also a block that is loose: 5 % at 8 and
-    16 Hz are 27 % of critical at 1 Hz. `StiffnessDamping` has none. The ratio at a frequency f is a/(4 π f) + b π f; the two coefficients make it the wanted one
-    at two frequencies (Clough and Penzien, 1993, section 12-4).
+    The ratio at a frequency f is a/(4 π f) + b π f; the two coefficients make it the wanted one
+    at two frequencies (Clough and Penzien, 1993, section 12-4). The mass part drags whatever moves
+    against the ground, also a block that is loose: 5 % at 8 and 16 Hz are 27 % of critical at 1 Hz.
+    `StiffnessDamping` has none.
 
     Attributes:
         ratio: of critical damping at both frequencies [-].
@@ -61,8 +62,9 @@ class StiffnessDamping:
     """Damping proportional to stiffness alone: what moves without deforming is not dragged.
 
     The ratio at a frequency f is b π f: the wanted one at one frequency, less below, more above. A
-    block in flight, or rocking on its edge, loses nothing; energy is lost where blocks and the
-    closed part of joints deform, above all when a block lands (`restitution_damping` sets how much).
+    block in flight loses nothing and one that turns on its edge hardly anything; energy is lost
+    where blocks and the closed part of joints deform, above all when a block lands
+    (`restitution_damping` sets how much).
 
     Attributes:
         ratio: of critical damping at the frequency [-].
