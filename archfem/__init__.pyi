@@ -17,6 +17,7 @@ from .dynamics.ladder import build as build
 from .dynamics.scales import mechanism_scales as mechanism_scales
 from .dynamics.schemes import HHT as HHT
 from .dynamics.schemes import Rayleigh as Rayleigh
+from .dynamics.schemes import StiffnessDamping as StiffnessDamping
 from .dynamics.time_history import Record as Record
 from .dynamics.time_history import time_history as time_history
 from .dynamics.tradeoff import accuracy as accuracy

@@ -5,6 +5,7 @@
     motions     [motion], [suite] as a `Motion`, a `Suite`
     limits      [limit] as loads and friction for limit analysis
     building    [dead_load] as stages of building
+    stepping    damping and scheme of [analysis]
     case        one analysis as one value, read from a TOML file
     run         carry out a case; go on where an earlier run ended
     findings    what a study finds of its cases, kept in files

@@ -17,16 +17,9 @@ from archfem.cases import motions as ground
 from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
+from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
 from archfem.cases.structures import planned
-from archfem.dynamics.schemes import (
-    HHT,
-    Conserving,
-    EffectiveRayleigh,
-    Newmark,
-    Rayleigh,
-    Scheme,
-    check_sliding,
-)
+from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -48,7 +41,15 @@ MODEL = {
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
-DAMPING = {"ratio": "1", "frequencies": ["Hz"], "modes": str, "share": "1", "joints": str}
+DAMPING = {
+    "ratio": "1",
+    "frequency": "Hz",
+    "frequencies": ["Hz"],
+    "modes": str,
+    "kind": str,
+    "share": "1",
+    "joints": str,
+}
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
 CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
 OUTPUT = {
@@ -174,7 +175,7 @@ class Case:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        self._check_scheme()
+        check_scheme(self.analysis, self.structure.friction)
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
@@ -185,17 +186,6 @@ class Case:
     def stages(self) -> Sequence[Stage] | None:
         """In which the structure is built; None where it is in one go."""
         return stages_asked(self.settings.get("dead_load", {}), self.structure)
-
-    def _check_scheme(self) -> None:
-        """Refuse a scheme that cannot follow what the contacts say, in the words of the file."""
-        try:
-            check_sliding(self.scheme, self.structure.friction)
-        except InvalidInput as error:
-            name = self.analysis["scheme"]
-            raise InvalidInput(
-                f'analysis.scheme = {name!r}: {error}; in a case file, scheme = "conserving", or '
-                'friction = "none" in the table of each of its [contacts]'
-            ) from error
 
     @property
     def chooses(self) -> bool:
@@ -217,20 +207,9 @@ class Case:
         return tolerance
 
     @property
-    def damping(self) -> Rayleigh | EffectiveRayleigh | None:
+    def damping(self) -> Viscous | EffectiveDamping | None:
         """Damping of the time history; its frequencies may be left to the modes."""
-        if "damping" not in self.analysis:
-            return None
-        given = dict(self.analysis["damping"])
-        if set(given) - {"joints", "share"} == {"ratio", "modes"}:
-            if given.pop("modes") == "effective":
-                return EffectiveRayleigh(**given)
-        elif set(given) - {"joints"} == {"ratio", "frequencies"} and len(given["frequencies"]) == 2:
-            return Rayleigh(**{**given, "frequencies": tuple(given["frequencies"])})
-        raise InvalidInput(
-            f"analysis.damping = {self.analysis['damping']}: give a ratio and two frequencies, "
-            'e.g. { ratio = 0.05, frequencies = [8.0, 16.0] }, or modes = "effective" for them'
-        )
+        return damping_asked(self.analysis)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -240,14 +219,7 @@ class Case:
     @property
     def scheme(self) -> Scheme:
         """Time stepping of the time history."""
-        name, alpha = self.analysis.get("scheme", "conserving"), self.analysis.get("alpha")
-        known = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
-        if name not in known or (alpha is not None and name != "hht"):
-            raise InvalidInput(
-                f"analysis.scheme = {name!r} with alpha {alpha}: use 'conserving', 'newmark', or "
-                "'hht' and alpha"
-            )
-        return known[name]() if alpha is None else HHT(alpha)
+        return scheme_asked(self.analysis)
 
     def ground_motion(self) -> Motion:
         """Return the ground motion, read or made.

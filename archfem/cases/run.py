@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
-from archfem.dynamics.damping import effective_range
+from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
-from archfem.dynamics.schemes import EffectiveRayleigh, Rayleigh
+from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.dynamics.time_history import Record, time_history
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
@@ -34,7 +34,7 @@ FRAMES = 10
 SAME = 1e-6
 """Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
 
-Shake = Callable[[Case, Motion, Equilibrium, Rayleigh | None], History]
+Shake = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 """Runs a motion of a case from its dead load, with damping, as `shaken` does."""
 
 
@@ -72,7 +72,7 @@ class Rest:
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
 
     @cached_property
-    def damping(self) -> tuple[Rayleigh | None, str]:
+    def damping(self) -> tuple[Viscous | None, str]:
         """Damping of the runs, and in words how it was found, as by `damping_of`."""
         return damping_of(self.case, self.dead)
 
@@ -188,12 +188,12 @@ def expected_damping(case: Case) -> Damping:
     Returns:
         What the case says, or a function that finds it of the finest model.
     """
-    if isinstance(case.damping, EffectiveRayleigh):
+    if isinstance(case.damping, EffectiveDamping):
         return lambda model: damping_of(case, dead_load(model))[0]
     return case.damping
 
 
-def damping_of(case: Case, dead: Equilibrium) -> tuple[Rayleigh | None, str]:
+def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
     """Return the damping of a case about its dead load, and in words how it was found.
 
     Args:
@@ -204,17 +204,28 @@ def damping_of(case: Case, dead: Equilibrium) -> tuple[Rayleigh | None, str]:
         InvalidInput: it is to be that of the effective modes, and fewer than two are.
     """
     damping, how = case.damping, ""
-    if isinstance(damping, EffectiveRayleigh):
-        found = effective_range(dead.model, dead, share=damping.share)
-        damping, how = damping.between(found.frequencies), f"; {found.text}"
+    if isinstance(damping, EffectiveDamping):
+        damping, how = _found(damping, dead)
     if damping is None:
         return None, "damping: none"
+    ratio = f"damping: {100.0 * damping.ratio:g} % at"
+    if isinstance(damping, StiffnessDamping):
+        return damping, f"{ratio} {damping.frequency:.2f} Hz, proportional to stiffness{how}"
     low, high = damping.frequencies
-    return damping, f"damping: {100.0 * damping.ratio:g} % at {low:.2f} and {high:.2f} Hz{how}"
+    return damping, f"{ratio} {low:.2f} and {high:.2f} Hz{how}"
+
+
+def _found(wanted: EffectiveDamping, dead: Equilibrium) -> tuple[Viscous, str]:
+    """Damping by effective modes about a dead load, and in words which modes they are."""
+    if wanted.kind == "rayleigh":
+        ends = effective_range(dead.model, dead, share=wanted.share)
+        return Rayleigh(wanted.ratio, ends.frequencies, wanted.joints), f"; {ends.text}"
+    first = first_effective(dead.model, dead)
+    return StiffnessDamping(wanted.ratio, first.frequency, wanted.joints), f"; {first.text}"
 
 
 def shaken(
-    case: Case, motion: Motion, dead: Equilibrium, damping: Rayleigh | None = None
+    case: Case, motion: Motion, dead: Equilibrium, damping: Viscous | None = None
 ) -> History:
     """Return the time history of a case under a motion; the history carries the case.
 

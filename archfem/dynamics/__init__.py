@@ -3,6 +3,7 @@
     time_history  a whole run: from dead load to the end of the motion
     schemes       damping, and the scheme that steps
     damping       damping right at the effective modes
+    impact        what a rocking block loses at impacts, and damping for a wanted loss
     steps         what passes between stepper and run: states, steps, batches
     stepping      the one stepper and its strategies
     energy        the energy balance of a run

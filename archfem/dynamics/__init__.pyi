@@ -6,11 +6,14 @@ from .events import MovingMechanism as MovingMechanism
 from .history import Ending as Ending
 from .history import History as History
 from .history import history_of as history_of
+from .impact import restitution as restitution
+from .impact import restitution_damping as restitution_damping
 from .scales import mechanism_scales as mechanism_scales
 from .schemes import HHT as HHT
 from .schemes import Conserving as Conserving
 from .schemes import Newmark as Newmark
 from .schemes import Rayleigh as Rayleigh
+from .schemes import StiffnessDamping as StiffnessDamping
 from .stepping.equation import Equation as Equation
 from .stepping.exact import Exact as Exact
 from .stepping.stepper import Stepper as Stepper

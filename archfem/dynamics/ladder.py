@@ -19,7 +19,7 @@ from archfem.dynamics.probe import (
     strongest,
     usual_damping,
 )
-from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.stepping.modal import LARGEST
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.quadrature import Quadrature
@@ -31,7 +31,7 @@ from archfem.models.model import Model, Prediction
 from archfem.models.rigid import rigid
 from archfem.motion.motion import Motion
 
-Damping = Rayleigh | Callable[[Model], Rayleigh | None] | None
+Damping = Viscous | Callable[[Model], Viscous | None] | None
 """Of a run to come: known, or to be found of the finest model."""
 
 Builder = Callable[[Structure, Discretisation], Model]
@@ -203,7 +203,7 @@ class _Yardstick:
 
     model: Model
     window: Motion
-    damping: Rayleigh
+    damping: Viscous
     safety: float
     finer: float
     _known: dict[float, Array] = field(default_factory=dict)
@@ -235,7 +235,7 @@ def _yardstick(
     )
 
 
-def damping_for(model: Model, damping: Damping) -> Rayleigh | None:
+def damping_for(model: Model, damping: Damping) -> Viscous | None:
     """Return the damping of a run, asked of a model where it is yet to be found.
 
     Args:

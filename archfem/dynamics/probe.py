@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import eigsh
 
 from archfem.arrays import Array
-from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import judged
@@ -50,8 +50,8 @@ def severe_motion(model: Model) -> Motion:
     return Motion.synthetic(duration=WINDOW, pga=pga, seed=1)
 
 
-def usual_damping(model: Model) -> Rayleigh:
-    """Return five per cent at the first closed frequency and at three times that.
+def usual_damping(model: Model) -> StiffnessDamping:
+    """Return five per cent at the first closed frequency, and no drag on the mass.
 
     Args:
         model: any rung of the ladder.
@@ -60,10 +60,10 @@ def usual_damping(model: Model) -> Rayleigh:
         model.closed().tocsc(), 1, model.mass.tocsc(), sigma=0.0, return_eigenvectors=False
     )[0]
     first = float(np.sqrt(square) / (2.0 * np.pi))
-    return Rayleigh(0.05, (first, 3.0 * first))
+    return StiffnessDamping(0.05, first)
 
 
-def peaks(model: Model, motion: Motion, damping: Rayleigh | None, dt: float) -> Array:
+def peaks(model: Model, motion: Motion, damping: Viscous | None, dt: float) -> Array:
     """Return the largest |e| of each judged joint over a run (n,) [-]; 0.5 where it came apart.
 
     Args:

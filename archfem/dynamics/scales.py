@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from archfem.dynamics.events import EveryMechanism, possible_counts
 from archfem.dynamics.history import Ending, history_of
-from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.errors import DidNotConverge, InvalidInput
@@ -166,7 +166,7 @@ def mechanism_scales(
     motion: Motion,
     *,
     start: Equilibrium | None = None,
-    damping: Rayleigh | None = None,
+    damping: Viscous | None = None,
     dt: float | None = None,
     criteria: Criteria | None = None,
     precision: float = 0.05,

@@ -13,7 +13,15 @@ from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.recorder import Recorder
-from archfem.dynamics.schemes import HHT, Conserving, Newmark, Rayleigh, Scheme
+from archfem.dynamics.schemes import (
+    HHT,
+    Conserving,
+    Newmark,
+    Rayleigh,
+    Scheme,
+    StiffnessDamping,
+    Viscous,
+)
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.pace import Pace
@@ -58,7 +66,11 @@ class Record:
 
 _KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
     "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
-    "damping": ((Rayleigh,), "damping", "give Rayleigh(0.05, (8.0, 16.0)), or None"),
+    "damping": (
+        (Rayleigh, StiffnessDamping),
+        "damping",
+        "give Rayleigh(0.05, (8.0, 16.0)), StiffnessDamping(0.05, 8.0), or None",
+    ),
     "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
     "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
     "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
@@ -74,7 +86,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     dt: float | None = None,
     tolerance: float | None = None,
     start: Equilibrium | State | None = None,
-    damping: Rayleigh | None = None,
+    damping: Viscous | None = None,
     scheme: Scheme | None = None,
     record: Record | None = None,
     until: Until | None = None,
@@ -98,7 +110,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
             the history says for which part of the shortest the error was larger.
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
-        damping: None is undamped.
+        damping: `StiffnessDamping`, also as by `effective_damping` or `restitution_damping`;
+            `Rayleigh`, whose mass part also drags blocks that are loose; None is undamped.
         scheme: `Conserving` (the default), `Newmark` (average acceleration) or `HHT`; the last two
             for joints that never slide.
         record: what is kept; by default the resultants of every step.

@@ -10,7 +10,7 @@ from tqdm import tqdm
 from archfem.arrays import Array
 from archfem.dynamics.ladder import Damping, Setting, damping_for, finest
 from archfem.dynamics.probe import largest_difference, peaks
-from archfem.dynamics.schemes import Rayleigh
+from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.masonry.structure import Structure
@@ -160,7 +160,7 @@ def _trial(
     setting: Setting,
     structure: Structure,
     motion: Motion,
-    damping: Rayleigh | None,
+    damping: Viscous | None,
     reference: Array,
 ) -> Trial:
     """Build, run and compare one setting; what is compiled on first use is not counted."""

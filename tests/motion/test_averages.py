@@ -1,5 +1,7 @@
 """Mean accelerations between instants."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -15,10 +17,10 @@ def test_means_are_those_of_the_straight_lines_between_samples(step):
     times = np.arange(0.0, 0.29, step)
     found = mean_accelerations(motion, times)
     for axis in range(2):
-        for k, (start, end) in enumerate(zip(times[:-1], times[1:], strict=True)):
+        for k, (start, end) in enumerate(pairwise(times)):
             kinks = np.arange(30) * 0.01
             inside = kinks[(kinks > start) & (kinks < end)]
-            wanted = quad(lambda t: motion.at(t)[0, axis], start, end, points=inside)[0]
+            wanted = quad(lambda t, of: motion.at(t)[0, of], start, end, axis, points=inside)[0]
             assert found[k, axis] == pytest.approx(wanted / (end - start), abs=1e-7)
 
 

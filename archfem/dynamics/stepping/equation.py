@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
 from archfem.dynamics.energy import Meter
-from archfem.dynamics.schemes import Conserving, Rayleigh, Scheme, check_sliding
+from archfem.dynamics.schemes import Conserving, Scheme, Viscous, check_sliding
 from archfem.dynamics.stepping.newmark import Numbers, numbers_of
 from archfem.dynamics.steps import State
 from archfem.joints.operator import JointOperator
@@ -46,7 +46,7 @@ class Equation:
 
     model: Model
     motion: Motion
-    damping: Rayleigh | None = None
+    damping: Viscous | None = None
     scheme: Scheme = field(default_factory=Conserving)
 
     def __post_init__(self) -> None:

@@ -99,13 +99,16 @@ class Stepper:
             passes,
             np.full(count, dt),
             energy,
-            lambda k: State(
-                float(times[k]),
-                *strategy.leave(series[k + 1]),
-                memory=memories[k + 1] if self.equation.remembers else None,
-            ),
+            lambda k: self._state(float(times[k]), series[k + 1], memories[k + 1]),
             readings=self._read(series[1 : count + 1, 0]),
         )
+
+    def _state(self, time: float, vectors: Array, memory: Array) -> State:
+        """A state, from the strategy's own terms."""
+        assert self.strategy is not None
+        q, velocity, acceleration = self.strategy.leave(vectors)
+        remembered = memory if self.equation.remembers else None
+        return State(time, q, velocity, acceleration, remembered)
 
     @cached_property
     def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array | None]:

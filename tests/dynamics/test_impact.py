@@ -1,0 +1,173 @@
+"""What a rocking block keeps at an impact, against its equations of motion integrated by SciPy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import archfem as af
+from archfem.dynamics.impact import restitution, restitution_damping
+
+BREADTH, HEIGHT, WEIGHT = 0.6, 2.4, 19620.0
+
+STONE = af.Material(30e9, 0.2, WEIGHT)
+
+TABLE = {0.05: 0.989, 0.1: 0.985, 0.2: 0.977, 0.5: 0.961, 1.0: 0.940, 1.5: 0.924, 3.0: 0.881}
+"""r for damping of the bounce on the whole base, of critical, at k_n = 1 MPa/mm: computed apart
+from this package by an energy-momentum scheme with finite rotations."""
+
+
+def contact(normal=1e9, friction=0.6):
+    return af.Contact(normal, 0.4 * normal, friction)
+
+
+def of_bounce(ratio, normal=1e9):
+    """Damping with a ratio of the bounce on the whole base, told at that frequency."""
+    mass = WEIGHT / 9.81 * HEIGHT
+    omega = np.sqrt(normal / mass)
+    return af.StiffnessDamping(0.3 * ratio, 0.3 * omega / (2.0 * np.pi))
+
+
+def pressed(left, right):
+    """∫ <y>₋ ds and ∫ s <y>₋ ds over the base, y straight from the left end to the right one."""
+    slope, half = (right - left) / BREADTH, BREADTH / 2.0
+    low, high = -half, half
+    if left >= 0.0 and right >= 0.0:
+        return 0.0, 0.0
+    if left * right < 0.0:
+        zero = -half - left / slope
+        low, high = (low, zero) if left < 0.0 else (zero, high)
+    middle, size = 0.5 * (low + high), high - low
+    value = 0.5 * (left + right) + slope * middle
+    return value * size, value * middle * size + slope * size**3 / 12.0
+
+
+def stored(left, right):
+    """½ ∫ <y>₋² ds over the base."""
+    if left >= 0.0 and right >= 0.0:
+        return 0.0
+    size = BREADTH
+    if left * right < 0.0:
+        size *= abs(min(left, right)) / abs(right - left)
+        left, right = min(left, right), 0.0
+    return size * (left**2 + left * right + right**2) / 6.0
+
+
+@cache
+def integrated(lag, normal=1e9, impacts=2):
+    """r of the block let go from half of α: three coordinates, dashpots where springs press."""
+    mass = WEIGHT / 9.81 * BREADTH * HEIGHT
+    inertia = mass * (BREADTH**2 + HEIGHT**2) / 12.0
+    shear = 0.4 * normal * BREADTH
+    ends = np.array([-BREADTH / 2.0, BREADTH / 2.0])
+
+    def rates(_, state):
+        q, v = state[:3], state[3:]
+        late = q + lag * v
+        force, moment = pressed(*(late[1] + late[2] * ends))
+        along = shear * (late[0] + late[2] * HEIGHT / 2.0)
+        turning = (-normal * moment - along * HEIGHT / 2.0) / inertia
+        return np.array([*v, -along / mass, -normal * force / mass - 9.81, turning])
+
+    def turning(_, state):
+        return state[5]
+
+    tilt = 0.5 * np.arctan(BREADTH / HEIGHT)
+    strip = np.sqrt(2.0 * mass * 9.81 / (normal * tilt))
+    start = [tilt * HEIGHT / 2.0, tilt * (BREADTH / 2.0 - strip), -tilt, 0.0, 0.0, 0.0]
+    run = solve_ivp(
+        rates, (0.0, 1.9), start, "LSODA", max_step=5e-3, rtol=1e-6, atol=1e-9, events=turning
+    )
+
+    def energy(state):
+        q, v = state[:3], state[3:]
+        slip = q[0] + q[2] * HEIGHT / 2.0
+        kinetic = 0.5 * mass * (v[0] ** 2 + v[1] ** 2) + 0.5 * inertia * v[2] ** 2
+        joint = normal * stored(*(q[1] + q[2] * ends)) + 0.5 * shear * slip**2
+        return kinetic + joint + mass * 9.81 * q[1]
+
+    rest = -0.5 * (mass * 9.81) ** 2 / (normal * BREADTH)
+    turns = [np.array(start)]
+    for state in run.y_events[0]:
+        if state[2] * turns[-1][2] < 0.0:
+            turns.append(state)
+        elif abs(state[2]) > abs(turns[-1][2]):
+            turns[-1] = state
+    first, last = (energy(turns[k]) - rest for k in (0, impacts))
+    return np.sqrt(last / first) ** (1.0 / impacts)
+
+
+@pytest.mark.parametrize("wanted", [0.97, 0.95, 0.92])
+def test_found_damping_gives_the_wanted_restitution(wanted):
+    """To 1e-3, by the block's own equations, and by a run of the package on a finer scale."""
+    given = {"contact": contact(friction=None), "material": STONE}
+    damping = restitution_damping(wanted, BREADTH, HEIGHT, **given)
+    assert damping.mass == 0.0
+    assert restitution(damping, BREADTH, HEIGHT, **given) == pytest.approx(wanted, abs=1e-4)
+    assert integrated(damping.stiffness) == pytest.approx(wanted, abs=1e-3)
+
+
+@pytest.mark.parametrize(("ratio", "known"), TABLE.items())
+def test_restitution_falls_with_damping(ratio, known):
+    """To 2e-3: rotations are small here and finite there."""
+    found = restitution(of_bounce(ratio), BREADTH, HEIGHT, contact=contact(), material=STONE)
+    assert found == pytest.approx(known, abs=2e-3)
+
+
+def test_friction_that_holds_does_not_matter():
+    given = {"breadth": BREADTH, "height": HEIGHT, "material": STONE}
+    found = [
+        restitution(of_bounce(0.5), contact=contact(friction=each), **given) for each in (0.6, None)
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
+def test_housner_is_the_default_where_it_can_be_reached():
+    """At 1 - 3/2 sin² α = 0.9118; the damping is 1.9 times critical of the bounce."""
+    given = {"contact": contact(), "material": STONE}
+    damping = restitution_damping(None, BREADTH, HEIGHT, **given)
+    wanted = 1.0 - 1.5 * np.sin(np.arctan(BREADTH / HEIGHT)) ** 2
+    assert restitution(damping, BREADTH, HEIGHT, **given) == pytest.approx(wanted, abs=1e-4)
+    assert wanted == pytest.approx(0.9118, abs=1e-4)
+
+
+def test_the_usual_damping_lets_a_block_rock():
+    """Less is lost than at rigid impacts; Rayleigh damping loses most of the energy each swing."""
+    shape = af.column(breadth=BREADTH, heights=[HEIGHT], contact=contact(), material=STONE)
+    model = af.build(shape, fidelity="rigid", quadrature="exact")
+    free, dragged = (
+        restitution(
+            af.dynamics.effective_damping(model, kind=kind),
+            BREADTH,
+            HEIGHT,
+            contact=contact(),
+            material=STONE,
+        )
+        for kind in ("stiffness", "rayleigh")
+    )
+    assert 0.9118 < free == pytest.approx(0.965, abs=2e-3)
+    assert dragged < 0.5
+
+
+@pytest.mark.parametrize("wanted", [0.5, 0.999, 1.2])
+def test_what_damping_cannot_do_is_told_with_what_it_can(wanted):
+    with pytest.raises(af.InvalidInput, match=r"out of reach.* from 0\.88\d to 0\.99\d: give"):
+        restitution_damping(wanted, BREADTH, HEIGHT, contact=contact(), material=STONE)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"height": 0.4}, "0.6 m broad and 0.4 m high does not rock"),
+        ({"breadth": -1.0}, "-1.0 m broad"),
+        ({"breadth": "wide"}, "is not a finite number"),
+        ({"contact": contact(friction=0.1)}, r"slides before it turns .* is 0\.1: it needs 0\.18"),
+        ({"contact": 1e9}, "contact is a float"),
+        ({"material": 2e4}, "material is a float"),
+    ],
+)
+def test_blocks_that_cannot_be_meant(change, words):
+    given = {"breadth": BREADTH, "height": HEIGHT, "contact": contact(), "material": STONE}
+    with pytest.raises(af.InvalidInput, match=words):
+        restitution_damping(0.95, **{**given, **change})
