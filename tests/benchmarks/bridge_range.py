@@ -33,7 +33,7 @@ from archfem.models.build import build
 from archfem.units import mm
 
 DT = 0.005
-"""Time step, as the case has it; half of it changes no verdict [s]."""
+"""Time step, as the case has it; half of it adds one mechanism in a ring, of one step [s]."""
 
 MESHES = Path(__file__).parents[2] / "meshes"
 
