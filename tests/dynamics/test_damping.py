@@ -34,7 +34,7 @@ def test_effective_modes_are_those_of_all_modes(ring):
         assert found.frequencies == pytest.approx(ends, rel=SAME)
     text = effective_range(model, dead, share=0.8).text
     assert text.startswith("modes 1 and 4, the first and the last effective along x; up to the ")
-    assert "88.3 % of the mass, most of it 1 (7.93 Hz, 70.8 %), 2 (" in text
+    assert "88.2 % of the mass, most of it 1 (7.91 Hz, 70.7 %), 2 (" in text
 
 
 @pytest.mark.parametrize("cells", [(2, 2), (3, 3)])
@@ -80,7 +80,7 @@ def test_effective_damping_has_its_ratio_at_the_first_effective_mode(ring):
 def test_first_effective_mode_is_told(ring):
     model = af.build(ring, fidelity="rigid")
     text = first_effective(model, af.dead_load(model)).text
-    assert text == "mode 1, the first effective along x, has 70.8 % of the mass"
+    assert text == "mode 1, the first effective along x, has 70.7 % of the mass"
 
 
 def test_a_block_in_flight_is_not_dragged():

@@ -38,7 +38,7 @@ LOOSE = af.Criteria(hinge=0.38)
 @pytest.fixture(scope="module")
 def weak(motion):
     """A motion under which joints hinge by |e| of 0.38, and never four by 0.46."""
-    return motion.scaled(0.6)
+    return motion.scaled(0.7)
 
 
 @pytest.mark.parametrize(

@@ -129,5 +129,6 @@ def restarted(method="auto", fidelity="faces"):
         path = shaken(model, motion.cut(0.0, 2.0), method=method).save(Path(place) / "half.nc")
         start = last_state(af.History.read(path))
     rest = shaken(model, motion, start=start, method=method)
-    same = af.History(whole.dataset.isel(time=slice(-len(rest.time), None)))
-    return answer(rest, off(rest, same), 1e-8)
+    after = slice(1 - len(rest.time), None)  # the first is a state, the others means over steps
+    same, found = (af.History(run.dataset.isel(time=after)) for run in (whole, rest))
+    return answer(rest, off(found, same), 1e-8)

@@ -164,7 +164,7 @@ def shaken(model, motion: af.Motion, *, dt: float = DT, damping=DAMPING, **given
 
 def peaks(run: af.History) -> np.ndarray:
     """Largest |e| of every joint (n_joints,)."""
-    return np.nanmax(np.abs(run.joints["eccentricity"].values), axis=0)
+    return np.nan_to_num(np.abs(run.joints["eccentricity"].values)).max(axis=0)
 
 
 def off(run: af.History, other: af.History) -> float:

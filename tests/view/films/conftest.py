@@ -21,7 +21,9 @@ def shaken(model):
     time = np.linspace(0.0, 0.3, 61)
     motion = af.Motion(6.0 * np.sin(2.0 * np.pi * time / 0.3), 0.005, name="pulse")
     damping = af.Rayleigh(0.05, (8.0, 16.0))
-    return af.time_history(model, motion, damping=damping, record=af.Record(fields_every=5))
+    return af.time_history(
+        model, motion, dt=0.005, damping=damping, record=af.Record(fields_every=5)
+    )
 
 
 @pytest.fixture(scope="session")
