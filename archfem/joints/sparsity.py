@@ -38,8 +38,13 @@ class Pattern:
         """Number of rows."""
         return len(self.indptr) - 1
 
-    def _places(self, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.intp]:
-        """Positions of entries in the data of this pattern."""
+    def places(self, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.intp]:
+        """Return the positions of entries in the data of this pattern (k,).
+
+        Args:
+            rows: of the entries (k,).
+            columns: of the entries (k,).
+        """
         own = np.repeat(np.arange(self.size, dtype=np.int64), np.diff(self.indptr))
         keys = own * self.size + self.indices
         wanted = rows.astype(np.int64) * self.size + columns
@@ -65,7 +70,7 @@ class Pattern:
         """
         entries = matrix.tocoo()
         data = np.zeros(len(self.indices))
-        np.add.at(data, self._places(entries.row, entries.col), entries.data)
+        np.add.at(data, self.places(entries.row, entries.col), entries.data)
         return self.matrix(data)
 
     def outer(self, left: sparse.csr_matrix, right: sparse.csr_matrix) -> sparse.csr_matrix:
@@ -81,6 +86,6 @@ class Pattern:
         within = np.arange(len(which)) - np.repeat(np.cumsum(size) - size, size)
         first = left.indptr[which] + within // across[which]
         second = right.indptr[which] + within % across[which]
-        places = self._places(left.indices[first], right.indices[second])
+        places = self.places(left.indices[first], right.indices[second])
         values = left.data[first] * right.data[second]
         return sparse.csr_matrix((values, (places, which)), (len(self.indices), left.shape[0]))

@@ -1,0 +1,169 @@
+"""Joints of blocks that move as far as they like, over a step, compiled.
+
+The mean forces of a step, what joints remember at its end, and the derivative by the coordinates
+there: faces' poses by `poses`, measures by `frames`, the law by `overlap`. At an instant, that is
+over a step that goes nowhere, forces are those of statics and twice the derivative is the tangent.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.joints.frames import bend, discrete, gradient, measures
+from archfem.joints.overlap import (
+    Faces,
+    overlap,
+    press_faces,
+    rub_faces,
+    stored,
+)
+from archfem.joints.poses import Sides, pose, pose_bend, pose_gradient
+
+
+class Moved(NamedTuple):
+    """Joints between blocks that move.
+
+    Attributes:
+        sides: faces of the blocks.
+        faces: what the law needs.
+        angle: direction of the normals before anything moved (j,) [rad].
+    """
+
+    sides: Sides
+    faces: Faces
+    angle: Array
+
+
+class Answer(NamedTuple):
+    """What joints do over a step, filled by `pass_joints`.
+
+    Attributes:
+        force: mean generalised forces of each joint, of the lower block's coordinates and of the
+            higher's (j, 2, s).
+        rate: derivative by the coordinates at the end (j, 2, s, 2, s).
+        resultants: mean N, V, M (j, 3) [N, N, N m].
+        slid: how far each point has slid for good at the end (j, 2 m) [m].
+        lost: energy that friction and the lag take (j,) [J].
+    """
+
+    force: Array
+    rate: Array
+    resultants: Array
+    slid: Array
+    lost: Array
+
+
+def answer(joints: Moved) -> Answer:
+    """Return room for what joints do.
+
+    Args:
+        joints: of which.
+    """
+    count, size = len(joints.angle), 3 + joints.sides.shapes.shape[-1]
+    return Answer(
+        np.zeros((count, 2, size)),
+        np.zeros((count, 2, size, 2, size)),
+        np.zeros((count, 3)),
+        np.zeros((count, 2 * joints.faces.facets)),
+        np.zeros(count),
+    )
+
+
+@numba.njit(cache=True)
+def find_measures(joints, joint, q, found):  # type: ignore
+    """Find opening, slip and turn of a joint.
+
+    Args:
+        joints: `Moved`.
+        joint: its number.
+        q: coordinates (n,).
+        found: filled (3,) [m, m, -].
+    """
+    poses = np.empty((2, 3))
+    for side in range(2):
+        pose(joints.sides, joint, side, q, poses[side])
+    measures(poses[0], poses[1], joints.angle[joint], found)
+
+
+@numba.njit(cache=True)
+def all_measures(joints, q):  # type: ignore
+    """Return opening, slip and turn of all joints (j, 3) [m, m, -].
+
+    Args:
+        joints: `Moved`.
+        q: coordinates (n,).
+    """
+    found = np.empty((len(joints.angle), 3))
+    for joint in range(len(found)):
+        find_measures(joints, joint, q, found[joint])
+    return found
+
+
+@numba.njit(cache=True)
+def joint_energy(joints, q, slid):  # type: ignore
+    """Return the energy stored in all joints [J].
+
+    Args:
+        joints: `Moved`.
+        q: coordinates (n,).
+        slid: how far each point has slid for good (j, 2 m) [m].
+    """
+    found, total, faces = np.empty(3), 0.0, joints.faces
+    for joint in range(len(joints.angle)):
+        find_measures(joints, joint, q, found)
+        length = overlap(faces.depth[joint], found[1])[0]
+        total += faces.normal[joint] * length * stored(length, found[0], found[2])
+        for point in range(2 * faces.facets):
+            total += 0.5 * faces.shear[joint] * (found[1] - slid[joint, point]) ** 2
+    return total
+
+
+@numba.njit(cache=True)
+def pass_joints(joints, before, after, late, slid, found):  # type: ignore
+    """Find what joints do over a step.
+
+    Args:
+        joints: `Moved`.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
+        late: lag of damping over the length of the step [-].
+        slid: how far each point has slid for good before (j, 2 m) [m].
+        found: `Answer`, filled.
+    """
+    sides, size = joints.sides, found.force.shape[2]
+    poses, ends = np.empty((2, 2, 3)), np.empty((2, 3))
+    rates, now, curved = np.empty((3, 6)), np.empty((3, 6)), np.empty((6, 6))
+    own, last = np.empty((2, 3, size)), np.empty((2, 3, size))
+    turned, force, rate = np.empty((size, size)), np.empty(3), np.empty((3, 3))
+    normals = np.empty((2 * joints.faces.facets, 4))
+    for joint in range(len(joints.angle)):
+        for side in range(2):
+            pose(sides, joint, side, before, poses[0, side])
+            pose(sides, joint, side, after, poses[1, side])
+            pose_gradient(sides, joint, side, before, after, own[side])
+            pose_gradient(sides, joint, side, after, after, last[side])
+        angle = joints.angle[joint]
+        for end in range(2):
+            measures(poses[end, 0], poses[end, 1], angle, ends[end])
+        discrete(poses[0], poses[1], angle, rates)
+        gradient(poses[1], angle, now)
+        lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
+        shear, rubbing = rub_faces(
+            joints.faces, joint, ends, late, normals, slid[joint], force, rate, found.slid[joint]
+        )
+        found.resultants[joint, 0], found.resultants[joint, 1] = -force[0], shear
+        found.resultants[joint, 2] = force[2]
+        found.lost[joint] = lagging + rubbing
+        bend(poses[0], poses[1], angle, force, curved)
+        curved += rates.T @ rate @ now
+        pushed = rates.T @ force
+        for side in range(2):
+            pushing = pushed[3 * side : 3 * side + 3]
+            found.force[joint, side] = own[side].T @ pushing
+            for other in range(2):
+                block = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3].copy()
+                found.rate[joint, side, :, other, :] = own[side].T @ block @ last[other]
+            pose_bend(sides, joint, side, before, after, pushing, turned)
+            found.rate[joint, side, :, side, :] += turned

@@ -1,0 +1,139 @@
+"""Where the faces of blocks are that turn as far as they like, compiled.
+
+A block has the displacement (x, y) of its centroid, its angle θ, and where it is elastic shapes ξ in
+the frame that turns with it. A face with its middle at r from the centroid then has the pose
+
+    p = (x, y) + R(θ)(r + U ξ) - r,   θ + Θ ξ.
+
+Displacements, never positions: the difference of two large numbers would lose what stiff joints
+need. Over a step the discrete derivative takes the change of coordinates to that of the pose
+exactly, as in `frames`.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.joints.frames import sinc, sinc_rate
+
+
+class Sides(NamedTuple):
+    """The two faces of all joints, of the lower and of the higher block.
+
+    Attributes:
+        start: first coordinate of the block, -1 of one that does not move (j, 2).
+        size: number of its coordinates, 0 of one that does not move (j, 2).
+        arm: from the centroid to the middle of the face (j, 2, 2) [m].
+        shapes: U and Θ, x, y and angle of the face per shape (j, 2, 3, s).
+        held: pose where the block does not move (j, 2, 3) [m, m, rad].
+    """
+
+    start: Any
+    size: Any
+    arm: Array
+    shapes: Array
+    held: Array
+
+
+@numba.njit(cache=True)
+def _reach(sides, joint, side, q):  # type: ignore
+    """r + U ξ."""
+    x, y = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    start = sides.start[joint, side] + 3
+    for k in range(sides.size[joint, side] - 3):
+        x += sides.shapes[joint, side, 0, k] * q[start + k]
+        y += sides.shapes[joint, side, 1, k] * q[start + k]
+    return x, y
+
+
+@numba.njit(cache=True)
+def pose(sides, joint, side, q, found):  # type: ignore
+    """Find the pose of a face.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        q: coordinates (n,).
+        found: filled (3,) [m, m, rad].
+    """
+    start = sides.start[joint, side]
+    if start < 0:
+        found[:] = sides.held[joint, side]
+        return
+    x, y = _reach(sides, joint, side, q)
+    c, s = np.cos(q[start + 2]), np.sin(q[start + 2])
+    less = -2.0 * np.sin(0.5 * q[start + 2]) ** 2  # cos θ - 1
+    dx, dy = x - sides.arm[joint, side, 0], y - sides.arm[joint, side, 1]
+    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    found[0] = q[start] + less * rx - s * ry + c * dx - s * dy
+    found[1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
+    found[2] = q[start + 2]
+    for k in range(sides.size[joint, side] - 3):
+        found[2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
+
+
+@numba.njit(cache=True)
+def pose_gradient(sides, joint, side, before, after, rates):  # type: ignore
+    """Find what takes the change of coordinates over a step to that of the pose of a face.
+
+    With both ends the same it is the derivative there.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
+        rates: filled in its first columns (3, s).
+    """
+    start, size = sides.start[joint, side], sides.size[joint, side]
+    rates[:] = 0.0
+    if start < 0:
+        return
+    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
+    x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    half = 0.5 * (after[start + 2] - before[start + 2])
+    middle = before[start + 2] + half
+    c, s, shrunk, mean = np.cos(middle), np.sin(middle), sinc(half), np.cos(half)
+    rates[0, 0] = rates[1, 1] = rates[2, 2] = 1.0
+    rates[0, 2], rates[1, 2] = -shrunk * (s * x + c * y), shrunk * (c * x - s * y)
+    for k in range(size - 3):
+        u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
+        rates[0, 3 + k], rates[1, 3 + k] = mean * (c * u - s * v), mean * (s * u + c * v)
+        rates[2, 3 + k] = sides.shapes[joint, side, 2, k]
+
+
+@numba.njit(cache=True)
+def pose_bend(sides, joint, side, before, after, force, rates):  # type: ignore
+    """Find the derivative of generalised forces on a face by the coordinates at the end.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
+        force: on the pose, which is held (3,) [N, N, N m].
+        rates: filled in its first rows and columns (s, s).
+    """
+    start, size = sides.start[joint, side], sides.size[joint, side]
+    rates[:] = 0.0
+    if start < 0:
+        return
+    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
+    x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    half = 0.5 * (after[start + 2] - before[start + 2])
+    middle = before[start + 2] + half
+    c, s, shrunk, mean = np.cos(middle), np.sin(middle), sinc(half), np.cos(half)
+    along = force[0] * (c * x - s * y) + force[1] * (s * x + c * y)  # F·R x
+    across = -force[0] * (s * x + c * y) + force[1] * (c * x - s * y)  # F·J R x
+    rates[2, 2] = 0.5 * (sinc_rate(half) * across - shrunk * along)
+    for k in range(size - 3):
+        u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
+        straight = force[0] * (c * u - s * v) + force[1] * (s * u + c * v)
+        turned = -force[0] * (s * u + c * v) + force[1] * (c * u - s * v)
+        rates[3 + k, 2] = 0.5 * (mean * turned - np.sin(half) * straight)
+        rates[2, 3 + k] = 0.5 * shrunk * turned
