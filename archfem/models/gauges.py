@@ -15,6 +15,7 @@ from archfem.arrays import Array
 from archfem.joints.faces import face_matrix
 from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 
 _made: WeakKeyDictionary[Model, "Gauges"] = WeakKeyDictionary()
 
@@ -42,12 +43,14 @@ class Gauges:
     joints: int
 
     @classmethod
-    def on(cls, model: Model) -> "Gauges":
+    def on(cls, model: Model) -> "Gauges | MovedGauges":
         """Return the gauges of a model, made once.
 
         Args:
             model: any rung.
         """
+        if isinstance(model, Moving):
+            return MovedGauges(model)
         if model not in _made:
             _made[model] = cls._made_for(model)
         return _made[model]
@@ -90,3 +93,37 @@ class Gauges:
             readings: (…, r).
         """
         return readings[..., 3 * self.joints :].reshape(*readings.shape[:-1], -1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class MovedGauges:
+    """Readings of a model whose blocks move as far as they like, in the same order.
+
+    Attributes:
+        model: whose they are.
+    """
+
+    model: Moving
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.model.structure.joints)
+
+    def read(self, q: Array) -> Array:
+        """Return all readings (r,).
+
+        Args:
+            q: coordinates (n,).
+        """
+        gap, slip, turn = self.model.measures(q).T
+        cells, blocks = self.model.cells, len(self.model.structure.blocks)
+        moved = cells.displacement(q)
+        count = np.maximum(np.bincount(cells.block, minlength=blocks), 1)
+        middles = [np.bincount(cells.block, column, blocks) / count for column in moved.T]
+        return np.concatenate(
+            [gap, 2.0 * np.arcsin(0.5 * turn), slip, np.column_stack(middles).ravel()]
+        )
+
+    faces = Gauges.faces
+    middles = Gauges.middles
