@@ -125,5 +125,13 @@ class MovedGauges:
             [gap, 2.0 * np.arcsin(0.5 * turn), slip, np.column_stack(middles).ravel()]
         )
 
+    def over(self, states: Array) -> Array:
+        """Return the readings of many states (steps, r).
+
+        Args:
+            states: coordinates (steps, n).
+        """
+        return np.array([self.read(q) for q in states])
+
     faces = Gauges.faces
     middles = Gauges.middles

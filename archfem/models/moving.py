@@ -63,6 +63,7 @@ class Moving:
         self.structure = small.structure
         self.fidelity = small.fidelity
         self.size = self.at_rest.size
+        self.starts = np.append(sorted(blocks.starts.values()), self.size)
         self.joints = blocks.joints(self.at_rest)
         self._slots, coupled = _couplings(self.joints.sides, self.size)
         pattern = Pattern.of(self.at_rest.mass, self.at_rest.blocks, coupled)

@@ -105,8 +105,8 @@ class Equation:
     @property
     def remembers(self) -> int:
         """How many joint points remember what they have slid."""
-        joints = self.model.operator
-        return len(joints.points.arm) if joints is not None and joints.slides else 0
+        slides = bool(np.isfinite(self.model.structure.friction).any())
+        return len(self.model.memory) if slides else 0
 
     @cached_property
     def meter(self) -> Meter:

@@ -12,9 +12,9 @@ from archfem.arrays import Array
 from archfem.dynamics.stepping import loop
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.exact import Exact
-from archfem.dynamics.stepping.strategy import Strategy, in_own_terms
+from archfem.dynamics.stepping.strategy import Reordered, Strategy, in_own_terms
 from archfem.dynamics.steps import Batch, State
-from archfem.models.gauges import Gauges
+from archfem.models.gauges import Gauges, MovedGauges
 
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""
@@ -111,15 +111,20 @@ class Stepper:
         return State(time, q, velocity, acceleration, remembered)
 
     @cached_property
-    def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array | None]:
-        """Of the model, from the strategy's own terms: matrix, and offset where there is one."""
+    def _gauges(self) -> tuple[sparse.csr_matrix | Array, Array | None] | MovedGauges:
+        """Of the model: in the strategy's own terms where they are a matrix, and its offset."""
         assert self.strategy is not None
         gauges, mass = Gauges.on(self.equation.model), self.equation.model.mass
+        if isinstance(gauges, MovedGauges):
+            return gauges
         offset = gauges.offset if gauges.offset.any() else None
         return in_own_terms(self.strategy, gauges.matrix, mass), offset
 
     def _read(self, displacements: Array) -> Array:
         """Readings (steps, r), from displacements in the strategy's own terms (steps, m)."""
+        if isinstance(self._gauges, MovedGauges):
+            assert isinstance(self.strategy, Reordered)
+            return self._gauges.over(self.strategy.left(displacements))
         matrix, offset = self._gauges
         readings: Array = (matrix @ np.ascontiguousarray(displacements.T)).T
         return readings if offset is None else readings + offset

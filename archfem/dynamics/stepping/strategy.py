@@ -128,3 +128,11 @@ class Reordered:
             vectors: a state in order (3, n).
         """
         return vectors[:, self._place]
+
+    def left(self, displacements: Array) -> Array:
+        """Return displacements as the model orders them (steps, n).
+
+        Args:
+            displacements: in order (steps, n).
+        """
+        return displacements[:, self._place]

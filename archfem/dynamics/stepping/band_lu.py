@@ -1,0 +1,61 @@
+"""Gauss's elimination in a band, with row exchanges, compiled.
+
+Row i of a band of half-width b holds columns i - b … i + 2 b of a matrix: exchanges fill b more to
+the right. The matrix need not be symmetric.
+"""
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def eliminate(band, vector):  # type: ignore
+    """Solve a system in place.
+
+    Args:
+        band: the matrix, destroyed (n, 3 b + 1).
+        vector: right side, then solution (n,).
+
+    Returns:
+        Whether the matrix is regular.
+    """
+    size, half = len(vector), (band.shape[1] - 1) // 3
+    for k in range(size):
+        below = min(k + half, size - 1)
+        pivot, largest = k, abs(band[k, half])
+        for i in range(k + 1, below + 1):
+            if abs(band[i, half + k - i]) > largest:
+                pivot, largest = i, abs(band[i, half + k - i])
+        if largest == 0.0:
+            return False
+        last = min(k + 2 * half, size - 1)
+        if pivot != k:
+            shift = k - pivot
+            for j in range(k, last + 1):
+                upper = band[k, half + j - k]
+                band[k, half + j - k] = band[pivot, half + j - k + shift]
+                band[pivot, half + j - k + shift] = upper
+            vector[k], vector[pivot] = vector[pivot], vector[k]
+        for i in range(k + 1, below + 1):
+            factor = band[i, half + k - i] / band[k, half]
+            if factor != 0.0:
+                shift = k - i
+                for j in range(k + 1, last + 1):
+                    band[i, half + j - k + shift] -= factor * band[k, half + j - k]
+                vector[i] -= factor * vector[k]
+    for k in range(size - 1, -1, -1):
+        total = vector[k]
+        for j in range(k + 1, min(k + 2 * half, size - 1) + 1):
+            total -= band[k, half + j - k] * vector[j]
+        vector[k] = total / band[k, half]
+    return True
+
+
+def half_width(matrix) -> int:  # type: ignore
+    """Return the half-width of a sparse matrix.
+
+    Args:
+        matrix: in its order (n, n).
+    """
+    entries = matrix.tocoo()
+    return int(np.abs(entries.row - entries.col).max(initial=0))

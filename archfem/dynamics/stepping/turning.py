@@ -1,0 +1,308 @@
+"""The strategy for blocks that move as far as they like: Newton's method at every step.
+
+Nothing is linear here but the inertia and the blocks themselves. With the coordinates in an order
+that makes the tangent a narrow band,
+
+    (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g,
+
+f̄ the mean force of the joints, by `joints.moved`. Passes that go round in a circle, of points that
+hold and slide in turn, are halved.
+"""
+
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numba
+import numpy as np
+from numba.extending import overload
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.band_lu import eliminate, half_width
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.loop import ITERATIONS, begin, measure, settle
+from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
+from archfem.dynamics.stepping.strategy import Reordered
+from archfem.joints.moved import Answer, Moved, answer, joint_energy, pass_joints
+from archfem.joints.poses import Sides
+from archfem.models.moving import Moving
+
+ENOUGH = 1e-10
+"""Force left out of balance, relative to the weight."""
+
+ROUNDED = 1e-13
+"""Correction, relative to the size of the structure, below which more passes change nothing."""
+
+WHOLE = 7
+"""Passes that take whole steps."""
+
+SETUP = 0.05
+"""Estimate of the time until the first step can be taken [s]."""
+
+
+class TurningSystem(NamedTuple):
+    """A structure in the order of its band, and the numbers of a step.
+
+    Attributes:
+        turning: joints.
+        room: for what joints do over a step.
+        slid: how far points have slid for good at its start (j, 2 m) [m].
+        mass: M.
+        blocks: K, of the blocks alone.
+        viscous: C.
+        band: 2 M/Δt² + C/Δt + (½ + β/Δt) K (n, 3 b + 1).
+        weight: forces of gravity (n,).
+        body: forces per unit ground acceleration (2, n).
+        step: Δt, and β/Δt.
+        enough: force left out of balance that ends the passes [N], and correction [m].
+    """
+
+    turning: Moved
+    room: Answer
+    slid: Array
+    mass: Rows
+    blocks: Rows
+    viscous: Rows
+    band: Array
+    weight: Array
+    body: Array
+    step: tuple[float, float]
+    enough: tuple[float, float]
+
+
+class Turning(Reordered):
+    """Steps of blocks that move as far as they like.
+
+    Args:
+        equation: of motion.
+    """
+
+    name: ClassVar[str] = "turning"
+
+    def __init__(self, equation: Equation) -> None:
+        model = equation.model
+        assert isinstance(model, Moving)
+        self._equation, self._model = equation, model
+        self._blocks = _narrow(model)
+        pieces = [np.arange(*model.starts[k : k + 2]) for k in self._blocks]
+        super().__init__(np.concatenate(pieces))
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """Return the strategy, or None where displacements are small.
+
+        Args:
+            equation: of motion.
+        """
+        fits = isinstance(equation.model, Moving) and equation.conserving
+        return cls(equation) if fits else None
+
+    @property
+    def setup(self) -> float:
+        """Estimate of the time until the first step can be taken [s]."""
+        return SETUP
+
+    def system(self, dt: float) -> TurningSystem:
+        """Return all that steps of this length need.
+
+        Args:
+            dt: time step [s].
+        """
+        equation, model, order = self._equation, self._model, self.order
+        late = equation.lag / dt
+        mass, blocks, viscous, closed = (
+            each[order][:, order].tocsr()
+            for each in (model.mass, model.blocks, equation.viscous, model.closed())
+        )
+        effective = (2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks
+        room = answer(model.joints)
+        return TurningSystem(
+            model.joints._replace(sides=self._sides()),
+            room,
+            np.zeros_like(room.slid),
+            rows_of(mass),
+            rows_of(blocks),
+            rows_of(viscous),
+            _banded(effective, half_width(closed)),
+            equation.weight[order],
+            np.ascontiguousarray(model.body[order].T),
+            (dt, late),
+            (ENOUGH * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
+        )
+
+    def _sides(self) -> Sides:
+        """The joints' faces, with coordinates in the order of the band."""
+        sides, starts = self._model.joints.sides, self._model.starts
+        sizes = np.diff(starts)[self._blocks]
+        moved = np.full(starts[-1] + 1, -1)
+        moved[starts[self._blocks]] = np.cumsum(sizes) - sizes
+        return sides._replace(start=np.where(sides.start < 0, -1, moved[sides.start]))
+
+
+def _narrow(model: Moving) -> Any:
+    """Free blocks in an order that keeps neighbours close."""
+    free, pairs = np.array(model.structure.free), model.structure.pairs
+    place = np.full(len(model.structure.blocks), -1)
+    place[free] = np.arange(len(free))
+    inner = place[pairs[np.all(place[pairs] >= 0, axis=1)]]
+    graph = sparse.csr_matrix((np.ones(len(inner)), inner.T), 2 * (len(free),))
+    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+
+
+def _banded(matrix: sparse.csr_matrix, half: int) -> Array:
+    """A matrix as a band with room for its elimination (n, 3 b + 1)."""
+    entries = matrix.tocoo()
+    band = np.zeros((matrix.shape[0], 3 * half + 1))
+    band[entries.row, half + entries.col - entries.row] = entries.data
+    return band
+
+
+class Turned(NamedTuple):
+    """What is carried from step to step.
+
+    Attributes:
+        band: of a pass, destroyed by it (n, 3 b + 1).
+        rest: forces out of balance, then the correction (n,).
+        image: room (n,).
+        constant: what of the forces does not depend on the end of the step (n,).
+        move: Δq (n,).
+    """
+
+    band: Array
+    rest: Array
+    image: Array
+    constant: Array
+    move: Array
+
+
+def _is_system(system: Any) -> bool:
+    return getattr(system, "instance_class", None) is TurningSystem
+
+
+@overload(begin)
+def _begin(system, state, memory):  # type: ignore
+    return _started if _is_system(system) else None
+
+
+@overload(settle)
+def _settle(system, kept, step, states, ground):  # type: ignore
+    return _settled if _is_system(system) else None
+
+
+@overload(measure)
+def _measure(system, kept, step, states, ground, results, memory):  # type: ignore
+    return _measured if _is_system(system) else None
+
+
+def _started(system, state, memory):  # type: ignore
+    """Room for the steps, and what joints remember."""
+    size = state.shape[1]
+    points = system.slid.shape[1]
+    for place in range(len(memory)):
+        system.slid[place // points, place % points] = memory[place]
+    return Turned(
+        np.empty_like(system.band), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    )
+
+
+def _settled(system, kept, step, states, ground):  # type: ignore
+    """Take a step by Newton's method."""
+    dt = system.step[0]
+    old, new, move, rest = states[0], states[1], kept.move, kept.rest
+    _load(system, kept, old, ground)
+    move[:] = dt * old[1]
+    last = np.inf
+    for turn in range(ITERATIONS):
+        new[0] = old[0] + move
+        left = _left(system, kept, old[0], new[0])
+        if left <= system.enough[0] or (last <= system.enough[1] and left <= 1e4 * system.enough[0]):
+            new[1] = (2.0 / dt) * move - old[1]
+            new[2] = (new[1] - old[1]) / dt
+            return turn + 1
+        _assemble(system, kept)
+        if not eliminate(kept.band, rest):
+            return -1
+        rest *= 1.0 if turn < WHOLE else 0.5
+        last = np.max(np.abs(rest))
+        if not last < np.inf:
+            return -1
+        move += rest
+    return -1
+
+
+@numba.njit(cache=True)
+def _load(system, kept, old, ground):  # type: ignore
+    """Forces that do not depend on the end of the step."""
+    constant, image = kept.constant, kept.image
+    times(system.mass, old[1], image)
+    for k in range(len(constant)):
+        inertia = 2.0 / system.step[0] * image[k]
+        constant[k] = system.weight[k] + inertia
+        constant[k] -= ground[0] * system.body[0, k] + ground[1] * system.body[1, k]
+    if stored(system.blocks) > 0:
+        times(system.blocks, old[0], image)
+        constant -= image
+
+
+@numba.njit(cache=True)
+def _left(system, kept, before, after):  # type: ignore
+    """Find the forces out of balance; returns their norm."""
+    rest, band, joints = kept.rest, system.band, system.turning
+    half, size = (band.shape[1] - 1) // 3, len(rest)
+    pass_joints(joints, before, after, system.step[1], system.slid, system.room)
+    rest[:] = kept.constant
+    for i in range(size):
+        total = 0.0
+        for j in range(max(0, i - half), min(size, i + half + 1)):
+            total += band[i, half + j - i] * kept.move[j]
+        rest[i] -= total
+    start, sizes, force = joints.sides.start, joints.sides.size, system.room.force
+    for joint in range(len(start)):
+        for side in range(2):
+            first = start[joint, side]
+            for k in range(sizes[joint, side]):
+                rest[first + k] -= force[joint, side, k]
+    return np.sqrt(np.sum(rest * rest))
+
+
+@numba.njit(cache=True)
+def _assemble(system, kept):  # type: ignore
+    """The derivative of the forces by the end of the step."""
+    band, rate = kept.band, system.room.rate
+    start, sizes = system.turning.sides.start, system.turning.sides.size
+    half = (band.shape[1] - 1) // 3
+    band[:] = system.band
+    for joint in range(len(start)):
+        for side in range(2):
+            for k in range(sizes[joint, side]):
+                row = start[joint, side] + k
+                for other in range(2):
+                    first = half + start[joint, other] - row
+                    for m in range(sizes[joint, other]):
+                        band[row, first + m] += rate[joint, side, k, other, m]
+
+
+def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
+    """Mean resultants and energies of a step, and what joints remember at its end."""
+    (resultants, energy), room, image = results, system.room, kept.image
+    old, new, move = states[0], states[1], kept.move
+    dt, late = system.step
+    resultants[:] = room.resultants
+    times(system.mass, new[1], image)
+    energy[0] = 0.5 * np.sum(new[1] * image)
+    system.slid[:] = room.slid
+    energy[1] = joint_energy(system.turning, new[0], system.slid) - np.sum(system.weight * new[0])
+    across = ground[0] * system.body[0] + ground[1] * system.body[1]
+    energy[2] = -np.sum(move * across)
+    energy[3] = np.sum(room.lost)
+    if stored(system.blocks) > 0:
+        times(system.blocks, new[0], image)
+        energy[1] += 0.5 * np.sum(new[0] * image)
+        times(system.blocks, move, image)
+        energy[3] += late * np.sum(move * image)
+    if stored(system.viscous) > 0:
+        times(system.viscous, move, image)
+        energy[3] += np.sum(move * image) / dt
+    points = system.slid.shape[1]
+    for place in range(len(memory)):
+        memory[place] = system.slid[place // points, place % points]
