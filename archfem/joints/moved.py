@@ -44,7 +44,7 @@ class Answer(NamedTuple):
             higher's (j, 2, s).
         rate: derivative by the coordinates at the end (j, 2, s, 2, s).
         resultants: mean N, V, M (j, 3) [N, N, N m].
-        slid: how far each point has slid for good at the end (j, 2 m) [m].
+        slid: how far each point has slid for good at the end (p,) [m].
         lost: energy that friction and the lag take (j,) [J].
     """
 
@@ -66,7 +66,7 @@ def answer(joints: Moved) -> Answer:
         np.zeros((count, 2, size)),
         np.zeros((count, 2, size, 2, size)),
         np.zeros((count, 3)),
-        np.zeros((count, 2 * joints.faces.facets)),
+        np.zeros(len(joints.faces.place)),
         np.zeros(count),
     )
 
@@ -108,15 +108,16 @@ def joint_energy(joints, q, slid):  # type: ignore
     Args:
         joints: `Moved`.
         q: coordinates (n,).
-        slid: how far each point has slid for good (j, 2 m) [m].
+        slid: how far each point has slid for good (p,) [m].
     """
     found, total, faces = np.empty(3), 0.0, joints.faces
     for joint in range(len(joints.angle)):
         find_measures(joints, joint, q, found)
         length = overlap(faces.depth[joint], found[1])[0]
-        total += faces.normal[joint] * length * stored(length, found[0], found[2])
-        for point in range(2 * faces.facets):
-            total += 0.5 * faces.shear[joint] * (found[1] - slid[joint, point]) ** 2
+        phi = stored(faces, joint, length, found[0], found[2])[0]
+        total += faces.normal[joint] * length * phi
+        for point in range(faces.first[joint], faces.first[joint + 1]):
+            total += 0.5 * faces.shear[point] * (found[1] - slid[point]) ** 2
     return total
 
 
@@ -129,7 +130,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         before: coordinates at the start (n,).
         after: coordinates at the end (n,).
         late: lag of damping over the length of the step [-].
-        slid: how far each point has slid for good before (j, 2 m) [m].
+        slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
     sides, size = joints.sides, found.force.shape[2]
@@ -137,7 +138,8 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
     rates, now, curved = np.empty((3, 6)), np.empty((3, 6)), np.empty((6, 6))
     own, last = np.empty((2, 3, size)), np.empty((2, 3, size))
     turned, force, rate = np.empty((size, size)), np.empty(3), np.empty((3, 3))
-    normals = np.empty((2 * joints.faces.facets, 4))
+    pushed = np.empty(6)
+    normals = np.empty((len(slid), 4))
     for joint in range(len(joints.angle)):
         for side in range(2):
             pose(sides, joint, side, before, poses[0, side])
@@ -151,19 +153,44 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         gradient(poses[1], angle, now)
         lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
         shear, rubbing = rub_faces(
-            joints.faces, joint, ends, late, normals, slid[joint], force, rate, found.slid[joint]
+            joints.faces, joint, ends, late, normals, slid, force, rate, found.slid
         )
         found.resultants[joint, 0], found.resultants[joint, 1] = -force[0], shear
         found.resultants[joint, 2] = force[2]
         found.lost[joint] = lagging + rubbing
         bend(poses[0], poses[1], angle, force, curved)
-        curved += rates.T @ rate @ now
-        pushed = rates.T @ force
+        _between(rates, rate, now, curved)
+        _pushed(rates, force, pushed)
         for side in range(2):
             pushing = pushed[3 * side : 3 * side + 3]
-            found.force[joint, side] = own[side].T @ pushing
-            for other in range(2):
-                block = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3].copy()
-                found.rate[joint, side, :, other, :] = own[side].T @ block @ last[other]
+            _pushed(own[side], pushing, found.force[joint, side])
             pose_bend(sides, joint, side, before, after, pushing, turned)
-            found.rate[joint, side, :, side, :] += turned
+            for other in range(2):
+                block = found.rate[joint, side, :, other, :]
+                block[:] = 0.0
+                if other == side:
+                    block[:] = turned
+                part = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3]
+                _between(own[side], part, last[other], block)
+
+
+@numba.njit(cache=True)
+def _pushed(rates, force, found):  # type: ignore
+    """Ratesᵀ force, filled."""
+    for column in range(len(found)):
+        found[column] = 0.0
+        for row in range(3):
+            found[column] += rates[row, column] * force[row]
+
+
+@numba.njit(cache=True)
+def _between(left, middle, right, found):  # type: ignore
+    """Leftᵀ middle right, added."""
+    for column in range(left.shape[1]):
+        for k in range(3):
+            value = 0.0
+            for row in range(3):
+                value += left[row, column] * middle[row, k]
+            if value != 0.0:
+                for other in range(right.shape[1]):
+                    found[column, other] += value * right[k, other]

@@ -1,24 +1,24 @@
 """The law of a joint over the overlap of its two faces, over a step, compiled.
 
 Faces of depth h that have slid by s overlap on ℓ = h - |s|, around their mean middle. The gap is
-linear there, g - x ℓ σ with x from -½ to ½, and the traction is integrated exactly over equal
-facets. With Φ = ½∫<gap>₋² dx the joint stores k_n w ℓ Φ, and the mean forces over a step are those
-whose work is the change of that:
+linear there, g - x ℓ σ with x from -½ to ½. The traction is integrated exactly over facets, or by
+springs at places of a rule. With Φ = ½∫<gap>₋² dx the joint stores k_n w ℓ Φ, and the mean forces
+over a step are those whose work is the change of that:
 
     F_g = k_n w ℓ̄ Σ f̄_i,   F_σ = -k_n w ℓ̄² Σ x_i f̄_i,
     F_s = k_n w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i f̄_i) + Σ τ̄_i,
 
-f̄ the means of ∫φ_i <gap>₋ dx while the gap goes straight, bars means of both ends. At each end of
-a facet a spring in series with a stop holds the shear, as `law.shear_over_step`.
+f̄_i the means of ∫φ_i <gap>₋ dx, or of W_i <gap>₋, while the gap goes straight, bars means of both
+ends. At each point a spring in series with a stop holds the shear, as `law.shear_over_step`.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.means import facet_means
+from archfem.joints.means import facet_means, point_means
 
 
 class Faces(NamedTuple):
@@ -27,16 +27,22 @@ class Faces(NamedTuple):
     Attributes:
         depth: h (j,) [m].
         normal: k_n w (j,) [Pa].
-        shear: of each point, k_s times its area (j,) [N/m].
         friction: μ, infinite where a joint never slides (j,) [-].
-        facets: on each joint.
+        first: where the points of each joint begin (j + 1,).
+        place: of the points, x; of a facet its two ends in turn (p,) [-].
+        share: of the depth that a point stands for, or the whole facet it is on (p,) [-].
+        shear: k_s times the area of each point (p,) [N/m].
+        facets: whether points are ends of facets, not springs.
     """
 
     depth: Array
     normal: Array
-    shear: Array
     friction: Array
-    facets: int
+    first: Any
+    place: Array
+    share: Array
+    shear: Array
+    facets: bool
 
 
 @numba.njit(cache=True)
@@ -54,21 +60,42 @@ def overlap(depth, slip):  # type: ignore
 
 
 @numba.njit(cache=True)
-def stored(length, opening, turn):  # type: ignore
-    """Return Φ, half the mean square of the closing over the overlap [m²].
+def stored(faces, joint, length, opening, turn):  # type: ignore
+    """Return Φ, half the mean square of the closing over the overlap, and its derivatives.
 
     Args:
+        faces: `Faces`.
+        joint: its number.
         length: of the overlap [m].
         opening: g [m].
         turn: σ [-].
+
+    Returns:
+        Φ [m²], ∫<gap>₋ dx and ∫x <gap>₋ dx [m].
     """
+    if not faces.facets:
+        phi = whole = tilted = 0.0
+        for point in range(faces.first[joint], faces.first[joint + 1]):
+            place, share = faces.place[point], faces.share[point]
+            gap = min(opening - place * length * turn, 0.0)
+            phi += 0.5 * share * gap * gap
+            whole += share * gap
+            tilted += share * place * gap
+        return phi, whole, tilted
     first, last = opening + 0.5 * length * turn, opening - 0.5 * length * turn
-    low, high = min(first, last), max(first, last)
-    if low >= 0.0:
-        return 0.0
-    if high <= 0.0:
-        return (low * low + low * high + high * high) / 6.0
-    return -(low**3) / (6.0 * (high - low))
+    low, high = 0.0, 1.0
+    if first > 0.0 and last > 0.0:
+        return 0.0, 0.0, 0.0
+    if (first <= 0.0) != (last <= 0.0):
+        zero = first / (first - last)
+        if first <= 0.0:
+            high = zero
+        else:
+            low = zero
+    step, a, b = last - first, high - low, 0.5 * (high**2 - low**2)
+    c = (high**3 - low**3) / 3.0
+    whole, tilted = first * a + step * b, first * b + step * c
+    return 0.5 * (first * whole + step * tilted), whole, tilted - 0.5 * whole
 
 
 @numba.njit(cache=True)
@@ -82,99 +109,107 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         late: lag of damping over the length of the step [-].
         force: on opening, slip and turn, filled (3,) [N, N, N m].
         rate: filled (3, 3).
-        normals: of each end of each facet mean pressing force, not negative, and its derivative by
-            opening, slip and turn at the end, filled (2 m, 4) [N].
+        normals: of each point mean pressing force, not negative, and its derivative by opening,
+            slip and turn at the end, filled for those of this joint (p, 4) [N].
 
     Returns:
         Energy that the lag takes [J].
     """
-    depth, count, stiff = faces.depth[joint], faces.facets, faces.normal[joint]
-    share = 1.0 / count
-    (l0, r0), (l1, r1) = overlap(depth, ends[0, 1]), overlap(depth, ends[1, 1])
-    mean, turn = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2])
-    slope, bends = _slope(ends[0, 1], ends[1, 1], (l0, l1), (r0, r1))
+    (l0, _), (l1, shrinks) = overlap(faces.depth[joint], ends[0, 1]), overlap(
+        faces.depth[joint], ends[1, 1]
+    )
+    mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
+    widens = 0.5 * shrinks
     total = moment = lost = 0.0
     total_by, moment_by = np.zeros(3), np.zeros(3)
-    second = 1.0 + late
-    for facet in range(count):
-        x0 = -0.5 + facet * share
-        x1 = x0 + share
+    stride = 2 if faces.facets else 1
+    for point in range(faces.first[joint], faces.first[joint + 1], stride):
+        x0 = faces.place[point]
+        x1 = faces.place[point + stride - 1]
         a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
         b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
         lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        normal, _, rates, _ = facet_means(lagged, late, second)
-        half = 0.5 * (late + second)
-        k00, k01, k11 = half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2]
+        share = faces.share[point]
+        (n0, n1), (k00, k01, k11) = _carried(lagged, late, 1.0 + late, faces.facets)
         if late > 0.0:
-            plain = facet_means((a, c, b, d), 0.0, 1.0)[0]
-            lost += (normal[0] - plain[0]) * (b - a) + (normal[1] - plain[1]) * (d - c)
-        total += normal[0] + normal[1]
-        moment += x0 * normal[0] + x1 * normal[1]
+            p0, p1 = _carried((a, c, b, d), 0.0, 1.0, faces.facets)[0]
+            lost += share * ((n0 - p0) * (b - a) + (n1 - p1) * (d - c))
+        total += share * (n0 + n1)
+        moment += share * (x0 * n0 + x1 * n1)
+        scale = -stiff * share
+        normals[point, 0] = scale * mean * n0
+        if faces.facets:
+            normals[point + 1, 0] = scale * mean * n1
         for k in range(3):
-            if k == 0:
-                by_b = by_d = 1.0
-            elif k == 1:
-                by_b, by_d = -x0 * r1 * ends[1, 2], -x1 * r1 * ends[1, 2]
-            else:
-                by_b, by_d = -x0 * l1, -x1 * l1
+            by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            total_by[k] += near + far
-            moment_by[k] += x0 * near + x1 * far
-            widens = 0.5 * r1 if k == 1 else 0.0
-            factor = -stiff * share
-            normals[2 * facet, 1 + k] = factor * (mean * near + widens * normal[0])
-            normals[2 * facet + 1, 1 + k] = factor * (mean * far + widens * normal[1])
-        normals[2 * facet, 0] = -stiff * share * mean * normal[0]
-        normals[2 * facet + 1, 0] = -stiff * share * mean * normal[1]
-    scale = stiff * share
-    phi0 = stored(l0, ends[0, 0], ends[0, 2])
-    phi1 = stored(l1, ends[1, 0], ends[1, 2])
-    push = 0.5 * count * (phi0 + phi1) - mean * turn * moment
-    force[0] = scale * mean * total
-    force[1] = scale * slope * push
-    force[2] = -scale * mean * mean * moment
-    now = _gap_sums(l1, ends[1, 0], ends[1, 2])
-    by_phi = (now[0], -r1 * ends[1, 2] * now[1], -l1 * now[1])
+            total_by[k] += share * (near + far)
+            moment_by[k] += share * (x0 * near + x1 * far)
+            wider = widens if k == 1 else 0.0
+            normals[point, 1 + k] = scale * (mean * near + wider * n0)
+            if faces.facets:
+                normals[point + 1, 1 + k] = scale * (mean * far + wider * n1)
+    before = stored(faces, joint, l0, ends[0, 0], ends[0, 2])[0]
+    after, whole, tilted = stored(faces, joint, l1, ends[1, 0], ends[1, 2])
+    slope, bends = _slope(ends[0, 1], ends[1, 1], faces.depth[joint])
+    push = 0.5 * (before + after) - mean * turn * moment
+    force[0] = stiff * mean * total
+    force[1] = stiff * slope * push
+    force[2] = -stiff * mean * mean * moment
+    by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
     for k in range(3):
-        widens = 0.5 * r1 if k == 1 else 0.0
-        turns = 0.5 if k == 2 else 0.0
-        rate[0, k] = scale * (mean * total_by[k] + widens * total)
-        rate[2, k] = -scale * mean * (mean * moment_by[k] + 2.0 * widens * moment)
-        change = 0.5 * count * by_phi[k] - (widens * turn + mean * turns) * moment
+        wider, turns = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0
+        rate[0, k] = stiff * (mean * total_by[k] + wider * total)
+        rate[2, k] = -stiff * mean * (mean * moment_by[k] + 2.0 * wider * moment)
+        change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
         change -= mean * turn * moment_by[k]
-        rate[1, k] = scale * (slope * change + (bends * push if k == 1 else 0.0))
-    return scale * mean * lost
+        rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
+    return stiff * mean * lost
 
 
 @numba.njit(cache=True)
-def _slope(before, after, lengths, rates):  # type: ignore
+def _gap_rate(measure, place, length, shrinks, ends):  # type: ignore
+    """Derivative of the gap at a place by a measure at the end of the step."""
+    if measure == 0:
+        return 1.0
+    return -place * (shrinks * ends[1, 2] if measure == 1 else length)
+
+
+@numba.njit(cache=True)
+def _carried(ends, first, second, facet):  # type: ignore
+    """Mean of ∫φ_i <gap>₋ over a step on a facet of unit length, or of <gap>₋, and its derivative.
+
+    Args:
+        ends: gaps of both ends at the start, and of both at the end, of their paths [m].
+        first: change of the start with a parameter [-].
+        second: change of the end with it [-].
+        facet: whether it is one.
+    """
+    a, c, b, d = ends
+    half = 0.5 * (first + second)
+    if not facet:
+        normal, _, rate, _ = point_means(a, b, first, second)
+        return (normal, 0.0), (half - rate, 0.0, 0.0)
+    if max(a, c, b, d) <= 0.0:
+        near, far = 0.5 * (a + b), 0.5 * (c + d)
+        normal = ((2.0 * near + far) / 6.0, (near + 2.0 * far) / 6.0)
+        return normal, (half / 3.0, half / 6.0, half / 3.0)
+    if min(a, c, b, d) > 0.0:
+        return (0.0, 0.0), (0.0, 0.0, 0.0)
+    normal, _, rates, _ = facet_means(ends, first, second)
+    return normal, (half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2])
+
+
+@numba.njit(cache=True)
+def _slope(before, after, depth):  # type: ignore
     """Δℓ/Δs over a step, and its derivative by the slip at the end."""
-    if rates[0] == rates[1] and lengths[0] > 0.0 and lengths[1] > 0.0 and before * after > 0.0:
-        return rates[1], 0.0
+    (l0, r0), (l1, r1) = overlap(depth, before), overlap(depth, after)
     moved = after - before
-    if abs(moved) < 1e-12 * (abs(before) + abs(after)) or moved == 0.0:
-        return rates[1], 0.0
-    slope = (lengths[1] - lengths[0]) / moved
-    return slope, (rates[1] - slope) / moved
-
-
-@numba.njit(cache=True)
-def _gap_sums(length, opening, turn):  # type: ignore
-    """∫<gap>₋ dx and ∫x <gap>₋ dx over an overlap of unit length."""
-    first, last = opening + 0.5 * length * turn, opening - 0.5 * length * turn
-    low, high = 0.0, 1.0
-    if (first <= 0.0) != (last <= 0.0):
-        zero = first / (first - last)
-        if first <= 0.0:
-            high = zero
-        else:
-            low = zero
-    elif first > 0.0:
-        return 0.0, 0.0
-    step = last - first
-    whole = first * (high - low) + 0.5 * step * (high**2 - low**2)
-    tilted = 0.5 * first * (high**2 - low**2) + step * (high**3 - low**3) / 3.0
-    return whole, tilted - 0.5 * whole
+    same = r0 == r1 and l0 > 0.0 and l1 > 0.0 and before * after > 0.0
+    if same or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
+        return r1, 0.0
+    slope = (l1 - l0) / moved
+    return slope, (r1 - slope) / moved
 
 
 @numba.njit(cache=True)
@@ -219,20 +254,20 @@ def rub_faces(faces, joint, ends, late, normals, slid, force, rate, after):  # t
         joint: its number.
         ends: measures at the start and at the end of the step (2, 3).
         late: lag of damping over the length of the step [-].
-        normals: as `press_faces` fills them (2 m, 4) [N].
-        slid: how far each point has slid for good before (2 m,) [m].
+        normals: as `press_faces` fills them (p, 4) [N].
+        slid: how far each point has slid for good before (p,) [m].
         force: on opening, slip and turn, added to (3,) [N, N, N m].
         rate: its derivative by the measures at the end, added to (3, 3).
-        after: `slid` at the end, filled (2 m,) [m].
+        after: `slid` at the end, filled for those of this joint (p,) [m].
 
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    stiff, friction = faces.shear[joint], faces.friction[joint]
-    change = stiff * (ends[1, 1] - ends[0, 1])
-    found = np.empty(5)
+    friction, found = faces.friction[joint], np.empty(5)
     total = lost = 0.0
-    for point in range(2 * faces.facets):
+    for point in range(faces.first[joint], faces.first[joint + 1]):
+        stiff = faces.shear[point]
+        change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
         rub(first, change, late, limit, found)

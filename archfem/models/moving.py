@@ -111,7 +111,7 @@ class Moving:
     @property
     def memory(self) -> Array:
         """How far each joint point has slid for good (p,) [m]."""
-        return self._slid.ravel()
+        return self._slid
 
     def remembering(self, memory: Array) -> Self:
         """Return the same model, whose joints have slid so far.
@@ -120,7 +120,7 @@ class Moving:
             memory: how far each joint point has slid for good (p,) [m].
         """
         other = copy(self)
-        other._slid = np.ascontiguousarray(memory, float).reshape(self._slid.shape)
+        other._slid = np.ascontiguousarray(memory, float)
         return other
 
     def remembered(self, q: Array) -> Array:
@@ -129,7 +129,7 @@ class Moving:
         Args:
             q: coordinates (n,).
         """
-        return self._at(q).slid.ravel()
+        return self._at(q).slid
 
     def passage(self, start: Array, late: float) -> "MovingPassage":
         """Return a step from a state that the joints remember.
@@ -281,7 +281,7 @@ class MovingPassage:
         Args:
             q: coordinates at the end (n,).
         """
-        return self._over(q).slid.ravel()
+        return self._over(q).slid
 
     def lost(self, q: Array) -> float:
         """Return the energy that friction and the lag of damping take [J].
@@ -432,14 +432,19 @@ def _own_coordinates(small: Jointed, own: Array, number: int) -> tuple[Array, Ar
 def _faces(model: Jointed) -> Faces:
     """What the law of the joints needs."""
     structure, points = model.structure, model.operator.points
-    counts = np.bincount(points.joint, minlength=points.count) // 2
-    facets = int(counts.max())
     contacts = [joint.contact for joint in structure.joints]
-    depth = structure.depths
-    normal = np.array([each.normal_stiffness for each in contacts]) * structure.width
-    shear = np.array([each.shear_stiffness for each in contacts]) * structure.width * depth
-    friction = np.array([each.coefficient for each in contacts])
-    return Faces(depth, normal, shear / (2 * facets), friction, facets)
+    depth, facets = structure.depths, isinstance(model.operator.law, Facets)
+    share = points.weight / (structure.width * depth[points.joint])
+    return Faces(
+        depth,
+        structure.width * np.array([each.normal_stiffness for each in contacts]),
+        np.array([each.coefficient for each in contacts]),
+        np.searchsorted(points.joint, np.arange(points.count + 1)),
+        points.arm / depth[points.joint],
+        np.repeat(share[0::2] + share[1::2], 2) if facets else share,
+        points.shear,
+        facets,
+    )
 
 
 def _held(structure, supports: Array) -> Array:
@@ -491,8 +496,6 @@ def _check(small: Jointed) -> None:
         raise InvalidInput(
             f"large displacements are not known on the rung '{small.fidelity}': use one of {PLANE}"
         )
-    if not isinstance(small.operator.law, Facets):
-        raise InvalidInput("large displacements need exact joints: leave quadrature out")
     cohesion = float(small.operator.points.cohesion.max())
     if cohesion > 0.0:
         raise InvalidInput(

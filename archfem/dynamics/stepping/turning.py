@@ -46,7 +46,7 @@ class TurningSystem(NamedTuple):
     Attributes:
         turning: joints.
         room: for what joints do over a step.
-        slid: how far points have slid for good at its start (j, 2 m) [m].
+        slid: how far points have slid for good at its start (p,) [m].
         mass: M.
         blocks: K, of the blocks alone.
         viscous: C.
@@ -197,9 +197,7 @@ def _measure(system, kept, step, states, ground, results, memory):  # type: igno
 def _started(system, state, memory):  # type: ignore
     """Room for the steps, and what joints remember."""
     size = state.shape[1]
-    points = system.slid.shape[1]
-    for place in range(len(memory)):
-        system.slid[place // points, place % points] = memory[place]
+    system.slid[: len(memory)] = memory
     return Turned(
         np.empty_like(system.band), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
     )
@@ -303,6 +301,4 @@ def _measured(system, kept, step, states, ground, results, memory):  # type: ign
     if stored(system.viscous) > 0:
         times(system.viscous, move, image)
         energy[3] += np.sum(move * image) / dt
-    points = system.slid.shape[1]
-    for place in range(len(memory)):
-        memory[place] = system.slid[place // points, place % points]
+    memory[:] = system.slid[: len(memory)]
