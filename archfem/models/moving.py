@@ -30,7 +30,7 @@ from archfem.joints.moved import (
 from archfem.joints.overlap import Faces
 from archfem.joints.poses import Sides
 from archfem.joints.sparsity import Pattern
-from archfem.masonry.actions import Action, BodyForce, Settlement
+from archfem.masonry.actions import Action, BodyForce, PointLoad, Settlement
 from archfem.masonry.rigid_motion import motion_of
 from archfem.models.cells import Cells
 from archfem.models.jointed import Jointed
@@ -75,6 +75,7 @@ class Moving:
         self.cells = TurningCells.of(self.at_rest.cells, blocks.starts)
         self.supports = self.at_rest.supports
         self.prediction: Prediction | None = None
+        self._points: dict[PointLoad, _Point] = {}
         self._slid = np.zeros_like(answer(self.joints).slid)
 
     def settled(self, settlement: Settlement) -> Self:
@@ -224,13 +225,96 @@ class Moving:
         found: Array = all_measures(self.joints, q)
         return found
 
-    def load(self, action: Action) -> Array:
-        """Return the generalised forces of an action before anything moves (n,).
+    def load(self, action: Action, q: Array | None = None) -> Array:
+        """Return the generalised forces of an action; a point load turns with nothing (n,).
 
         Args:
             action: body force or point load.
+            q: coordinates at which it acts; None before anything moves (n,).
         """
-        return self.at_rest.load(action)
+        if isinstance(action, BodyForce) or q is None:
+            return self.at_rest.load(action)
+        place = self._place(action)
+        return place.gradient(q, self.size).T @ np.array(action.force)
+
+    def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `load` by the coordinates (n, n).
+
+        Args:
+            action: body force or point load.
+            q: coordinates at which it acts (n,).
+        """
+        if isinstance(action, BodyForce):
+            return sparse.csr_matrix((self.size, self.size))
+        return self._place(action).bend(q, np.array(action.force), self.size)
+
+    def work(self, action: Action, q: Array) -> float:
+        """Return the work of an action since before anything moved [J].
+
+        Args:
+            action: body force or point load.
+            q: coordinates (n,).
+        """
+        if isinstance(action, BodyForce):
+            return float(self.load(action) @ q)
+        return float(self._place(action).displacement(q) @ np.array(action.force))
+
+    def _place(self, action: PointLoad) -> "_Point":
+        """Where a point load acts."""
+        if action in self._points:
+            return self._points[action]
+        block, point = action.place(self.structure)
+        rows = self.at_rest.cells.at(block, point)
+        number = self.structure.free.index(block)
+        first, end = self.starts[number], self.starts[number + 1]
+        local = rows[:, first:end].toarray()
+        found = _Point(int(first), np.array([local[1, 2], -local[0, 2]]), local[:, 3:])
+        self._points[action] = found
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """A point of a block that turns.
+
+    Attributes:
+        first: first coordinate of the block.
+        arm: from its centroid (2,) [m].
+        shapes: displacements there of its modes (2, s).
+    """
+
+    first: int
+    arm: Array
+    shapes: Array
+
+    def _turned(self, q: Array) -> tuple[Array, Array, Array]:
+        """Where it is in the block, the block's rotation, and the derivative of that."""
+        c, s = np.cos(q[self.first + 2]), np.sin(q[self.first + 2])
+        strained = self.shapes @ q[self.first + 3 : self.first + 3 + self.shapes.shape[1]]
+        return self.arm + strained, np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
+
+    def displacement(self, q: Array) -> Array:
+        """Displacement from coordinates (2,) [m]."""
+        place, turn, _ = self._turned(q)
+        return q[self.first : self.first + 2] + turn @ place - self.arm
+
+    def gradient(self, q: Array, size: int) -> sparse.csr_matrix:
+        """Its derivative (2, n)."""
+        place, turn, rate = self._turned(q)
+        local = np.column_stack([np.eye(2), rate @ place, turn @ self.shapes])
+        columns = self.first + np.arange(local.shape[1])
+        found = sparse.lil_matrix((2, size))
+        found[:, columns] = local
+        return found.tocsr()
+
+    def bend(self, q: Array, force: Array, size: int) -> sparse.csr_matrix:
+        """Derivative of the generalised forces of a force (n, n)."""
+        place, turn, rate = self._turned(q)
+        theta, modes = self.first + 2, self.first + 3 + np.arange(self.shapes.shape[1])
+        found = sparse.lil_matrix((size, size))
+        found[theta, theta] = -force @ (turn @ place)
+        found[theta, modes] = found[modes, theta] = force @ (rate @ self.shapes)
+        return found.tocsr()
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
 
@@ -35,8 +36,7 @@ class LoadPath:
     Attributes:
         model: what is loaded, at the last step.
         dead: generalised forces of the self-weight (n,).
-        live: of the load (n,).
-        probe: displacement of the load along itself is probe·(q - q_0) (n,).
+        load: what grows.
         unit: displacement and factor of the first step of an elastic structure.
         states: coordinates at each step, the dead load's first (n,).
         resisted: N, V, M of every joint at each step (n_joints, 3) [N, N, N m].
@@ -48,8 +48,7 @@ class LoadPath:
 
     model: Model
     dead: Array
-    live: Array
-    probe: Array
+    load: "Load"
     unit: tuple[float, float]
     states: list[Array]
     resisted: list[Array]
@@ -75,21 +74,19 @@ class LoadPath:
         Raises:
             InvalidInput: the load is zero.
         """
-        live = sum((model.load(action) for action in actions), np.zeros(model.size))
-        size = sum(_size(model, action) for action in actions)
-        if size == 0.0:
-            raise InvalidInput("the load is zero: give it a force or a multiple of g")
-        probe = live / size
+        load = Load.of(model, actions)
+        live = load.forces(start.q)
         first = FIRST * model.structure.size
-        give = float(probe @ splu(model.tangent(start.q).tocsc()).solve(live))
+        give = float(live @ splu(model.tangent(start.q).tocsc()).solve(live)) / load.size
         unit = (first, first / give)
         resisted = [model.resultants(start.q)]
-        return cls(model, self_weight(model), live, probe, unit, [start.q], resisted, [0.0], [0])
+        return cls(model, self_weight(model), load, unit, [start.q], resisted, [0.0], [0])
 
     @property
     def displacements(self) -> Array:
         """Of the load along itself, since the dead load (steps,) [m]."""
-        return np.array([self.probe @ (q - self.states[0]) for q in self.states])
+        first = self.load.moved(self.states[0])
+        return np.array([self.load.moved(q) - first for q in self.states])
 
     @property
     def resultants(self) -> Array:
@@ -113,7 +110,8 @@ class LoadPath:
             Whether there is one.
         """
         along, up = border / np.array(self.unit)
-        row = sparse.csr_matrix(np.append(along * self.probe, up))
+        probe = self.load.forces(self.states[-1]) / self.load.size
+        row = sparse.csr_matrix(np.append(along * probe, up))
         x = np.append(self.states[-1], self.factors[-1])
         target = (row @ x)[0] + distance
         return any(self._reached(row, target, distance, share) for share in (0.0, FIRM))
@@ -126,16 +124,16 @@ class LoadPath:
         Returns:
             Whether Newton's method found it.
         """
-        column = sparse.csr_matrix(-self.live[:, None])
         x = np.append(self.states[-1], self.factors[-1])
         for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
-            tangent = self.model.tangent(x[:-1])
+            tangent = self.model.tangent(x[:-1]) - x[-1] * self.load.rate(x[:-1])
             rest, ahead = self._rest(x), target - row @ x
             if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
                 self._add(x, iteration)
                 return True
             if share > 0.0:
                 tangent = (1.0 - share) * tangent + share * self.model.closed()
+            column = sparse.csr_matrix(-self.load.forces(x[:-1])[:, None])
             matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
             try:
                 x = x + splu(matrix).solve(np.append(rest, ahead))
@@ -153,14 +151,78 @@ class LoadPath:
 
     def _rest(self, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
-        rest: Array = self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        rest: Array = self.dead + x[-1] * self.load.forces(x[:-1]) - self.model.force(x[:-1])
         return rest
 
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Whether forces are in balance, or off by no more than round-off of large motions."""
-        load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.live)
+        load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.load.forces(x[:-1]))
         rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
         return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Actions that grow together, on a model.
+
+    Attributes:
+        model: that they act on.
+        actions: body forces and point loads.
+        size: of all [N].
+        first: generalised forces before anything moves (n,).
+    """
+
+    model: Model
+    actions: tuple[BodyForce | PointLoad, ...]
+    size: float
+    first: Array
+
+    @classmethod
+    def of(cls, model: Model, actions: Sequence[BodyForce | PointLoad]) -> "Load":
+        """Return actions on a model.
+
+        Args:
+            model: that they act on.
+            actions: body forces and point loads.
+
+        Raises:
+            InvalidInput: they come to nothing.
+        """
+        size = sum(_size(model, action) for action in actions)
+        if size == 0.0:
+            raise InvalidInput("the load is zero: give it a force or a multiple of g")
+        first = np.sum([model.load(action) for action in actions], axis=0)
+        return cls(model, tuple(actions), size, first)
+
+    def forces(self, q: Array) -> Array:
+        """Return the generalised forces (n,).
+
+        Args:
+            q: coordinates at which they act (n,).
+        """
+        if not isinstance(self.model, Moving):
+            return self.first
+        return np.sum([self.model.load(action, q) for action in self.actions], axis=0)
+
+    def rate(self, q: Array) -> sparse.csr_matrix | float:
+        """Return the derivative of `forces` (n, n); 0 where it does not depend on q.
+
+        Args:
+            q: coordinates (n,).
+        """
+        if not isinstance(self.model, Moving):
+            return 0.0
+        return sum(self.model.load_rate(action, q) for action in self.actions)
+
+    def moved(self, q: Array) -> float:
+        """Return the displacement of the load along itself [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        if isinstance(self.model, Moving):
+            return sum(self.model.work(action, q) for action in self.actions) / self.size
+        return float(self.first @ q) / self.size
 
 
 def _size(model: Model, action: BodyForce | PointLoad) -> float:
