@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from archfem.errors import InvalidInput
 from archfem.masonry.softness import soft_blocks, softness
@@ -32,6 +33,15 @@ def build(structure: Structure, asked: Discretisation) -> Model:
         InvalidInput: a rung is asked for blocks that there are not.
         MeshError: the blocks cannot be cut as asked.
     """
+    if asked.displacements == "large":
+        from archfem.models.moving import Moving  # compiled: it takes a while to import
+
+        return Moving(_small(structure, asked))
+    return _small(structure, asked)
+
+
+def _small(structure: Structure, asked: Discretisation) -> Any:
+    """Build a model of small displacements."""
     rungs = _rungs(structure, asked.fidelity)
     _doubt(structure, rungs)
     if asked.fidelity == "rigid":

@@ -13,6 +13,9 @@ RUNGS = ("rigid", "faces", "condensed", "full")
 FIDELITIES = (*RUNGS, "monolithic")
 """What a whole structure may be: the ladder, and the slow reference."""
 
+DISPLACEMENTS = ("small", "large")
+"""What displacements may be."""
+
 SHAPES = ("quadrilateral", "triangle")
 """Of cells."""
 
@@ -40,6 +43,8 @@ class Discretisation:
         quadrature: rule on each joint facet, "exact", "lobatto", "nodal" or "gauss"; None takes the
             exact one, and Lobatto's where there is none: of degree 2, and for "monolithic".
         points: on each facet, 3 where not given.
+        displacements: "small", or "large" where blocks may turn and slide as far as they like, on
+            the rungs "rigid" and "faces".
     """
 
     fidelity: str | Mapping[str, str] = "full"
@@ -49,6 +54,7 @@ class Discretisation:
     degree: int = 1
     quadrature: str | None = None
     points: int | None = None
+    displacements: str = "small"
 
     def __post_init__(self) -> None:
         """Refuse unknown words, impossible numbers, and what does not go together."""
@@ -58,6 +64,10 @@ class Discretisation:
             raise InvalidInput(f"cell '{self.cell}' is not known: use one of {SHAPES}")
         if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
             raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
+        if self.displacements not in DISPLACEMENTS:
+            raise InvalidInput(
+                f"displacements {self.displacements!r} are not known: use one of {DISPLACEMENTS}"
+            )
         if self.degree not in (1, 2):
             raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")
         if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):

@@ -37,9 +37,6 @@ from archfem.models.jointed import Jointed
 from archfem.models.model import Prediction
 from archfem.models.reduced import projected
 
-DISPLACEMENTS = ("small", "large")
-"""What displacements may be."""
-
 PLANE = ("rigid", "faces")
 """Rungs whose faces stay plane."""
 

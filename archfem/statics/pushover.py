@@ -190,6 +190,8 @@ def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str |
     slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
     if slope <= stop.slope:
         return f"the slope fell to {slope:.2g} of the initial one"
+    if path.factors[-1] <= 0.0 and path.units == "1":
+        return "it bears no load any more"
     if reached >= stop.displacement * path.model.structure.size:
         return f"the {path.moving} moved by {reached:.3g} m"
     if stop.hinges is not None:

@@ -1,0 +1,151 @@
+"""Joints that move as far as they like, over a step: exact increments, energies, derivatives."""
+
+import numpy as np
+import pytest
+
+from archfem.joints import frames
+from archfem.joints.moved import Moved, answer, joint_energy, pass_joints
+from archfem.joints.overlap import Faces
+from archfem.joints.poses import Sides, pose, pose_gradient
+
+SEEDS = range(12)
+
+
+def random_poses(seed):
+    rng = np.random.default_rng(seed)
+    before = rng.normal(size=(2, 3))
+    return before, before + rng.normal(size=(2, 3)) * 10.0 ** rng.uniform(-6, 0), rng.uniform(-3, 3)
+
+
+def measured(poses, angle):
+    found = np.empty(3)
+    frames.measures(poses[0], poses[1], angle, found)
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
+    """D Δp = Δ(g, s, σ), to rounding."""
+    before, after, angle = random_poses(seed)
+    rates = np.empty((3, 6))
+    frames.discrete(before, after, angle, rates)
+    change = measured(after, angle) - measured(before, angle)
+    assert np.abs(rates @ (after - before).ravel() - change).max() < 4e-15
+
+
+def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
+    """Whatever the angle; the gap at an arm a is -a σ less that at the place."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        angle, turn, arm = rng.uniform(-3, 3), rng.uniform(-2, 2), rng.uniform(-0.5, 0.5)
+        along = np.array([-np.sin(angle), np.cos(angle)])
+        spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        moved = arm * along - spin @ (arm * along)
+        found = measured(np.array([[0.0, 0.0, 0.0], [*moved, turn]]), angle)
+        assert abs(found[1]) < 1e-15
+        assert found[0] - arm * found[2] == pytest.approx(0.0, abs=1e-15)
+
+
+def two_joints(shapes, friction, facets, rng):
+    """Block 0 on block 1 on the ground, with modes or without."""
+    count = 4
+    sides = Sides(
+        np.array([[0, 3 + shapes], [3 + shapes, -1]]),
+        np.array([[3 + shapes, 3 + shapes], [3 + shapes, 0]]),
+        rng.normal(size=(2, 2, 2)),
+        0.1 * rng.normal(size=(2, 2, 3, shapes)),
+        np.zeros((2, 2, 3)),
+    )
+    edges = np.linspace(-0.5, 0.5, count + 1)
+    if facets:
+        place = np.tile(np.column_stack([edges[:-1], edges[1:]]).ravel(), 2)
+    else:
+        place = np.tile(0.5 * (edges[:-1] + edges[1:]), 2)
+    points = len(place) // 2
+    faces = Faces(
+        np.array([1.0, 0.8]),
+        np.array([1e6, 2e6]),
+        np.array([friction, friction]),
+        np.array([0, points, 2 * points]),
+        place,
+        np.full(2 * points, 1.0 / count),
+        np.repeat([3e4, 2e4], points) / points,
+        facets,
+    )
+    return Moved(sides, faces, rng.uniform(-3, 3, 2))
+
+
+def gathered(joints, before, after, late, slid):
+    """Force (n,), its derivative (n, n), and all that joints do."""
+    found, size = answer(joints), len(before)
+    pass_joints(joints, before, after, late, slid, found)
+    force, rate = np.zeros(size), np.zeros((size, size))
+    start, sizes = joints.sides.start, joints.sides.size
+    for joint in range(2):
+        for side in range(2):
+            if start[joint, side] < 0:
+                continue
+            own = start[joint, side] + np.arange(sizes[joint, side])
+            force[own] += found.force[joint, side, : len(own)]
+            for other in range(2):
+                if start[joint, other] >= 0:
+                    theirs = start[joint, other] + np.arange(sizes[joint, other])
+                    block = found.rate[joint, side, : len(own), other, : len(theirs)]
+                    rate[np.ix_(own, theirs)] += block
+    return force, rate, found
+
+
+@pytest.mark.parametrize("facets", [True, False])
+@pytest.mark.parametrize("friction", [0.5, np.inf])
+@pytest.mark.parametrize("shapes", [0, 3])
+def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(shapes, friction, facets):
+    """However far blocks move in a step, with damping by a lag and without."""
+    rng = np.random.default_rng(shapes)
+    for trial in range(40):
+        joints = two_joints(shapes, friction, facets, rng)
+        size = 2 * (3 + shapes)
+        before = 0.05 * rng.normal(size=size)
+        after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-4, -0.5)
+        slid = 0.01 * rng.normal(size=len(joints.faces.place))
+        force, _, found = gathered(joints, before, after, 0.3 * (trial % 2), slid)
+        stored = [joint_energy(joints, *each) for each in ((before, slid), (after, found.slid))]
+        scale = max(*stored, np.abs(force * (after - before)).sum())
+        work = force @ (after - before)
+        assert abs(work - stored[1] + stored[0] - found.lost.sum()) < 1e-13 * scale
+        assert found.lost.min() > -1e-14 * scale
+
+
+@pytest.mark.parametrize("facets", [True, False])
+@pytest.mark.parametrize("friction", [0.5, np.inf])
+@pytest.mark.parametrize("shapes", [0, 3])
+def test_the_derivative_is_that_of_the_force(shapes, friction, facets):
+    """By central differences, but where the law bends between them: in three of four states."""
+    rng, errors = np.random.default_rng(3), []
+    for trial in range(40):
+        joints = two_joints(shapes, friction, facets, rng)
+        size = 2 * (3 + shapes)
+        before = 0.05 * rng.normal(size=size)
+        after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-3, -1)
+        slid = 0.01 * rng.normal(size=len(joints.faces.place))
+        late = 0.3 * (trial % 2)
+        rate = gathered(joints, before, after, late, slid)[1]
+        steps = 1e-7 * np.eye(size)
+        there, back = (
+            np.array([gathered(joints, before, after + w * s, late, slid)[0] for s in steps])
+            for w in (1.0, -1.0)
+        )
+        errors.append(np.abs((there - back).T / 2e-7 - rate).max() / 1e6)
+    assert np.quantile(errors, 0.75) < 1e-7
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_pose_follows_its_discrete_derivative(seed):
+    """P Δq = Δp, of a block with modes that turns by radians."""
+    rng = np.random.default_rng(seed)
+    sides = two_joints(3, 0.5, True, rng).sides
+    before, after = rng.normal(size=(2, 12))
+    poses, rates = np.empty((2, 3)), np.empty((3, 6))
+    for row, q in zip(poses, (before, after), strict=True):
+        pose(sides, 0, 1, q, row)
+    pose_gradient(sides, 0, 1, before, after, rates)
+    assert np.abs(rates @ (after - before)[6:] - (poses[1] - poses[0])).max() < 1e-14
