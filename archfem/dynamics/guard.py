@@ -9,6 +9,7 @@ from archfem.dynamics.energy import Balance
 from archfem.dynamics.steps import Batch, State
 from archfem.errors import DidNotConverge
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 
 logger = logging.getLogger("archfem")
 
@@ -40,6 +41,7 @@ class Guard:
         self.worst = 0.0
         self.largest_displacement = 0.0
         self._balance = Balance(*start.energy[0, :2])
+        self._small = not isinstance(model, Moving)
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
@@ -65,7 +67,7 @@ class Guard:
         return drift
 
     def _look(self, state: State) -> None:
-        moved = np.abs(self.model.cells.lift @ state.q).max()
+        moved = np.abs(self.model.cells.displacement(state.q)).max()
         self.largest_displacement = max(self.largest_displacement, float(moved))
 
     def judge(self) -> None:
@@ -89,11 +91,11 @@ class Guard:
                 "smaller dt",
                 last=self._before,
             )
-        if self.largest_displacement > size:
+        if self._small and self.largest_displacement > size:
             raise DidNotConverge(
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than the size of the structure, {size:.3g} m: it has fallen apart; end the run "
-                "at its mechanism, with until=CountedMechanism()",
+                "at its mechanism, with until=CountedMechanism(), or let displacements be large",
                 last=self._before,
             )
         share = balance.fraction
@@ -104,12 +106,13 @@ class Guard:
                 f"energy drifts: by t = {time:.4g} s {abs(share):.0%} of the largest exchanged "
                 f"{what}; compare with a smaller dt, or with more damping",
             )
-        if self.largest_displacement > self._depth:
+        if self._small and self.largest_displacement > self._depth:
             self._tell(
                 "displacement",
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
-                "displacements that archfem assumes; read it as collapse",
+                "displacements that this model assumes; read it as collapse, or follow it on a model "
+                "whose displacements may be large",
             )
 
     def _tell(self, kind: str, words: str) -> None:

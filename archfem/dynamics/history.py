@@ -5,9 +5,11 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
+from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import in_one_stroke
@@ -36,17 +38,19 @@ class Ending(StrEnum):
         EVENT: by the event that it was to run until.
         INTERRUPTED: by Ctrl-C.
         FAILED: at a step without equilibrium.
+        PARTED: because blocks came loose, and were followed to the ground.
     """
 
     FINISHED = "finished"
     EVENT = "event"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
+    PARTED = "parted"
 
     @property
     def by_itself(self) -> bool:
         """Whether the run came to its end, and was not broken off."""
-        return self in (Ending.FINISHED, Ending.EVENT)
+        return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,21 @@ class History:
         return demirel_aldemir_mechanism(self.joints)
 
     @cached_property
+    def fall(self) -> Fall | None:
+        """What the run has left of the structure; None where displacements were taken as small."""
+        told = self.dataset.attrs
+        if "fall" not in told:
+            return None
+        time = float(told["fall_time"])
+        return Fall(
+            str(told["fall"]),
+            None if np.isnan(time) else time,
+            tuple(name for name in str(told["fall_blocks"]).split("\n") if name),
+            float(told["fall_residual"]),
+            bool(told["fall_resting"]),
+        )
+
+    @cached_property
     def verdict(self) -> str:
         """What the run means, in words: a sentence, and a line for each way to find a mechanism.
 
@@ -154,7 +173,8 @@ class History:
             names = [block.name for block in self.structure.blocks]
         told = self.dataset.attrs
         whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
-        lines = ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
+        lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
+        lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
         lines += mechanism_lines(self.joints, found, names)
         return "\n".join(line for line in lines if line)
 
@@ -221,6 +241,23 @@ class History:
                 "versions do not: give the structure that was shaken too"
             )
         return cls(flagged(dataset), structure)
+
+
+def with_fall(history: History, fall: Fall) -> History:
+    """Return a history that tells what its run has left of the structure.
+
+    Args:
+        history: of a run.
+        fall: what it has left.
+    """
+    dataset = history.dataset.assign_attrs(
+        fall=fall.kind,
+        fall_time=np.nan if fall.time is None else fall.time,
+        fall_blocks="\n".join(fall.blocks),
+        fall_residual=fall.residual,
+        fall_resting=int(fall.resting),
+    )
+    return History(dataset, history.structure)
 
 
 def history_of(error: DidNotConverge) -> History:

@@ -9,6 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem.dynamics.events import EveryMechanism, possible_counts
+from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.history import Ending, history_of
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
@@ -40,12 +41,14 @@ class ScaledRun:
         found: the first mechanism by each definition, or None.
         ended: how the run ended.
         outcome: the same in words.
+        fall: what the run has left of a structure whose displacements may be large.
     """
 
     scale: float
-    found: dict[str, Mechanism | None]
+    found: dict[str, Mechanism | Fall | None]
     ended: Ending
     outcome: str
+    fall: Fall | None = None
 
     @property
     def interrupted(self) -> bool:
@@ -205,8 +208,6 @@ def mechanism_scales(
             "above 0, the smaller first"
         )
     start = start or dead_load(model)
-    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
-    most = LARGEST_PEAK / peak if peak > 0.0 else inf  # no motion may be stronger
     least, largest = between
 
     def shaken(scale: float) -> ScaledRun:
@@ -225,7 +226,17 @@ def mechanism_scales(
         return ScaledRun(scale, first_mechanisms(run), run.ended, run.outcome)
 
     asked = (*possible_counts(model.structure, criteria), "verified")
-    return search(shaken, asked, precision, (least, max(least, min(largest, most))))
+    return search(shaken, asked, precision, (least, max(least, min(largest, largest_scale(motion)))))
+
+
+def largest_scale(motion: Motion) -> float:
+    """Return the largest factor by which a motion may be multiplied: none is stronger than 5 g [-].
+
+    Args:
+        motion: all of its components count.
+    """
+    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
+    return LARGEST_PEAK / peak if peak > 0.0 else inf
 
 
 def search(

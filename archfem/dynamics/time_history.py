@@ -11,6 +11,7 @@ from tqdm import tqdm
 from archfem.arguments import instance, real, whole
 from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
+from archfem.dynamics.collapse import Parting, fallen, left_standing
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.recorder import Recorder
 from archfem.dynamics.schemes import (
@@ -153,7 +154,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     pace = None if dt else Pace(stepper, tolerance, first)
     try:
         recorder.add(first)
-        ended, outcome = _stepped(pace or stepper, recorder, watch, motion.duration)
+        parting = Parting(model) if isinstance(model, Moving) else None
+        ended, outcome = _stepped(pace or stepper, recorder, (watch, parting), motion.duration)
     except KeyboardInterrupt:
         ended, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
@@ -164,7 +166,16 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     history = recorder.history(motion, ended, outcome)
     if pace is not None:
         history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": pace.unmet_share}
-    return history
+    return _judged(history, model, recorder.state, motion) if isinstance(model, Moving) else history
+
+
+def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
+    """A run of a structure that may fall, with what it has left of it."""
+    if history.ended is not Ending.PARTED:
+        return with_fall(history, left_standing(model, state.q))
+    frames, fall = fallen(model, state, motion)
+    dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
+    return with_fall(History(dataset, history.structure), fall)
 
 
 def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[float | None, float]:
@@ -221,7 +232,10 @@ def _recorder(
 
 
 def _stepped(
-    stepper: Stepper | Pace, recorder: Recorder, watch: Watch | None, end: float
+    stepper: Stepper | Pace,
+    recorder: Recorder,
+    watches: tuple[Watch | None, Parting | None],
+    end: float,
 ) -> tuple[Ending, str]:
     """Record steps to the end of the motion, or up to an event; which of both, also in words."""
     # Steps are too small for threads, which only get in each other's way.
@@ -233,12 +247,12 @@ def _stepped(
     )
     with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
         for batch in batches:
-            reason, size = _reason(watch, batch)
+            ended, reason, size = _reason(watches, batch)
             recorder.add(batch.cut(size), last=reason is not None)
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
                 time = recorder.state.time
-                return Ending.EVENT, f"ended at {time:.4g} s by {reason}"
+                return ended, f"ended at {time:.4g} s by {reason}"
     return Ending.FINISHED, "reached the end of the motion"
 
 
@@ -246,13 +260,20 @@ def _bar(duration: float) -> tqdm:
     return tqdm(total=round(duration, 4), unit="s", disable=None, leave=False)
 
 
-def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:
-    """Why the run ends within a batch, if it does, and after how many of its steps."""
+def _reason(
+    watches: tuple[Watch | None, Parting | None], batch: Batch
+) -> tuple[Ending, str | None, int]:
+    """How and why the run ends within a batch, if it does, and after how many of its steps."""
+    watch, parting = watches
+    loose = parting.step(batch) if parting is not None else None
+    last = len(batch.times) if loose is None else loose[0] + 1
     if watch is not None:
-        for k, resultants in enumerate(batch.resultants):
+        for k, resultants in enumerate(batch.resultants[:last]):
             if reason := watch(resultants):
-                return reason, k + 1
-    return None, len(batch.times)
+                return Ending.EVENT, reason, k + 1
+    if loose is not None:
+        return Ending.PARTED, f"the blocks coming loose: {loose[1]}", last
+    return Ending.FINISHED, None, last
 
 
 def last_state(history: History) -> State:

@@ -116,15 +116,46 @@ class LoadPath:
         target = (row @ x)[0] + distance
         return any(self._reached(row, target, distance, share) for share in (0.0, FIRM))
 
+    def onward(self, distance: float) -> bool:
+        """Add the equilibrium in the hyperplane across the last step, at a distance.
+
+        Unlike `advance` it follows a path on which the load itself moves back for a while, as when
+        a hinge moves from one joint to the next. Lengths are mean ones of all that has mass.
+
+        Args:
+            distance: from the last state on, in units of the first step.
+
+        Returns:
+            Whether there is one.
+        """
+        if len(self.states) < 2:
+            return self.advance(np.array([1.0, 1.0]) / np.sqrt(2.0), distance)
+        mass = self.model.structure.weight / self.model.structure.gravity
+        moved, grown = self.states[-1] - self.states[-2], self.factors[-1] - self.factors[-2]
+        across = np.append(
+            self.model.mass @ moved / (mass * self.unit[0] ** 2), grown / self.unit[1] ** 2
+        )
+        step = np.append(moved, grown)
+        length = np.sqrt(across @ step)
+        row = sparse.csr_matrix(across / length)
+        x = np.append(self.states[-1], self.factors[-1])
+        target = (row @ x)[0] + distance
+        return self._reached(row, target, distance, 0.0, x + distance / length * step)
+
     def _reached(
-        self, row: sparse.csr_matrix, target: float, distance: float, share: float
+        self,
+        row: sparse.csr_matrix,
+        target: float,
+        distance: float,
+        share: float,
+        start: Array | None = None,
     ) -> bool:
         """Add the equilibrium where row × (q, λ) is the target; tangents share the closed one.
 
         Returns:
             Whether Newton's method found it.
         """
-        x = np.append(self.states[-1], self.factors[-1])
+        x = np.append(self.states[-1], self.factors[-1]) if start is None else start
         for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
             tangent = self.model.tangent(x[:-1]) - x[-1] * self.load.rate(x[:-1])
             rest, ahead = self._rest(x), target - row @ x

@@ -16,7 +16,7 @@ from archfem.models.model import Model, check_model
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath, Path, SupportPath
 
-CONTROLS = ("displacement", "arc length", "force")
+CONTROLS = ("displacement", "arc length", "path", "force")
 
 FLAT, STEEP = 1e-6, 0.2
 """Growth of the factor in the last step below which the limit has been reached, and the largest
@@ -25,6 +25,9 @@ extrapolation beyond the last factor; both relative to it."""
 GROWTH, SMALLEST = 1.1, 1e-3
 """Growth of steps, and the smallest one, relative to the first, to which they are halved before
 giving up."""
+
+FASTER, EASY = 1.4, 4
+"""Growth of steps across the last one where Newton's method needs few iterations, and how many."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +121,8 @@ def pushover(
     Args:
         model: any rung of the ladder.
         load: one action, or several that grow together; a `Settlement` comes alone.
-        control: "displacement", "arc length" or "force".
+        control: "displacement", "arc length", "path" or "force"; "path" goes on across the last
+            step in all coordinates, and so follows what snaps back where displacements are large.
         start: the dead load's equilibrium, found first if not given.
         stop: when to end.
         criteria: what makes a joint hinge; by default the usual ones.
@@ -159,7 +163,7 @@ def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
 
     Args:
         path: that begins with the dead load.
-        control: "displacement", "arc length" or "force".
+        control: one of `CONTROLS`.
         stop: the rules.
         criteria: what makes a joint hinge.
 
@@ -172,7 +176,11 @@ def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
     distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
     while True:
-        if not path.advance(fixed.get(control, direction), distance):
+        if control == "path" and isinstance(path, LoadPath):
+            found = path.onward(distance)
+        else:
+            found = path.advance(fixed.get(control, direction), distance)
+        if not found:
             distance /= 2.0
             if distance < SMALLEST:
                 return _stuck(path, control)
@@ -182,7 +190,8 @@ def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         direction = moved / np.linalg.norm(moved)
         if reason := _finished(path, stop, criteria, moved):
             return reason
-        distance *= GROWTH
+        easy = control == "path" and path.iterations[-1] <= EASY
+        distance *= FASTER if easy else GROWTH
 
 
 def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:

@@ -1,0 +1,107 @@
+"""From a structure that parts to what lies on the ground: the end of a run, and what it left.
+
+While joints hold, forces are those of `joints.moved`. Once a joint has turned or slid so far that
+its blocks are loose, `falling` takes them as they are and as they move, to the ground and to rest.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from archfem.arrays import Array
+from archfem.dynamics.falling.engine import Falling
+from archfem.dynamics.falling.handover import Handover, released
+from archfem.dynamics.falling.state import Loose
+from archfem.dynamics.falling.verdict import Fall, fall_of
+from archfem.dynamics.steps import Batch, State
+from archfem.models.gauges import Gauges
+from archfem.models.moving import Moving
+from archfem.motion.motion import Motion
+
+TURNED = 0.3
+"""Turn of a joint beyond which its blocks are loose: a voussoir is then about to tumble [rad]."""
+
+SETTLING = 20.0
+"""Time after the motion in which what falls may come to rest [s]."""
+
+SPACING = 0.02
+"""Time between two frames of a fall [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parting:
+    """Says in which step of a run a joint lets its blocks go.
+
+    Attributes:
+        model: whose joints.
+    """
+
+    model: Moving
+
+    def step(self, batch: Batch) -> tuple[int, str] | None:
+        """Return the first step of a batch after which blocks are loose, and why; or None.
+
+        Args:
+            batch: steps of a run.
+        """
+        gauges, structure = Gauges.on(self.model), self.model.structure
+        _, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
+        loose = (np.abs(turn) > TURNED) | (np.abs(slip) >= structure.depths)
+        if not loose.any():
+            return None
+        k = int(np.argmax(loose.any(axis=1)))
+        joint = int(np.argmax(loose[k]))
+        name = structure.joints[joint].name
+        if abs(turn[k, joint]) > TURNED:
+            return k, f"'{name}' had turned by {abs(turn[k, joint]):.2g} rad"
+        return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
+
+
+def fallen(model: Moving, state: State, motion: Motion) -> tuple[xr.Dataset, Fall]:
+    """Let the blocks of a structure that has parted fall until they rest.
+
+    Args:
+        model: that has parted.
+        state: in which it did.
+        motion: of the ground, which goes on.
+
+    Returns:
+        Poses of all blocks over frames, and what the fall has left.
+    """
+    given = released(model, state)
+    end = max(motion.duration, state.time) + SETTLING
+    frames = list(Falling(model.structure).frames(given.start, end, motion, spacing=SPACING))
+    fall = fall_of(model.structure, [given.start, *frames])
+    return _as_dataset(model, [given.start, *frames], given), fall
+
+
+def _as_dataset(model: Moving, frames: list[Loose], given: Handover) -> xr.Dataset:
+    """Frames of a fall."""
+    poses = np.array([frame.poses for frame in frames])
+    about = {
+        "long_name": "displacement of a block's centroid, and its turn, from where it was built",
+        "units": "m, m, rad",
+    }
+    return xr.Dataset(
+        {"fall_pose": (("fall_frame", "block", "pose"), poses, about)},
+        {
+            "fall_time": ("fall_frame", np.array([frame.time for frame in frames]), {"units": "s"}),
+            "pose": ["x", "y", "turn"],
+        },
+        {
+            "handover_strain": given.strain,
+            "handover_kinetic": np.array([given.before, given.after]),
+        },
+    )
+
+
+def left_standing(model: Moving, q: Array) -> Fall:
+    """Return what a run has left of a structure whose blocks have held together.
+
+    Args:
+        model: that has not parted.
+        q: coordinates at the end (n,).
+    """
+    state = State(0.0, q, np.zeros_like(q), np.zeros_like(q), None)
+    return fall_of(model.structure, [released(model, state).start])
