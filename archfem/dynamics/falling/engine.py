@@ -33,6 +33,9 @@ its weight would be lifted."""
 STILL = 1e-3
 """Speed [m/s] of the fastest point of a block up to which it counts as still."""
 
+THROUGH = 0.2
+"""Overlap, relative to the reach of the smallest block, at which blocks pass through each other."""
+
 LASTING = 0.5
 """Time [s] for which all blocks must be still, on ground that rests, to have come to rest."""
 
@@ -232,8 +235,13 @@ class _Run:
         return Frame(time, self._q.copy(), self._v.copy(), *told)
 
     def _check(self, time: float) -> None:
-        """Refuse energy from nowhere."""
-        structure = self._falling.structure
+        """Refuse blocks that pass through each other, and energy from nowhere."""
+        structure, bodies = self._falling.structure, self._falling.bodies
+        if self._overlap > THROUGH * bodies.reach[list(structure.free)].min():
+            raise DidNotConverge(
+                f"by {time:.4g} s blocks overlap by {self._overlap:.3g} m and pass through each "
+                f"other: begin with blocks apart, and give a smaller dt than {self._falling.dt:g} s"
+            )
         noise = NOISE * structure.weight * structure.size
         gained, allowed = self._energy[4], RISE * self._exchanged + noise
         if not gained <= allowed:

@@ -63,7 +63,7 @@ def _convex(points: Array, piece: Piece) -> bool:
 def _triangles(points: Array) -> list[Piece]:
     """Cut off one ear after another."""
     left, found = list(range(len(points))), []
-    while len(left) > 3:
+    while len(left) > 2:
         ear = next((k for k in range(len(left)) if _is_ear(points, left, k)), None)
         if ear is None:
             raise InvalidStructure(
@@ -72,7 +72,7 @@ def _triangles(points: Array) -> list[Piece]:
             )
         found.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
         del left[ear]
-    return [*found, (left[0], left[1], left[2])]
+    return found
 
 
 def _is_ear(points: Array, left: list[int], k: int) -> bool:
