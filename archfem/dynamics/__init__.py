@@ -6,6 +6,7 @@
     impact        what a rocking block loses at impacts, and damping for a wanted loss
     steps         what passes between stepper and run: states, steps, batches
     stepping      the one stepper and its strategies
+    falling       loose rigid blocks: impacts, and the way to the ground
     energy        the energy balance of a run
     guard         doubts about a run while it goes on
     glance        a quick look at joints at every step

@@ -3,6 +3,11 @@ from .events import CountedMechanism as CountedMechanism
 from .events import Event as Event
 from .events import EveryMechanism as EveryMechanism
 from .events import MovingMechanism as MovingMechanism
+from .falling.engine import Falling as Falling
+from .falling.handover import released as released
+from .falling.state import Loose as Loose
+from .falling.verdict import Fall as Fall
+from .falling.verdict import fall_of as fall_of
 from .history import Ending as Ending
 from .history import History as History
 from .history import history_of as history_of

@@ -1,0 +1,197 @@
+"""Rigid blocks from a pose to rest: overturning, dominoes, arches, energy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from loose_blocks import G, floor, overturns, rocking_block, sine, tilted
+
+import archfem as af
+from archfem.dynamics.falling.engine import Falling
+from archfem.dynamics.falling.state import Loose
+
+THRESHOLDS = [(1.0, 0.33033), (3.0, 0.57432), (8.0, 1.20181)]
+"""Frequency over p, and the least half sine that overturns the block 0.6 × 2.4 m, over g."""
+
+ISLANDS = [(2.0, 0.30583), (3.0, 0.35008), (3.0, 0.88670), (3.0, 0.91579)]
+"""The same of one sine, with Housner's restitution: where it begins or ceases to overturn."""
+
+LEAST = {0.31: 0.19600, 0.45: 0.10672}
+"""Friction, and least thickness over radius of a semicircle of 27 voussoirs, by limit analysis."""
+
+
+def falls(ratio, peak, halves, dt=5e-4):
+    """Whether the rocking block falls over under half sines."""
+    structure = rocking_block()
+    motion = sine(ratio, peak, halves, dt)
+    for frame in Falling(structure, dt=motion.dt).frames(Loose.built(structure), 12.0, motion):
+        turn, speed = abs(frame.poses[1, 2]), np.abs(frame.velocities[1]).max()
+        if turn > 1.0:
+            return True
+        if frame.time > motion.duration and turn < 1e-3 and speed < 0.02:
+            return False
+    return False
+
+
+@pytest.mark.parametrize(("ratio", "least"), THRESHOLDS)
+def test_a_half_sine_overturns_above_its_threshold(ratio, least):
+    """Within 0.01 %, five digits of the threshold being known to 0.001 %."""
+    for factor, wanted in ((0.9999, False), (1.0001, True)):
+        assert overturns(ratio, factor * least, 1) is wanted
+        assert falls(ratio, factor * least, 1) is wanted
+
+
+@pytest.mark.parametrize(("ratio", "edge"), ISLANDS)
+def test_a_sine_overturns_in_islands(ratio, edge):
+    """Within 0.1 %, with the impacts of the engine in place of Housner's."""
+    above = edge != ISLANDS[2][1]
+    for factor, wanted in ((0.999, not above), (1.001, above)):
+        assert overturns(ratio, factor * edge, 2) is wanted
+        assert falls(ratio, factor * edge, 2) is wanted
+
+
+@pytest.mark.slow
+def test_the_map_of_one_sine_is_that_of_housner():
+    for ratio, peaks in ((2.0, np.linspace(0.26, 0.6, 18)), (3.0, np.linspace(0.3, 1.0, 36))):
+        for peak in peaks:
+            assert falls(ratio, peak, 2) == overturns(ratio, peak, 2), (ratio, peak)
+
+
+def test_dominoes_all_fall_at_one_speed():
+    """Each takes as long as the one before; the speed does not depend on the step."""
+    boxes = [(0.6 * k, 0.0, 0.6 * k + 0.2, 1.0) for k in range(20)]
+    structure = floor(*boxes, friction=0.4)
+    speeds = []
+    for dt in (2e-3, 1e-3):
+        start = tilted(structure, np.arctan(0.2) + 0.02)
+        met = np.full(21, np.inf)
+        for frame in Falling(structure, dt=dt).frames(start, 6.0, spacing=dt):
+            turned = -frame.poses[:, 2] > 0.01
+            met[turned] = np.minimum(met[turned], frame.time)
+            if turned[-1]:
+                break
+        speeds.append(0.6 * 8 / (met[19] - met[11]))
+        assert frame.overlap < 0.01
+    assert speeds == pytest.approx([3.158, 3.158], rel=3e-3)
+
+
+@pytest.fixture(scope="module")
+def chords():
+    return af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+
+
+def pulse(peak, duration):
+    return af.Motion(np.full(round(duration / 0.01), peak * G), 0.01)
+
+
+def test_a_ring_falls_to_the_ground_and_comes_to_rest(chords):
+    falling = Falling(chords, dt=1e-3)
+    frames = list(falling.frames(Loose.built(chords), 15.0, pulse(0.7, 0.5)))
+    last = frames[-1]
+    assert last.resting
+    assert last.time < 10.0
+    levels = [block.centroid[1] + pose[1] for block, pose in zip(chords.blocks, last.poses, strict=True)]
+    assert max(levels) - falling.bodies.level < 1.0  # no stone lies higher than on another
+    assert last.overlap < 0.01
+    spent = [frame.balance.work - frame.balance.potential - frame.balance.kinetic for frame in frames]
+    exchanged = max(spent)
+    assert np.diff(spent).min() > -1e-5 * exchanged
+    assert last.balance.gained < 1e-5 * exchanged
+    assert last.balance.kinetic < 1e-12 * exchanged
+
+
+def test_a_ring_at_rest_stays(chords):
+    start = Loose.built(chords)
+    count = 3001
+    breath = af.Motion(1e-9 * np.ones(count), 1e-3)  # keeps the run going
+    end = Falling(chords).last(start, 3.0, breath)
+    assert end.time == pytest.approx(3.0)
+    assert np.abs(end.poses).max() < 1e-5
+
+
+@pytest.mark.parametrize("chords", [None, 2])
+def test_stones_of_several_pieces_fall_as_far(chords):
+    ring = af.circular_arch(
+        radius=2.95, thickness=0.55, embrace=150.0, voussoirs=5, chords=chords
+    )
+    falling = Falling(ring, dt=1e-3)
+    assert len(falling.bodies.owner) > len(ring.blocks)
+    end = falling.last(Loose.built(ring), 15.0, pulse(1.2, 0.5))
+    assert end.resting
+    assert end.poses[3, 1] < -1.5
+    assert end.balance.gained < 1e-4 * end.balance.lost
+
+
+def semicircle_stands(friction, ratio):
+    contact = af.Contact(1e9, 1e9, friction)
+    arch = af.circular_arch(
+        radius=5.0, thickness=5.0 * ratio, embrace=180.0, voussoirs=27, chords=1, contact=contact
+    )
+    for frame in Falling(arch, dt=1e-3).frames(Loose.built(arch), 6.0):
+        if np.abs(frame.poses[:, :2]).max() > 0.2:
+            return False
+    return frame.resting
+
+
+@pytest.mark.parametrize(("friction", "least"), LEAST.items())
+def test_a_semicircle_stands_by_friction_from_its_least_thickness_on(friction, least):
+    assert not semicircle_stands(friction, 0.99 * least)
+    assert semicircle_stands(friction, 1.01 * least)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction", "least"), LEAST.items())
+def test_a_semicircle_stands_by_friction_farther_from_its_least_thickness(friction, least):
+    assert not semicircle_stands(friction, 0.97 * least)
+    assert semicircle_stands(friction, 1.03 * least)
+
+
+def test_the_ground_may_be_moved_up_and_down():
+    """Weightless on a ground that falls as fast: what is thrown goes straight on."""
+    structure = floor((0.0, 0.0, 0.5, 0.5))
+    start = Loose.built(structure)
+    start.velocities[1] = 0.5, 1.0, 2.0
+    ground = af.Motion(np.zeros(101), 0.01, np.full(101, -G))
+    end = Falling(structure).last(start, 1.0, ground)
+    assert end.poses[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-9)
+    assert end.balance.lost < 1e-9 * end.balance.kinetic
+
+
+def test_frames_come_at_equal_times_and_at_the_end():
+    structure = floor((0.0, 0.0, 0.5, 0.5))
+    start = replace(Loose.built(structure), time=2.0)
+    start.poses[1, 1] = 5.0
+    times = [frame.time for frame in Falling(structure).frames(start, 2.05, spacing=0.02)]
+    assert times == pytest.approx([2.0, 2.02, 2.04, 2.05], abs=1e-9)
+
+
+def test_numbers_that_cannot_be_meant_are_refused():
+    structure = floor((0.0, 0.0, 0.5, 0.5))
+    for told in ({"dt": 0.1}, {"restitution": 1.5}, {"friction": -1.0}, {"level": 5.0}):
+        with pytest.raises(af.errors.InvalidInput):
+            Falling(structure, **told)
+    with pytest.raises(af.errors.InvalidInput, match="structure is a str"):
+        Falling("ring")
+    falling, start = Falling(structure), Loose.built(structure)
+    with pytest.raises(af.errors.InvalidInput, match="not after the start"):
+        falling.last(start, 0.0)
+    with pytest.raises(af.errors.InvalidInput, match="below the step"):
+        list(falling.frames(start, 1.0, spacing=1e-5))
+    with pytest.raises(af.errors.InvalidInput, match="give finite numbers of shape"):
+        falling.last(replace(start, poses=start.poses[:1]), 1.0)
+
+
+def test_blocks_that_begin_inside_each_other_are_refused():
+    structure = floor((0.0, 0.0, 0.5, 0.5))
+    start = Loose.built(structure)
+    start.poses[1, 1] = -0.2
+    with pytest.raises(af.errors.DidNotConverge, match=r"overlap by 0\.2 m"):
+        Falling(structure).last(start, 1.0)
+
+
+def test_energy_from_nowhere_is_refused(monkeypatch, chords):
+    """What a coarse step gains is above a bound far below the true one."""
+    monkeypatch.setattr("archfem.dynamics.falling.engine.RISE", 1e-12)
+    monkeypatch.setattr("archfem.dynamics.falling.engine.NOISE", 0.0)
+    with pytest.raises(af.errors.DidNotConverge, match="from nowhere"):
+        Falling(chords, dt=5e-3).last(Loose.built(chords), 15.0, pulse(0.7, 0.5))
