@@ -4,13 +4,12 @@ While joints hold, forces are those of `joints.moved`. Once a joint has turned o
 its blocks are loose, `falling` takes them as they are and as they move, to the ground and to rest.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
-from archfem.arrays import Array
-from archfem.dynamics.falling.engine import Falling
+from archfem.dynamics.falling.engine import STILL, Falling
 from archfem.dynamics.falling.handover import Handover, released
 from archfem.dynamics.falling.state import Loose
 from archfem.dynamics.falling.verdict import Fall, fall_of
@@ -96,12 +95,13 @@ def _as_dataset(model: Moving, frames: list[Loose], given: Handover) -> xr.Datas
     )
 
 
-def left_standing(model: Moving, q: Array) -> Fall:
+def left_standing(model: Moving, state: State) -> Fall:
     """Return what a run has left of a structure whose blocks have held together.
 
     Args:
         model: that has not parted.
-        q: coordinates at the end (n,).
+        state: at the end.
     """
-    state = State(0.0, q, np.zeros_like(q), np.zeros_like(q), None)
-    return fall_of(model.structure, [released(model, state).start])
+    loose = released(model, state).start
+    resting = bool(np.abs(loose.velocities[:, :2]).max() <= STILL)
+    return replace(fall_of(model.structure, [loose]), resting=resting)

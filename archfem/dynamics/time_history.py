@@ -12,7 +12,7 @@ from archfem.arguments import instance, real, whole
 from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.collapse import Parting, fallen, left_standing
-from archfem.dynamics.history import Ending, History
+from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.recorder import Recorder
 from archfem.dynamics.schemes import (
     HHT,
@@ -31,6 +31,7 @@ from archfem.dynamics.steps import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.models.model import Model, check_model
+from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.newton import Newton
@@ -172,7 +173,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
     """A run of a structure that may fall, with what it has left of it."""
     if history.ended is not Ending.PARTED:
-        return with_fall(history, left_standing(model, state.q))
+        return with_fall(history, left_standing(model, state))
     frames, fall = fallen(model, state, motion)
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
     return with_fall(History(dataset, history.structure), fall)

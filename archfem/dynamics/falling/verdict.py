@@ -9,6 +9,7 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.bodies import Bodies, bodies_of
 from archfem.dynamics.falling.state import Loose
 from archfem.errors import InvalidInput
+from archfem.masonry.naming import listed
 from archfem.masonry.structure import Structure
 
 KINDS = ("stands", "dislocated", "partly fallen", "fallen")
@@ -56,6 +57,16 @@ class Fall:
     blocks: tuple[str, ...]
     residual: float
     resting: bool
+
+    @property
+    def words(self) -> str:
+        """The same as the end of a sentence on the structure."""
+        left = f"the largest displacement left is {self.residual:.3g} m"
+        still = "" if self.resting else ", and blocks still move"
+        if self.time is None:
+            return f"{'stands' if self.kind == 'stands' else 'stands, dislocated'}; {left}{still}"
+        names = listed(self.blocks, "; ")
+        return f"is {self.kind}, at {self.time:.2f} s first; lost: {names}; {left}{still}"
 
 
 def fall_of(structure: Structure, frames: Iterable[Loose]) -> Fall:
