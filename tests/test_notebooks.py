@@ -23,7 +23,14 @@ def test_every_notebook_has_a_number():
     assert {path.stem for path in FOLDER.glob("*.py")} == set(EXPECTED)
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+LONG = ("05_speed_against_error", "06_a_roman_bridge")
+"""What these arrive at, tests of predicted errors and of the weight on bases check as well."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in EXPECTED],
+)
 def test_notebook_arrives_at_its_number(name, monkeypatch, tmp_path):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.setenv("ARCHFEM_QUICK", "1")

@@ -27,7 +27,7 @@ def study(tmp_path):
     """Two rings, one of them thin, under one short motion."""
     path = tmp_path / "study.toml"
     path.write_text(
-        'title = "two rings"\nscales = { precision = 0.2, between = [0.3, 2.0] }\n'
+        'title = "two rings"\nscales = { precision = 0.4, between = [0.3, 2.0] }\n'
         'pairs = ["pair-1"]\n[cases]\n'
         f'"thick" = {{ case = "{MESHES}/ring_suite.toml" }}\n'
         f'"thin" = {{ case = "{MESHES}/ring_suite.toml", set = ["structure.thickness=0.4"] }}\n'

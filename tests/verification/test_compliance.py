@@ -50,7 +50,7 @@ def filled():
         ("closed", NEWMARK),
         ("initial", af.HHT(-0.1)),
         ("none", CONSERVING),
-        ("none", af.HHT(-0.2)),
+        pytest.param("none", af.HHT(-0.2), marks=pytest.mark.slow),
     ],
 )
 def test_history_is_that_of_snes(filled, rule, joints, scheme):
