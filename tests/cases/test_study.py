@@ -16,6 +16,7 @@ QUICK = [
     "suite.matched=false",
     "suite.reduction=2",
     "suite.pairs.pair-1.synthetic.duration=2",
+    "suite.pairs.pair-1.vertical.synthetic.duration=2",
     "suite.pairs.pair-1.synthetic.pga=3.0",
 ]
 CASE = f'[cases."a b"]\ncase = "{MESHES}/ring_suite.toml"'
@@ -27,7 +28,7 @@ def study(tmp_path):
     """Two rings, one of them thin, under one short motion."""
     path = tmp_path / "study.toml"
     path.write_text(
-        'title = "two rings"\nscales = { precision = 0.4, between = [0.3, 2.0] }\n'
+        'title = "two rings"\nscales = { precision = 0.2, between = [0.3, 2.0] }\n'
         'pairs = ["pair-1"]\n[cases]\n'
         f'"thick" = {{ case = "{MESHES}/ring_suite.toml" }}\n'
         f'"thin" = {{ case = "{MESHES}/ring_suite.toml", set = ["structure.thickness=0.4"] }}\n'

@@ -52,8 +52,8 @@ SLOW = [("force", "eccentric"), ("force", "two at the crown")]
 def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     limit = limit_of(LOADS[load])
     found = pushover(rigid(RING), LOADS[load], control=control)
-    if control == "force":
-        assert "cannot grow beyond a factor of" in found.outcome
+    if (control, load) == ("force", "sideways"):
+        assert "cannot grow beyond a factor of 0.457" in found.outcome
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor <= limit * (1.0 + 1e-6)  # joints' end points carry the edge exactly
 
