@@ -12,6 +12,8 @@ LONG = (
     "viaduct of 8 spans, bare",
     "record × 3",
     "0.98 × least, soft joints",
+    "cover of 20 mm",
+    "flat ring, 20°",
 )
 """Seconds each, and near to others that are quicker."""
 
