@@ -30,7 +30,7 @@ LEVELS = (
         ),
         ("condensed", (8, 8)),
     ),
-    Level((("faces", (8, 8)), ("condensed", (8, 8))), ("condensed", (16, 16))),
+    Level((("faces", (8, 8)), ("condensed", (8, 8))), ("condensed", (12, 12))),
 )
 """The second is looked at where all models of the first err too much. On a ring whose joints slide
 faces 2×2, 4×4 and 8×8 err by 0.014, 0.006 and 0.002, condensed 4×4 and 8×8 by 0.005 and 0.001."""

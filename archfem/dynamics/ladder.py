@@ -30,7 +30,7 @@ Builder = Callable[[Structure, Discretisation], Model]
 logger = logging.getLogger("archfem")
 
 FINEST = 1e-4
-"""Smallest tolerance of |e| by which steps are tried: some 0.5 ms long where a ring is shaken [-]."""
+"""Smallest tolerance of |e| by which steps are tried: 0.5 ms or so where a ring is shaken [-]."""
 
 
 def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice needs)
@@ -161,12 +161,13 @@ def _climbed(
     structure: Structure, yardstick: Yardstick, steps: Steps, builder: Builder
 ) -> Iterator[tuple[Discretisation, Model, float]]:
     """Models, the cheapest first, and what each errs by; those of a level against its best."""
+    before = best(structure, LEVELS[0]), yardstick.model
     for level in LEVELS:
         if level is not LEVELS[0]:
             finer = builder(structure, best(structure, level))
             yardstick = Yardstick(finer, yardstick.window, yardstick.damping)
         for asked in candidates(structure, level):
-            model = builder(structure, asked)
+            model = before[1] if asked == before[0] else builder(structure, asked)
             yield asked, model, yardstick.in_model(model, steps)
 
 
