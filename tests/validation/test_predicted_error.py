@@ -178,7 +178,7 @@ def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
 
 
 def test_steps_alone_are_refined_where_they_err(ring):
-    """No finer mesh is tried for what steps of 20 ms err by; steps of their own length do better."""
+    """No finer mesh is tried for what steps of 20 ms err by; steps of any length do better."""
     motion = af.Motion.synthetic(duration=1.5, pga=2.5, seed=5)
     coarse = af.build(ring, fidelity="auto", tolerance=0.04, motion=motion, dt=0.02).prediction
     assert not coarse.met
