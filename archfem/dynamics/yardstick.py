@@ -23,7 +23,9 @@ from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 
 SAFETY = 1.5
-"""By how much an error elsewhere in the motion may exceed that in the window."""
+"""By how much an error elsewhere in the motion may exceed that in the window. With it, what was
+predicted of eight arches and columns, a motion each, was 1.0 to 2.7 times what came about; of a
+slender block that rocks on one joint 0.2 times: a model may agree in the window by luck."""
 
 RICHARDSON = 4.0 / 3.0
 """Error of a scheme of second order, of what it changes by in steps half as long."""
