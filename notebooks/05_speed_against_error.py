@@ -70,7 +70,7 @@ af.view.draw_accuracy(found)
 # %% [markdown]
 # ## Let it choose
 #
-# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, the cheapest first,
+# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, cheapest first,
 # until the error it predicts for the largest $|e|$ of every joint is within the tolerance.
 
 # %%

@@ -29,6 +29,11 @@ SCENES = {
 FILLED = {"backfill": "full", "rest": "condensed"}
 
 
+def quick(structure, discretisation):
+    """As many models as are asked for, all of rigid stones with as many facets."""
+    return plain(structure, replace(discretisation, fidelity="rigid"))
+
+
 def damping_of(structure):
     return usual_damping(rigid(structure, rule=af.joints.Quadrature("exact")))
 
@@ -83,7 +88,7 @@ def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_da
     built, asked = [], []
 
     def builder(structure, discretisation):
-        model = plain(structure, replace(discretisation, fidelity="rigid"))  # as many, but quick
+        model = quick(structure, discretisation)
         built.append((discretisation, model))
         return model
 
@@ -91,7 +96,7 @@ def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_da
         asked.append(model)
         return af.Rayleigh(0.05, (8.0, 24.0))
 
-    motion = af.Motion.synthetic(duration=0.5, pga=1.0, seed=1)
+    motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
     choose(ring, 1e-9, motion, damping, dt, builder=builder)
     orders = [each for each, _ in built]
     assert [orders.count(best(ring, level)) for level in LEVELS] == [1, 1]
@@ -160,12 +165,8 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
 
 
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
-    motion = af.Motion.synthetic(duration=0.5, pga=4.0, seed=3)
-
-    def builder(structure, discretisation):
-        return plain(structure, replace(discretisation, fidelity="rigid"))  # as many, but quick
-
-    model = choose(ring, 1e-9, motion, None, builder=builder)
+    motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
+    model = choose(ring, 1e-9, motion, builder=quick)
     told = model.prediction
     assert not told.met
     assert told.pace == FINEST
@@ -180,11 +181,11 @@ def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
 def test_steps_alone_are_refined_where_they_err(ring):
     """No finer mesh is tried for what steps of 20 ms err by; steps of any length do better."""
     motion = af.Motion.synthetic(duration=1.5, pga=2.5, seed=5)
-    coarse = af.build(ring, fidelity="auto", tolerance=0.04, motion=motion, dt=0.02).prediction
+    coarse = choose(ring, 0.04, motion, dt=0.02, builder=quick).prediction
     assert not coarse.met
     assert coarse.in_time > 0.04
     assert len(coarse.considered) <= 3
-    free = af.build(ring, fidelity="auto", tolerance=0.04, motion=motion).prediction
+    free = choose(ring, 0.04, motion, builder=quick).prediction
     assert free.met
     assert free.in_time <= 0.02
 
