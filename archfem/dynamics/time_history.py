@@ -103,11 +103,13 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     Args:
         model: any rung of the ladder.
         motion: of the ground.
-        dt: time step [s]; by default that for which the model was chosen, or steps of different
-            lengths, as the tolerance asks for. Accelerations between samples are interpolated.
+        dt: time step [s]; by default the steps for which the model was chosen, or else steps of
+            different lengths, as the tolerance asks for. Accelerations between samples are
+            interpolated.
         tolerance: error of |e| of the joints of rings and piers that steps in time may cause [-],
-            without `dt`; by default 0.005. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of
-            the history says for which part of the shortest the error was larger.
+            without `dt`; by default that for which the model was chosen, or 0.005. Steps are from
+            0.1 to 20 ms long; `tolerance_unmet` of the history says for which part of the shortest
+            the error was larger.
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
         damping: `StiffnessDamping`, also as by `effective_damping` or `restitution_damping`;
@@ -175,8 +177,10 @@ def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[flo
         if not 0.0 < real(tolerance, "tolerance on |e| [-]") < 1.0:
             raise InvalidInput(f"tolerance {tolerance!r} on |e| is not between 0 and 1: try 0.005")
         return None, tolerance
+    if dt is None and model.prediction:
+        return model.prediction.dt, model.prediction.pace or TOLERANCE
     if dt is None:
-        return (model.prediction.dt if model.prediction else None), TOLERANCE
+        return None, TOLERANCE
     if not 0.0 < real(dt, "dt [s]") <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
     return dt, TOLERANCE
