@@ -23,7 +23,7 @@ Tangent = Callable[[Array], sparse.csr_matrix]
 ROUGHLY = 1e-7
 """Residual, relative to the load, above which round-off is no excuse."""
 
-_SEARCHES = {"basic": 12, "cp": 60}
+SEARCHES = {"basic": 12, "cp": 60}
 """Line searches in the order tried, and the iterations each may take; more than a dozen full
 steps are a cycle of statuses."""
 
@@ -93,7 +93,7 @@ class Solver:
         tangent: Tangent,
         start: Array,
         scale: float,
-        searches: Iterable[str] = tuple(_SEARCHES),
+        searches: Iterable[str] = tuple(SEARCHES),
     ) -> Solved:
         """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm.
 
@@ -148,7 +148,7 @@ class Solver:
         chosen = {
             "snes_linesearch_type": search,
             "snes_linesearch_max_it": "40",
-            "snes_max_it": str(_SEARCHES[search]),
+            "snes_max_it": str(SEARCHES[search]),
             "ksp_type": "preonly",
             "pc_type": "lu",
             **self.settings.petsc,
