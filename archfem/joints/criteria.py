@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from archfem.arguments import instance, real, whole
 from archfem.errors import InvalidInput
+from archfem.joints.duration import step_lengths
 from archfem.masonry.roles import judged_parts
 
 HINGE = 0.46
@@ -17,6 +18,11 @@ HINGE = 0.46
 
 FAILURES = 4
 """Hinging or sliding joints in one ring that make it a mechanism: Heyman (1966)."""
+
+DURATION = 1e-3
+"""Time for which a mechanism must hold to count as one [s]. A stone that lost all support would
+fall by 5 µm in it, less than joints give elastically; and steps that choose their length go down to
+a tenth of it, and would else decide. Among steps as long as this, or longer, each counts."""
 
 USED_UP = 1e-6
 """Friction left, relative to its limit, below which it is used up: round-off decides nothing there.
@@ -38,11 +44,14 @@ class Criteria:
         failures: joints of rings and piers that, failed at once, count as a mechanism.
         friction: |V| / N from which every joint counts as sliding [-]; None takes the coefficient
             of friction of each joint's own contact.
+        duration: for which a mechanism must hold without a break, whichever joints it is made of,
+            to count as one over time [s]; shorter ones are named where they were met.
     """
 
     hinge: float = HINGE
     failures: int = FAILURES
     friction: float | None = None
+    duration: float = DURATION
 
     def __post_init__(self) -> None:
         """Refuse limits that no joint, or every joint, would pass."""
@@ -54,6 +63,7 @@ class Criteria:
         whole(self.failures, "criteria failures")
         if self.friction is not None:
             real(self.friction, "criteria friction [-]", least=0.0)
+        real(self.duration, "criteria duration [s]", least=0.0)
 
     @classmethod
     def of(cls, joints: xr.Dataset) -> "Criteria":
@@ -62,7 +72,7 @@ class Criteria:
         Args:
             joints: as made by `joint_dataset`, which tell them as attributes.
         """
-        kinds = {"hinge": float, "failures": int, "friction": float}
+        kinds = {"hinge": float, "failures": int, "friction": float, "duration": float}
         told = {key: joints.attrs.get(PREFIX + key) for key in kinds}
         return cls(**{key: kinds[key](value) for key, value in told.items() if value is not None})
 
@@ -195,9 +205,7 @@ def longest_duration(flags: xr.DataArray) -> xr.DataArray:
     Args:
         flags: true or false over time and joint.
     """
-    time = flags["time"].values
-    step = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(1)
-    up = flags.transpose("time", ...).values
+    step, up = step_lengths(flags["time"].values), flags.transpose("time", ...).values
     elapsed = np.cumsum(np.where(up, step[:, None], 0.0), axis=0)
     before = np.maximum.accumulate(np.where(up, 0.0, elapsed), axis=0)
     return xr.DataArray((elapsed - before).max(axis=0), {"joint": flags["joint"]}, ("joint",))
