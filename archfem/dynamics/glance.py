@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.joints.criteria import Criteria, failing
+from archfem.joints.criteria import Criteria, failing, ratio_at_sliding
 from archfem.joints.resultants import joint_dataset, ratios
 from archfem.masonry.structure import Structure
 
@@ -34,7 +34,10 @@ class Glance:
         self._structure, self._criteria, self._ask = structure, criteria, ask
         self._numbers = np.array(numbers, dtype=np.intp)
         self._depth = structure.depths[self._numbers]
-        self._coefficients = criteria.coefficients(structure.friction[self._numbers])
+        self._laws = (
+            criteria.coefficients(structure.friction[self._numbers]),
+            criteria.cohesions(structure.cohesion[self._numbers]),
+        )
         self._seen: dict[bytes, frozenset[str]] = {}
 
     def __call__(self, resultants: Array, least: int) -> frozenset[str]:
@@ -46,7 +49,8 @@ class Glance:
         """
         own = resultants[self._numbers]
         e, friction = ratios(own, self._depth)
-        hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
+        limits = ratio_at_sliding(own[:, 0], e, *self._laws)
+        hinges, slides = failing(e, friction, limits, self._criteria.hinge)
         apart = own[:, 0] <= 0.0
         if np.count_nonzero(hinges | slides | apart) < least:
             return frozenset()

@@ -69,8 +69,8 @@ def verified_mechanism(
     """Look for a rigid-block motion that the joints failed at one instant permit.
 
     The largest motion v, within a box, that opens a joint only where it hinges (away from the face
-    that stays in contact) or has come apart, slides only where friction is used up and in the
-    sense of the shear force, and closes none:
+    that stays in contact) or has come apart, slides only where friction and cohesion are used up
+    and in the sense of the shear force, and closes none:
 
         max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere,
 
