@@ -27,6 +27,12 @@ SEARCHES = {"basic": 12, "cp": 60}
 """Line searches in the order tried, and the iterations each may take; more than a dozen full
 steps are a cycle of statuses."""
 
+SYMMETRIC = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
+"""Methods that take a matrix for symmetric, by the options of PETSc that choose them."""
+
+ASYMMETRY = 1e-9
+"""Difference of a matrix and its transpose, relative to its largest entry, that is round-off."""
+
 _REASONS = {
     -3: "the tangent is singular",
     -4: "the residual is not a number",
@@ -42,7 +48,8 @@ class Newton:
 
     Attributes:
         tolerance: largest residual, relative to the load [-].
-        petsc: further options for PETSc, without a prefix, e.g. {"pc_type": "cholesky"}.
+        petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. Methods for
+            symmetric matrices are refused where joints slide, for tangents then are not.
     """
 
     tolerance: float = 1e-10
@@ -52,7 +59,7 @@ class Newton:
         """Refuse what no solve could reach, and options without names."""
         if not 0.0 < real(self.tolerance, "tolerance of a solve [-]") < 1.0:
             raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
-        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"pc_type": "cholesky"}')
+        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
 
 
 @dataclass(frozen=True)
@@ -187,10 +194,21 @@ class Solver:
 
     def _load(self, snes: PETSc.SNES, q: PETSc.Vec, matrix: PETSc.Mat, _: PETSc.Mat) -> None:
         tangent = self._tangent(q.array_r)  # type: ignore[misc]
+        self._check_symmetry(tangent)
         if tangent is not self._loaded:
             matrix.setValuesCSR(tangent.indptr, tangent.indices, tangent.data)
             matrix.assemble()
             self._loaded = tangent
+
+    def _check_symmetry(self, tangent: sparse.csr_matrix) -> None:
+        """Refuse methods for symmetric matrices where the tangent is not symmetric."""
+        chosen = self.settings.petsc
+        asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
+        if asked and abs(tangent - tangent.T).max() > ASYMMETRY * abs(tangent).max():
+            raise InvalidInput(
+                f"petsc = {asked} is for symmetric matrices, and where joints slide the tangent is "
+                "not: leave it out, and each tangent is factorised by LU"
+            )
 
 
 def magnitude(load: Array) -> float:
