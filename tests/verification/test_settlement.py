@@ -55,6 +55,17 @@ def test_supports_that_move_together_change_nothing(rung, rule, motion):
     np.testing.assert_allclose(gap, plane, atol=1e-8)
 
 
+@pytest.mark.parametrize("rung", RUNGS)
+def test_what_supports_pull_is_the_derivative_of_the_force(rung):
+    """By differences, on joints that never slide, where some are open in part."""
+    model = af.build(glued(RING), fidelity=rung, cells=(2, 2), quadrature="lobatto")
+    q, motion = af.dead_load(model).q, np.zeros_like(model.supports)
+    motion[0] = [-1.0, 0.5, 0.3]
+    ahead, back = (model.moved(sign * 1e-9 * motion).force(q) for sign in (1.0, -1.0))
+    pulled = model.pulled(q, motion)
+    np.testing.assert_allclose((ahead - back) / 2e-9, pulled, atol=1e-6 * np.abs(pulled).max())
+
+
 @pytest.mark.parametrize("settlement", [(-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
 def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlement):
     """Joints slide to and fro on the way, by 0.1 to 0.3 mm; 5 cm at once come to the same."""
