@@ -237,7 +237,7 @@ def _stepped(
     )
     with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
         for batch in batches:
-            reason, size = _reason(watch, batch)
+            reason, size = _reason(watch, batch, recorder.state.time)
             recorder.add(batch.cut(size), last=reason is not None)
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
@@ -250,11 +250,12 @@ def _bar(duration: float) -> tqdm:
     return tqdm(total=round(duration, 4), unit="s", disable=None, leave=False)
 
 
-def _reason(watch: Watch | None, batch: Batch) -> tuple[str | None, int]:
+def _reason(watch: Watch | None, batch: Batch, before: float) -> tuple[str | None, int]:
     """Why the run ends within a batch, if it does, and after how many of its steps."""
     if watch is not None:
-        for k, resultants in enumerate(batch.resultants):
-            if reason := watch(resultants):
+        steps = np.diff(batch.times, prepend=before)
+        for k, (resultants, step) in enumerate(zip(batch.resultants, steps, strict=True)):
+            if reason := watch(resultants, float(step)):
                 return reason, k + 1
     return None, len(batch.times)
 

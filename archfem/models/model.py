@@ -150,6 +150,14 @@ class Model(Protocol):
             object as then, which need not be factorised again.
         """
 
+    def pulled(self, q: Array, motion: Array) -> Array:
+        """Return the change of `force` by a small motion of the supports, as `tangent` has it (n,).
+
+        Args:
+            q: coordinates (n,).
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
+
     def closed(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth (n, n)."""
 
