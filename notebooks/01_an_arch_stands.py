@@ -130,7 +130,7 @@ pd.Series(
 # - `thickness=0.30`: the thrust line comes closer to both faces. At which thickness does
 #   `dead_load` say that the arch cannot carry itself? The next notebook knows.
 # - `af.PointLoad` at a quarter of the span: where do the four hinges form?
-# - `af.view.picture(model, dead.q, colour="stress")` shows the deformed stones.
+# - `af.view.picture(model, dead, colour="stress")` shows the deformed stones.
 
 # %%
 crown = float(found.loc[8, "exact"])

@@ -36,7 +36,7 @@ quick = "ARCHFEM_QUICK" in os.environ  # a short motion: for tests
 
 # %%
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
-motion = af.Motion.synthetic(duration=3.0 if quick else 8.0, pga=1.7, seed=1)
+motion = af.Motion.synthetic(duration=2.0 if quick else 8.0, pga=1.7, seed=1)
 damping = af.Rayleigh(0.05, (8.0, 16.0))
 for rung in ("rigid", "faces", "condensed", "full"):
     print(f"{rung:10s} {af.build(ring, fidelity=rung, quadrature='exact').size:4d} coordinates")
@@ -59,7 +59,7 @@ af.view.draw_envelope(runs, dead=af.dead_load(stones).joints)
 # %% [markdown]
 # ## All of it in one picture
 #
-# Rungs, quadratures and time steps against a converged reference: 6 × 6 cells, exact facets,
+# Rungs, quadratures and time steps against a converged reference: 12 × 12 cells, exact facets,
 # 1.25 ms. The shape of a mark is the rung, its colour the quadrature.
 
 # %%
@@ -70,23 +70,24 @@ af.view.draw_accuracy(found)
 # %% [markdown]
 # ## Let it choose
 #
-# `fidelity="auto"` runs candidates on the strongest part of the motion, the cheapest first, until
-# the error it predicts for the largest $|e|$ of every joint is within the tolerance.
+# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, cheapest first,
+# until the error it predicts for the largest $|e|$ of every joint is within the tolerance.
 
 # %%
 chosen = af.build(ring, fidelity="auto", tolerance=0.005, motion=motion, damping=damping)
-print(chosen.fidelity, chosen.size, chosen.prediction)
+print(chosen.fidelity, chosen.size, chosen.prediction.text)
 
 # %% [markdown]
 # ## Was the prediction honest?
 #
-# The ratio of the predicted error to the one that came about should be near one.
+# The ratio of the predicted error to the one that came about should be above one, and not by much:
+# what the model and what its steps err by is added up, though one may make up for the other.
 
 # %%
-reference = af.build(ring, fidelity="condensed", cells=(8, 8), quadrature="exact")
+reference = af.build(ring, fidelity="condensed", cells=(12, 12), quadrature="exact")
 histories = [
-    af.time_history(model, motion, damping=damping, dt=dt).joints["eccentricity"]
-    for model, dt in ((reference, 0.00125), (chosen, chosen.prediction.dt))
+    af.time_history(reference, motion, damping=damping, dt=0.00125).joints["eccentricity"],
+    af.time_history(chosen, motion, damping=damping).joints["eccentricity"],
 ]
 largest = [abs(e).max("time").values for e in histories]
 actual = float(np.abs(largest[0] - largest[1]).max())

@@ -79,7 +79,7 @@ af.view.draw_eccentricity(
 # %%
 use = af.statics.strength_use(model, dead["as it stands"].q)
 print(af.statics.use_table(use))
-af.view.draw_stress(model, dead["as it stands"].q)
+af.view.draw_stress(model, dead["as it stands"])
 
 # %% [markdown]
 # No joint is near hinging or sliding, as the paper says. Its largest compression, 0.6 MPa, is more

@@ -13,7 +13,7 @@ EXPECTED = {
     "02_how_thin_can_it_be": ("checked", 0.1075, 1e-4),  # Milankovitch (1907), four digits
     "03_a_load_finds_its_four_hinges": ("checked", 1.0, 5e-3),  # pushover by limit analysis
     "04_how_many_springs": ("checked", 1.0, 1e-3),  # centroids of sectors move by 2e-4
-    "05_speed_against_error": ("ratio", 1.67, 1.33),  # honest: between 1/3 and 3
+    "05_speed_against_error": ("ratio", 2.75, 2.25),  # honest: between 1/2 and 5
     "06_a_roman_bridge": ("carried", 1.0, 1e-9),  # equilibrium, to the tolerance of its solve
 }
 """Variable that a notebook ends with, its value, and how far off it may be."""
@@ -23,7 +23,14 @@ def test_every_notebook_has_a_number():
     assert {path.stem for path in FOLDER.glob("*.py")} == set(EXPECTED)
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+LONG = ("05_speed_against_error", "06_a_roman_bridge")
+"""What these arrive at, tests of predicted errors and of the weight on bases check as well."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in EXPECTED],
+)
 def test_notebook_arrives_at_its_number(name, monkeypatch, tmp_path):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.setenv("ARCHFEM_QUICK", "1")

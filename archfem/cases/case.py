@@ -51,7 +51,7 @@ DAMPING = {
     "joints": str,
 }
 ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
-CRITERIA = {"hinge": "1", "failures": int, "friction": "1"}
+CRITERIA = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
 OUTPUT = {
     "every": int,
     "fields_every": int,

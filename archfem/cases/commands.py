@@ -245,6 +245,8 @@ def _tell_rest(rest: Rest) -> None:
         f"{len(structure.joints)} joints, {model.size} coordinates "
         f"({rest.seconds:.2f} s with the dead load)"
     )
+    if model.prediction is not None:
+        print(f"model: {model.prediction.text}")
     print(
         f"dead load: |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
         f"V/N ≤ {float(joints['friction'].max()):.3f}, "

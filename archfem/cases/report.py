@@ -70,7 +70,7 @@ def write_dead(rest: Rest, folder: Path) -> list[Path]:
         save(draw_names(structure), folder / "names.png"),
     ]
     if rest.use is not None:
-        files.append(save(draw_stress(model, dead.q), folder / "dead_stress.png"))
+        files.append(save(draw_stress(model, dead), folder / "dead_stress.png"))
         files.append(_write(use_table(rest.use), folder / "dead_stress.txt"))
     if "free_body" in case.output:
         body = draw_free_body(structure, dead.joints, case.output["free_body"], cells=model.cells)

@@ -17,6 +17,8 @@
     verdicts      when a run first meets a mechanism, by each definition
     scales        by what factor a motion must be multiplied for a mechanism
     ladder        which rung, mesh and step a scene needs
+    candidates    models that may be chosen, and finer ones to compare them with
+    yardstick     what a model and its steps err by
     probe         what a short run tells of a model
     tradeoff      speed against error over settings
 

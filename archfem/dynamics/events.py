@@ -9,19 +9,22 @@ from dataclasses import InitVar, dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import xarray as xr
 
 from archfem.arrays import Array
 from archfem.dynamics.glance import Glance
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, chosen
+from archfem.joints.duration import Unbroken
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.counted import KINDS, counted_mechanism, counted_mechanisms
+from archfem.limit.counted import KINDS, Mechanism, counted_mechanism, counted_mechanisms
 from archfem.limit.verified import Verifier
 from archfem.masonry.naming import listed_joints
 from archfem.masonry.structure import Structure
 
-Watch = Callable[[Array], str | None]
-"""Looks at N, V, M (n_joints, 3) of a step; words that say why the run ends, or None."""
+Watch = Callable[[Array, float], str | None]
+"""Looks at N, V, M (n_joints, 3) of a step and its length [s]; words that say why the run ends, or
+None."""
 
 
 @runtime_checkable
@@ -46,14 +49,14 @@ class Event(Protocol):
 
 
 Until = Event | Callable[[Structure, Array], str | None]
-"""An event, or a function of the structure and N, V, M of a step that does as a `Watch` does."""
+"""An event, or a function of the structure and N, V, M of a step that gives words or None."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CountedMechanism:
     """Event: so many joints of one part, or of several, hinge, slide or have come apart at once.
 
-    Its words say whether the blocks can also move.
+    They do for as long as the criteria say. Its words say whether the blocks can also move.
 
     Attributes:
         criteria: what makes a joint fail, and how many make a mechanism; None for those of the
@@ -87,16 +90,21 @@ class CountedMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier = Verifier(structure)
-        glance = Glance(structure, criteria, np.flatnonzero(structure.judged).tolist())
+        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
 
-        def look(resultants: Array) -> str | None:
-            joints = glance(resultants, criteria.failures)
-            found = None if joints is None else counted_mechanism(joints, kinds=self.kinds)
-            if joints is None or found is None:
+        def found(joints: xr.Dataset) -> Mechanism | None:
+            return counted_mechanism(joints, kinds=self.kinds)
+
+        judged = np.flatnonzero(structure.judged).tolist()
+        glance = Glance(structure, criteria, judged, lambda joints: _named(found(joints)))
+
+        def look(resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(glance(resultants, criteria.failures)), step):
                 return None
-            motion = verifier.verified(joints)
-            return f"a mechanism of {found.part} by {listed_joints(found.names)}; {motion}"
+            joints = glance.labelled(resultants)
+            counted, motion = found(joints), verifier.verified(joints)
+            assert counted is not None
+            return f"a mechanism of {counted.part} by {listed_joints(counted.names)}; {motion}"
 
         return look
 
@@ -105,7 +113,7 @@ class CountedMechanism:
 class MovingMechanism:
     """Event: the failed joints, and they alone, permit a motion of the blocks.
 
-    Its words say whether the count of failures agrees.
+    They do for as long as the criteria say. Its words say whether the count of failures agrees.
 
     Attributes:
         criteria: what makes a joint fail; None for those of the run. Given here and not to the
@@ -137,14 +145,18 @@ class MovingMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier = Verifier(structure)
-        glance = Glance(structure, criteria, verifier.skeleton.joints)
+        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
 
-        def look(resultants: Array) -> str | None:
-            joints = glance(resultants, 1)
-            found = None if joints is None else verifier.moving(joints)
-            if found is None or found.kind not in self.kinds:
+        def moves(joints: xr.Dataset) -> frozenset[str]:
+            found = verifier.moving(joints)
+            return _named(found if found is not None and found.kind in self.kinds else None)
+
+        glance = Glance(structure, criteria, verifier.skeleton.joints, moves)
+
+        def look(resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(glance(resultants, 1)), step):
                 return None
+            found = verifier.verified(glance.labelled(resultants))
             return f"a mechanism that moves, by {listed_joints(found.moved.names)}; {found}"
 
         return look
@@ -152,9 +164,10 @@ class MovingMechanism:
 
 @dataclass(frozen=True, kw_only=True)
 class EveryMechanism:
-    """Event: a mechanism by each definition has been met, at one step of the run or another.
+    """Event: a mechanism by each definition has been met, at one time of the run or another.
 
-    Definitions that the structure has no joints for are not waited for.
+    Each lasts for as long as the criteria say. Definitions that the structure has no joints for are
+    not waited for.
 
     Attributes:
         criteria: what makes a joint fail, and how many make a mechanism; None for those of the
@@ -184,17 +197,20 @@ class EveryMechanism:
         """
         verifier = Verifier(structure)
         concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
-        glance = Glance(structure, criteria, sorted(concerned))
         wanted = {"verified", *possible_counts(structure, criteria)}
+        times = {name: Unbroken(criteria.duration) for name in wanted}
         met: set[str] = set()
 
-        def look(resultants: Array) -> str | None:
-            joints = glance(resultants, 1)
-            if joints is None:
-                return None
-            met.update(name for name, found in counted_mechanisms(joints).items() if found)
-            if "verified" not in met and verifier.moving(joints) is not None:
-                met.add("verified")
+        def holding(joints: xr.Dataset) -> frozenset[str]:
+            counted = {name for name, found in counted_mechanisms(joints).items() if found}
+            moves = "verified" not in met and verifier.moving(joints) is not None
+            return frozenset(counted | ({"verified"} if moves else set()))
+
+        glance = Glance(structure, criteria, sorted(concerned), holding)
+
+        def look(resultants: Array, step: float) -> str | None:
+            now = glance(resultants, 1)
+            met.update(name for name, time in times.items() if time.lasts(name in now, step))
             return "a mechanism by each definition" if met >= wanted else None
 
         return look
@@ -240,7 +256,7 @@ def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
         )
     if isinstance(until, Event):
         return until.watch(structure, criteria)
-    return lambda resultants: until(structure, resultants)
+    return lambda resultants, step: until(structure, resultants)
 
 
 def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:
@@ -252,6 +268,11 @@ def possible_counts(structure: Structure, criteria: Criteria | None = None) -> t
     """
     apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
     return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
+
+
+def _named(found: object) -> frozenset[str]:
+    """What a look has found, by name: a mechanism, or nothing."""
+    return frozenset() if found is None else frozenset({"mechanism"})
 
 
 def _check_kinds(kinds: Any) -> None:

@@ -1,12 +1,12 @@
-"""A quick look at joints at every step: which fail, and whether they have failed so before."""
+"""A quick look at joints at every step: which fail, and how."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.joints.criteria import Criteria, failing
+from archfem.joints.criteria import Criteria, failing, ratio_at_sliding
 from archfem.joints.resultants import joint_dataset, ratios
 from archfem.masonry.structure import Structure
 
@@ -14,40 +14,56 @@ from archfem.masonry.structure import Structure
 class Glance:
     """A quick look at some joints of a structure at every step of a run.
 
-    Labels, which take long, are given only to states of joints that have not been seen before.
+    Labels, which take long, and what is asked of them, are for states of joints that have not been
+    seen before.
 
     Args:
         structure: whose joints they are.
         criteria: by which they fail.
         numbers: of the joints looked at.
+        ask: of labelled joints, whether what is looked for holds: names of what does.
     """
 
-    def __init__(self, structure: Structure, criteria: Criteria, numbers: Sequence[int]) -> None:
-        self._structure, self._criteria = structure, criteria
+    def __init__(
+        self,
+        structure: Structure,
+        criteria: Criteria,
+        numbers: Sequence[int],
+        ask: Callable[[xr.Dataset], frozenset[str]],
+    ) -> None:
+        self._structure, self._criteria, self._ask = structure, criteria, ask
         self._numbers = np.array(numbers, dtype=np.intp)
         self._depth = structure.depths[self._numbers]
-        self._coefficients = criteria.coefficients(structure.friction[self._numbers])
-        self._seen: set[bytes] = set()
+        self._laws = (
+            criteria.coefficients(structure.friction[self._numbers]),
+            criteria.cohesions(structure.cohesion[self._numbers]),
+        )
+        self._seen: dict[bytes, frozenset[str]] = {}
 
-    def __call__(self, resultants: Array, least: int) -> xr.Dataset | None:
-        """Label all joints where so many of those looked at fail in a way not yet seen.
+    def __call__(self, resultants: Array, least: int) -> frozenset[str]:
+        """Return what holds of the joints; nothing does where fewer than so many fail.
 
         Args:
             resultants: N, V, M of all joints (n_joints, 3) [N, N, N m].
-            least: how many.
-
-        Returns:
-            As made by `joint_dataset`; None where fewer fail, or each as it did before.
+            least: how many of those looked at.
         """
         own = resultants[self._numbers]
         e, friction = ratios(own, self._depth)
-        hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
+        limits = ratio_at_sliding(own[:, 0], e, *self._laws)
+        hinges, slides = failing(e, friction, limits, self._criteria.hinge)
         apart = own[:, 0] <= 0.0
         if np.count_nonzero(hinges | slides | apart) < least:
-            return None
+            return frozenset()
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)
         key = np.stack([*senses, slides, apart]).astype(np.int8).tobytes()
-        if key in self._seen:
-            return None
-        self._seen.add(key)
+        if key not in self._seen:
+            self._seen[key] = self._ask(self.labelled(resultants))
+        return self._seen[key]
+
+    def labelled(self, resultants: Array) -> xr.Dataset:
+        """Return all joints with labels and flags, as made by `joint_dataset`.
+
+        Args:
+            resultants: N, V, M of all joints (n_joints, 3) [N, N, N m].
+        """
         return joint_dataset(self._structure, resultants, criteria=self._criteria)

@@ -14,6 +14,7 @@ from archfem.dynamics.sentences import extremes, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
+from archfem.joints.duration import step_lengths
 from archfem.joints.resultants import one_joint
 from archfem.limit.counted import Mechanism, counted_mechanism, demirel_aldemir_mechanism
 from archfem.limit.verified import (
@@ -163,20 +164,33 @@ class History:
 
         The sentence tells the largest hinge rotation, slip and displacement, and what is left at
         the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
-        and, where the structure is known, verified, each with its duration and its opening. A run
-        that did not finish says so first.
+        and, where the structure is known, verified, each with its duration and its opening, and
+        whether any before it was too short to count. A run that did not finish says so first.
         """
-        found = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
         names = None
         if self.structure is not None:
-            found["verified"] = None if self.verified is None else self.verified.moved
             names = [block.name for block in self.structure.blocks]
         told = self.dataset.attrs
         whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
         lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
         lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
-        lines += mechanism_lines(self.joints, found, names)
+        lines += mechanism_lines(self.joints, self._first, names, self._first_of_any_duration)
         return "\n".join(line for line in lines if line)
+
+    @property
+    def _first(self) -> dict[str, Mechanism | None]:
+        """The first mechanism, or None, by each way to look for one."""
+        found = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
+        if self.structure is not None:
+            found["verified"] = None if self.verified is None else self.verified.moved
+        return found
+
+    @property
+    def _first_of_any_duration(self) -> dict[str, Mechanism | None]:
+        """The same, however short they are."""
+        if step_lengths(self.time).min() >= self.criteria.duration:
+            return self._first
+        return self.judged_by(replace(self.criteria, duration=0.0))._first
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.

@@ -11,7 +11,7 @@ from archfem.joints.criteria import judged
 from archfem.masonry.actions import BodyForce
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import equilibrium_under, self_weight
+from archfem.statics.equilibrium import Equilibrium, equilibrium_under, self_weight
 
 WINDOW = 8.0
 """Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
@@ -63,20 +63,30 @@ def usual_damping(model: Model) -> StiffnessDamping:
     return StiffnessDamping(0.05, first)
 
 
-def peaks(model: Model, motion: Motion, damping: Viscous | None, dt: float) -> Array:
+def peaks(
+    model: Model,
+    motion: Motion,
+    damping: Viscous | None,
+    dt: float | None,
+    *,
+    tolerance: float | None = None,
+    start: Equilibrium | None = None,
+) -> Array:
     """Return the largest |e| of each judged joint over a run (n,) [-]; 0.5 where it came apart.
 
     Args:
         model: any rung of the ladder.
         motion: of the ground.
         damping: None is undamped.
-        dt: time step [s].
+        dt: time step [s]; None where steps choose their length.
+        tolerance: of |e| by which they do so [-].
+        start: the dead load, found first where it is not given.
 
     Raises:
         DidNotConverge: a step failed.
     """
-    joints = judged(time_history(model, motion, damping=damping, dt=dt).joints)
-    return abs(joints["eccentricity"]).fillna(0.5).max("time").values
+    run = time_history(model, motion, damping=damping, dt=dt, tolerance=tolerance, start=start)
+    return abs(judged(run.joints)["eccentricity"]).fillna(0.5).max("time").values
 
 
 def largest_difference(first: Array, second: Array) -> float:

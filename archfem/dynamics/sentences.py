@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.joints.criteria import Criteria, judged, longest_duration
+from archfem.joints.duration import step_lengths
 from archfem.limit.counted import Mechanism, counts_as_mechanism
 from archfem.limit.episodes import episode, lasting
 from archfem.masonry.naming import listed, listed_joints
@@ -60,6 +61,7 @@ def mechanism_lines(
     joints: xr.Dataset,
     found: Mapping[str, Mechanism | None],
     blocks: Sequence[str] | None,
+    brief: Mapping[str, Mechanism | None],
 ) -> list[str]:
     """Return a line for each way to look for a mechanism.
 
@@ -67,20 +69,35 @@ def mechanism_lines(
         joints: over time and joint, in which they were found.
         found: the first mechanism each way, or None, "by count" and "verified" among them.
         blocks: names of the blocks that may move; None where nobody knows them.
+        brief: the first each way, however short.
     """
-    return [
-        f"{way}: {_none(way, joints) if each is None else _told(way, each, joints, blocks)}"
-        for way, each in found.items()
-    ]
+    lines = []
+    for way, each in found.items():
+        short = brief[way]
+        if each is not None:
+            words = _told(way, each, joints, blocks)
+        else:
+            words = _none(way, joints, short is not None)
+        if short is not None and (each is None or short.time != each.time):
+            words += f"; what begins at {short.time:.4f} s lasts less than {_least(joints)}"
+            words += ", and does not count"
+        lines.append(f"{way}: {words}")
+    return lines
 
 
-def _none(way: str, joints: xr.Dataset) -> str:
-    """That there was no mechanism, and why."""
-    failures = Criteria.of(joints).failures
-    return {
-        "by count": f"no mechanism, never {failures} failed joints at once in rings and piers",
+def _least(joints: xr.Dataset) -> str:
+    """The time for which a mechanism must hold to count, in words."""
+    return lasting(Criteria.of(joints).duration)
+
+
+def _none(way: str, joints: xr.Dataset, short: bool) -> str:
+    """That there was no mechanism, and why; whether there were some too short to count."""
+    never = f"never {Criteria.of(joints).failures} failed joints at once"
+    words = {
+        "by count": f"no mechanism, {never} in rings and piers",
         "verified": "no mechanism, at no instant could rings or piers move",
-    }.get(way, f"no mechanism, never {failures} failed joints at once in one ring")
+    }.get(way, f"no mechanism, {never} in one ring")
+    return f"{words} for {_least(joints)}" if short else words
 
 
 def _told(way: str, found: Mechanism, joints: xr.Dataset, blocks: Sequence[str] | None) -> str:
@@ -101,8 +118,7 @@ def _told(way: str, found: Mechanism, joints: xr.Dataset, blocks: Sequence[str] 
 def _in_all(joints: xr.Dataset) -> str:
     """For how long as many joints fail as make a mechanism by count."""
     flags = counts_as_mechanism(joints).expand_dims(joint=[0])
-    time = flags["time"].values
-    steps = np.diff(time, append=time[-1:])
+    steps = step_lengths(flags["time"].values)
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
     longest = float(longest_duration(flags)[0])
     return f"so many fail for {lasting(total)} in all, {lasting(longest)} at the longest"

@@ -105,11 +105,13 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     Args:
         model: any rung of the ladder.
         motion: of the ground.
-        dt: time step [s]; by default that for which the model was chosen, or steps of different
-            lengths, as the tolerance asks for. Accelerations between samples are interpolated.
+        dt: time step [s]; by default the steps for which the model was chosen, or else steps of
+            different lengths, as the tolerance asks for. Accelerations between samples are
+            interpolated.
         tolerance: error of |e| of the joints of rings and piers that steps in time may cause [-],
-            without `dt`; by default 0.005. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of
-            the history says for which part of the shortest the error was larger.
+            without `dt`; by default that for which the model was chosen, or 0.005. Steps are from
+            0.1 to 20 ms long; `tolerance_unmet` of the history says for which part of the shortest
+            the error was larger.
         start: the dead load, found first where it is not given, or the `last_state` of an
             earlier run, which is then continued.
         damping: `StiffnessDamping`, also as by `effective_damping` or `restitution_damping`;
@@ -187,8 +189,10 @@ def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[flo
         if not 0.0 < real(tolerance, "tolerance on |e| [-]") < 1.0:
             raise InvalidInput(f"tolerance {tolerance!r} on |e| is not between 0 and 1: try 0.005")
         return None, tolerance
+    if dt is None and model.prediction:
+        return model.prediction.dt, model.prediction.pace or TOLERANCE
     if dt is None:
-        return (model.prediction.dt if model.prediction else None), TOLERANCE
+        return None, TOLERANCE
     if not 0.0 < real(dt, "dt [s]") <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
     return dt, TOLERANCE
@@ -248,7 +252,7 @@ def _stepped(
     )
     with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
         for batch in batches:
-            ended, reason, size = _reason(watches, batch)
+            ended, reason, size = _reason(watches, batch, recorder.state.time)
             recorder.add(batch.cut(size), last=reason is not None)
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
@@ -262,15 +266,16 @@ def _bar(duration: float) -> tqdm:
 
 
 def _reason(
-    watches: tuple[Watch | None, Parting | None], batch: Batch
+    watches: tuple[Watch | None, Parting | None], batch: Batch, before: float
 ) -> tuple[Ending, str | None, int]:
     """How and why the run ends within a batch, if it does, and after how many of its steps."""
     watch, parting = watches
     loose = parting.step(batch) if parting is not None else None
     last = len(batch.times) if loose is None else loose[0] + 1
     if watch is not None:
-        for k, resultants in enumerate(batch.resultants[:last]):
-            if reason := watch(resultants):
+        steps = np.diff(batch.times[:last], prepend=before)
+        for k, step in enumerate(steps):
+            if reason := watch(batch.resultants[k], float(step)):
                 return Ending.EVENT, reason, k + 1
     if loose is not None:
         return Ending.PARTED, f"the blocks coming loose: {loose[1]}", last

@@ -8,7 +8,8 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem.arrays import Array
-from archfem.dynamics.ladder import Damping, Setting, damping_for, finest
+from archfem.dynamics.candidates import LEVELS, best, label
+from archfem.dynamics.ladder import Damping, damping_for
 from archfem.dynamics.probe import largest_difference, peaks
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
@@ -23,6 +24,27 @@ RUNGS = ("rigid", "faces", "condensed")
 CELLS = ((2, 2), (4, 4), (8, 8))
 RULES = (("nodal", None), ("lobatto", None), ("gauss", None), ("exact", None))
 STEPS = (0.01, 0.005, 0.0025)
+
+FINE = 0.00125
+"""Time step of the reference [s]."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A model and a time step.
+
+    Attributes:
+        discretisation: rung, mesh, and rule on the joints.
+        dt: time step [s].
+    """
+
+    discretisation: Discretisation
+    dt: float
+
+    @property
+    def label(self) -> str:
+        """The setting in a few words."""
+        return f"{label(self.discretisation)} {1e3 * self.dt:g} ms"
 
 
 @dataclass(frozen=True)
@@ -127,18 +149,17 @@ def accuracy(
         DidNotConverge: the reference itself failed.
     """
     settings = list(_settings(rungs, cells, rules, steps))
-    best = finest(structure)
-    model = build(structure, best.discretisation)
+    finest = best(structure, LEVELS[-1])
+    model = build(structure, finest)
     damping = damping_for(model, damping)
-    reference = peaks(model, motion, damping, best.dt)
-    through, along = best.discretisation.cells
-    halved = replace(best.discretisation, cells=(through // 2, along // 2))
-    doubt = _trial(Setting(halved, 2.0 * best.dt), structure, motion, damping, reference).error
+    reference = peaks(model, motion, damping, FINE)
+    halved = replace(finest, cells=(finest.through // 2, finest.along // 2))
+    doubt = _trial(Setting(halved, 2.0 * FINE), structure, motion, damping, reference).error
     trials = [
         _trial(setting, structure, motion, damping, reference)
         for setting in tqdm(settings, unit="setting", disable=None, leave=False)
     ]
-    return Accuracy(tuple(trials), best, doubt, motion.duration, tolerance)
+    return Accuracy(tuple(trials), Setting(finest, FINE), doubt, motion.duration, tolerance)
 
 
 def _settings(

@@ -13,6 +13,7 @@
     rigid       G of rigid blocks
     sparsity    one sparsity pattern for a family of matrices
     resultants  N, V, M, eccentricity, mobilised friction, thrust line
+    duration    how long something holds, over steps of any lengths
     criteria    hinged, sliding, open: `Criteria`, and flags of joints by them
 
 It imports from `masonry` and the ground. Start reading at `operator`, then at `resultants`.

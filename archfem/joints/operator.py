@@ -218,17 +218,28 @@ class JointOperator:
         """Elastic shear resultant of each joint from coordinates, sparse (n_joints, n) [N]."""
         return (self.sums[0] @ sparse.diags(self.points.shear) @ self.slip).tocsr()
 
+    def answered(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
+        """Return the forces at the points that answer small gaps, each (p,) [N].
+
+        Args:
+            stiffness: as by `stiffness` or `glued` (m,) [N/m].
+            gaps: opening and slip at the points (2, p) [m].
+        """
+        first, second = self.law.entries
+        across, along, coupled = np.split(stiffness, [len(first), len(first) + len(gaps[0])])
+        normal, shear = np.zeros_like(gaps[0]), along * gaps[1]
+        np.add.at(normal, first, across * gaps[0][second])
+        if self.slides:
+            np.add.at(shear, first, coupled * gaps[0][second])
+        return normal, shear
+
     def bonded(self, gaps: Array) -> tuple[Array, Array]:
         """Return the forces at the points if joints held tension and nothing slid, each (p,) [N].
 
         Args:
             gaps: opening and slip at the points (2, p) [m].
         """
-        first, second = self.law.entries
-        across = self.law.stiffness(np.full(len(self.points.arm), -1.0)) * gaps[0][second]
-        normal = np.zeros_like(gaps[0])
-        np.add.at(normal, first, across)
-        return normal, self.points.shear * gaps[1]
+        return self.answered(self.glued(), gaps)
 
     def glued(self) -> Array:
         """Return what `stiffness` is where all is closed and nothing slides (m,) [N/m]."""

@@ -10,7 +10,7 @@ import xarray as xr
 from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, flags
+from archfem.joints.criteria import Criteria, flags, ratio_at_sliding
 from archfem.joints.faces import MEASURES, measures
 from archfem.masonry.naming import number_of
 from archfem.masonry.structure import Structure
@@ -68,8 +68,8 @@ def joint_dataset(
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` where they
         are known, and `flags` of failure, over joint, or over time and joint, with the joints'
-        names, parts, roles, depths and friction limits, and whether they are judged, as
-        coordinates, and the criteria as attributes.
+        names, parts, roles, depths, coefficients of friction and what cohesion holds, and whether
+        they are judged, as coordinates, and the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
@@ -83,8 +83,9 @@ def joint_dataset(
         for key, value in measures(faces, depth).items():
             units, words = MEASURES[key]
             variables[key] = dims, value, {"units": units, "long_name": words}
-    coefficients = criteria.coefficients(structure.friction)
-    variables |= flags(dims, resultants[..., 0], found, coefficients, criteria.hinge)
+    laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
+    limits = ratio_at_sliding(resultants[..., 0], found[0], *laws)
+    variables |= flags(dims, resultants[..., 0], found, limits, criteria.hinge)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
@@ -93,6 +94,7 @@ def joint_dataset(
         "judged": ("joint", structure.judged),
         "depth": ("joint", depth, {"units": "m"}),
         "friction_limit": ("joint", structure.friction),
+        "cohesion_limit": ("joint", structure.cohesion, {"units": "N"}),
     }
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})

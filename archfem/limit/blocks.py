@@ -78,9 +78,7 @@ class RigidBlocks:
     @cached_property
     def cohesion(self) -> Array:
         """Shear that cohesion carries, c A of each whole joint (n_joints,) [mean block weights]."""
-        stress = np.array([joint.contact.cohesion for joint in self.structure.joints])
-        cohesion: Array = stress * self.structure.depths * self.structure.width / self.force
-        return cohesion
+        return self.structure.cohesion / self.force
 
     @cached_property
     def kinematics(self) -> sparse.csr_matrix:

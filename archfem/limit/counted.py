@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem.joints.criteria import Criteria, failed, flagged, judged, roles_of
+from archfem.joints.duration import first_lasting
 from archfem.masonry.roles import judged_parts
 
 KINDS = ("local", "semi-global", "global")
@@ -53,33 +54,38 @@ def mechanism_kind(roles: Collection[str]) -> str:
 def counted_mechanism(
     joints: xr.Dataset, criteria: Criteria | None = None, *, kinds: Sequence[str] = KINDS
 ) -> Mechanism | None:
-    """Find the first instant at which enough joints have failed at once.
+    """Find the first instant from which on enough joints have failed at once.
 
     A wide reading of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
     ring alone (local), with joints of one pier among the four (semi-global), or of more rings and
     piers (global); `demirel_aldemir_mechanism` keeps to their words. A joint that has come apart
     counts too. The class is that of all joints failed at the instant; ask for `kinds=("local",)` to
-    find four in one ring whatever else fails.
+    find four in one ring whatever else fails. Over time enough joints must have failed for as long
+    as the criteria say, the same ones or others.
 
     Args:
         joints: over joint, or over time and joint; those of `judged` are counted.
-        criteria: what makes a joint fail, and how many make a mechanism; by default those by which
-            the joints were judged already.
+        criteria: what makes a joint fail, how many make a mechanism, and for how long; by default
+            those by which the joints were judged already.
         kinds: classes to look for.
 
     Returns:
         The mechanism, or None.
     """
-    failures, roles = Criteria.of(joints := flagged(joints, criteria)).failures, roles_of(joints)
+    own, roles = Criteria.of(joints := flagged(joints, criteria)), roles_of(joints)
     flags = _over_time(joints)
     counts = _counts(flags, judged_parts(roles))
-    for instant in np.flatnonzero(sum(counts.values()) >= failures):
+
+    def look(instant: int) -> tuple[int, tuple[str, ...]] | None:
         count = {name: int(failures_of[instant]) for name, failures_of in counts.items()}
-        group = _widest_group(count, roles, failures, kinds)
-        if group:
-            kind = mechanism_kind([roles[name] for name in group])
-            return _mechanism(flags, int(instant), kind, group)
-    return None
+        group = _widest_group(count, roles, own.failures, kinds)
+        return None if group is None else (instant, group)
+
+    enough = np.flatnonzero(sum(counts.values()) >= own.failures)
+    found = first_lasting(enough, flags["time"].values, own.duration, look)
+    if found is None:
+        return None
+    return _mechanism(flags, found[0], mechanism_kind([roles[name] for name in found[1]]), found[1])
 
 
 def demirel_aldemir_mechanism(
@@ -95,7 +101,8 @@ def demirel_aldemir_mechanism(
     hinges and slides; one that has come apart, whose ratios are beyond any limit, counts as failed;
     with joints of one pier it is semi-global, with joints of more global. Four are as many as the
     criteria say, and their hinge is at |e| = 0.46, 8 % short of the 0.5 that the paper's equation
-    has, as in its evaluation of the bridge.
+    has, as in its evaluation of the bridge. For how long they must is not worded; it is as the
+    criteria say.
 
     Args:
         joints: over joint, or over time and joint.
@@ -107,14 +114,17 @@ def demirel_aldemir_mechanism(
     References:
         Demirel and Aldemir, Buildings 11 (2021), section 2, criteria 1 and 2 and what follows.
     """
-    failures, roles = Criteria.of(joints := flagged(joints, criteria)).failures, roles_of(joints)
+    own, roles = Criteria.of(joints := flagged(joints, criteria)), roles_of(joints)
     flags = _over_time(joints)
     counts = _counts(flags, roles)
     rings = [name for name, role in roles.items() if role == "ring"]
-    enough = np.array([counts[name] >= failures for name in rings]).reshape(-1, flags.sizes["time"])
-    if not enough.any():
+    enough = np.array([counts[name] >= own.failures for name in rings]).reshape(
+        -1, flags.sizes["time"]
+    )
+    times, up = flags["time"].values, np.flatnonzero(enough.any(axis=0))
+    instant = first_lasting(up, times, own.duration, lambda number: number)
+    if instant is None:
         return None
-    instant = int(enough.any(axis=0).argmax())
     fallen = [name for name, down in zip(rings, enough[:, instant], strict=True) if down]
     piers = [name for name, role in roles.items() if role == "pier" and counts[name][instant]]
     group = [name for name in roles if name in (*fallen, *piers)]

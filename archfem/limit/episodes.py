@@ -7,6 +7,7 @@ import xarray as xr
 
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import failed, flagged
+from archfem.joints.duration import step_lengths
 from archfem.limit.counted import Mechanism
 from archfem.units import mm
 
@@ -16,7 +17,7 @@ class Episode:
     """The unbroken time for which the joints of a mechanism stay failed, all of them.
 
     Attributes:
-        duration: of it, from the mechanism's time on [s]; a single record lasts until the next.
+        duration: of it [s]; a record lasts for the step that ends with it.
         opening: largest opening of any of its joints meanwhile [m]; None where that is not known.
         closes: whether it ends before the record does.
     """
@@ -30,8 +31,6 @@ class Episode:
         wide = "" if self.opening is None else f", opens by up to {self.opening / mm:.3g} mm"
         if self.closes:
             return f"it lasts {lasting(self.duration)}{wide} and closes again"
-        if self.duration == 0.0:
-            return f"it begins as the record ends{wide.replace('opens by up to', 'open by')}"
         return f"it lasts {lasting(self.duration)}{wide} and has not closed when the record ends"
 
 
@@ -69,6 +68,6 @@ def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
     stays = failed(own).all("joint").values
     count = len(stays) if stays.all() else int(stays.argmin())
     after = int(start[0]) + count
-    end = times[after] if after < len(times) else times[-1]
+    duration = float(step_lengths(times)[int(start[0]) : after].sum())
     opening = float(own["opening"][:count].max()) if "opening" in own else None
-    return Episode(float(end - times[start[0]]), opening, after < len(times))
+    return Episode(duration, opening, after < len(times))

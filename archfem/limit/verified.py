@@ -12,6 +12,7 @@ from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.joints.criteria import Criteria, chosen, flagged
+from archfem.joints.duration import first_lasting
 from archfem.joints.resultants import check_instant
 from archfem.limit.blocks import RigidBlocks
 from archfem.limit.counted import Mechanism, counted_mechanism, mechanism_kind
@@ -68,8 +69,8 @@ def verified_mechanism(
     """Look for a rigid-block motion that the joints failed at one instant permit.
 
     The largest motion v, within a box, that opens a joint only where it hinges (away from the face
-    that stays in contact) or has come apart, slides only where friction is used up and in the
-    sense of the shear force, and closes none:
+    that stays in contact) or has come apart, slides only where friction and cohesion are used up
+    and in the sense of the shear force, and closes none:
 
         max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere,
 
@@ -103,28 +104,33 @@ def verified_mechanism(
 def first_verified_mechanism(
     structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
 ) -> VerifiedMechanism | None:
-    """Find the first instant of a time history at which the failed joints permit a motion.
+    """Find the first instant of a time history from which on the failed joints permit a motion.
+
+    They must permit one, whichever it is, for as long as the criteria say.
 
     Args:
         structure: whose blocks move; of its rings and piers, one at least must.
         joints: over time and joint.
-        criteria: what makes a joint fail; by default those by which the joints were judged already.
+        criteria: what makes a joint fail, and for how long; by default those by which the joints
+            were judged already.
 
     Returns:
         The motion and its class at that instant; None where no ring and no pier ever moves.
     """
     verifier, joints = Verifier(structure), flagged(joints, criteria)
-    idle: set[bytes] = set()
+    moving: dict[bytes, bool] = {}
     free = verifier.freedoms(joints.transpose("time", "joint"))
-    for instant in np.flatnonzero(free.any(axis=1)):
+
+    def look(instant: int) -> VerifiedMechanism | None:
         state = free[instant].tobytes()
-        if state in idle:
-            continue
-        found = verifier.moving(joints.isel(time=int(instant)))
-        if found is not None:
-            return found
-        idle.add(state)
-    return None
+        if moving.get(state) is False:
+            return None
+        found = verifier.moving(joints.isel(time=instant))
+        moving[state] = found is not None
+        return found
+
+    instants = np.flatnonzero(free.any(axis=1))
+    return first_lasting(instants, joints["time"].values, Criteria.of(joints).duration, look)
 
 
 @dataclass(frozen=True, eq=False)

@@ -178,6 +178,17 @@ class Jointed:
             self._last = (stiffness, self.matrix(1.0, stiffness))
         return self._last[1]
 
+    def pulled(self, q: Array, motion: Array) -> Array:
+        """Return the change of `force` by a small motion of the supports, as `tangent` has it (n,).
+
+        Args:
+            q: coordinates (n,).
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
+        joints = self.operator
+        gaps = gaps_of(self.structure, joints.points, motion)
+        return joints.pushed(*joints.answered(joints.stiffness(q), gaps))
+
     def matrix(self, share: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the stiffness of blocks and joints together (n, n).
 

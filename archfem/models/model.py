@@ -23,21 +23,36 @@ class Prediction:
     """What was predicted of a model when it was chosen.
 
     Attributes:
-        error: in the largest |e| of the worst joint [-].
+        error: in the largest |e| of the worst joint, of the model and of its steps [-].
+        in_time: what the steps have of it [-].
         tolerance: that was asked for [-].
-        dt: time step with which the error is met [s].
-        considered: settings that were tried, the cheapest first, and the error of each.
+        dt: time step with which the error is met [s]; None where steps choose their length.
+        pace: tolerance of |e| by which they do so [-]; None where there is a time step.
+        considered: settings that were tried, in that order, and the error predicted of each: of
+            steps alone, then of models with the steps taken.
     """
 
     error: float
+    in_time: float
     tolerance: float
-    dt: float
+    dt: float | None
+    pace: float | None
     considered: tuple[tuple[str, float], ...]
 
     @property
     def met(self) -> bool:
         """Whether the error is within the tolerance."""
         return self.error <= self.tolerance
+
+    @property
+    def text(self) -> str:
+        """The prediction in words, and all that was tried."""
+        steps = f"{1e3 * self.dt:g} ms" if self.dt else f"a length for {self.pace:.2g} in |e|"
+        tried = "; ".join(f"{name}: {error:.2g}" for name, error in self.considered)
+        return (
+            f"predicted to err by {self.error:.2g} in the largest |e|, of which {self.in_time:.2g} "
+            f"by steps of {steps}; {self.tolerance:g} was asked for (tried: {tried})"
+        )
 
 
 class Passage(Protocol):
@@ -133,6 +148,14 @@ class Model(Protocol):
         Returns:
             Where a model can tell that nothing has changed since it was last asked, the very same
             object as then, which need not be factorised again.
+        """
+
+    def pulled(self, q: Array, motion: Array) -> Array:
+        """Return the change of `force` by a small motion of the supports, as `tangent` has it (n,).
+
+        Args:
+            q: coordinates (n,).
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         """
 
     def closed(self) -> sparse.csr_matrix:

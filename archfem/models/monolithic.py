@@ -68,12 +68,17 @@ class Monolithic:
         """
         other = copy(self)
         other.supports = supports
-        other._everywhere = np.zeros_like(self._everywhere)
+        other._everywhere = self._carried(supports)
+        return other
+
+    def _carried(self, supports: Array) -> Array:
+        """Displacements of all nodes, where only those of fixed blocks move (2 m,) [m]."""
+        found = np.zeros_like(self._everywhere)
         for number in set(range(len(supports))) - set(self.structure.free):
             nodes = np.flatnonzero(self._owner == number)
             motion = motion_of(self._places[nodes], self.structure.blocks[number].centroid)
-            other._everywhere.reshape(-1, 2)[nodes] = motion @ supports[number]
-        return other
+            found.reshape(-1, 2)[nodes] = motion @ supports[number]
+        return found
 
     def remembering(self, memory: Array) -> "Monolithic":
         """Return the same model, whose joints have slid so far.
@@ -142,6 +147,17 @@ class Monolithic:
             q: coordinates (n,).
         """
         return self.of_free(self._forms.tangent(self.spread(q), self.memory))
+
+    def pulled(self, q: Array, motion: Array) -> Array:
+        """Return the change of `force` by a small motion of the supports, as `tangent` has it (n,).
+
+        Args:
+            q: coordinates (n,).
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
+        tangent = self._forms.tangent(self.spread(q), self.memory)
+        change: Array = (tangent @ self._carried(motion))[self.free]
+        return change
 
     def of_free(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
         """Return the part of a matrix that belongs to the coordinates, on the model's pattern.

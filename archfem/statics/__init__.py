@@ -2,6 +2,7 @@
 
     newton       one equilibrium solve through PETSc SNES
     relaxation   a structure creeps to rest where Newton's method fails
+    search       the next equilibrium, from the last one
     equilibrium  dead load and other loads that stay
     path         paths of equilibrium, step by step
     pushover     a load grows until hardly anything resists

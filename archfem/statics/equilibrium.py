@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 import xarray as xr
-from scipy.sparse.linalg import splu
 
 from archfem.arguments import instance
 from archfem.arrays import Array
@@ -18,11 +17,8 @@ from archfem.models.gauges import Gauges
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.unfinished import Unfinished
-from archfem.statics.newton import Newton, Solved, Solver, magnitude
-from archfem.statics.relaxation import relaxed
-
-A_LITTLE = 1e-9
-"""Motion of supports by which the force that they exert on a structure is found [m]."""
+from archfem.statics.newton import Newton, Solver
+from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -167,7 +163,11 @@ def _on_moved_supports(
     if not supports.any():
         return found
     model = found.model
-    return _grown(solver, found, lambda part: (model.moved(part * supports), load), "settlement")
+
+    def at(part: float) -> tuple[Model, Array]:
+        return model.moved(part * supports), load
+
+    return _grown(solver, found, at, "settlement", FOLLOWING)
 
 
 def _built(solver: Solver, whole: Jointed, stages: Sequence[Stage]) -> Equilibrium:
@@ -197,18 +197,20 @@ def _grown(
     found: Equilibrium,
     at: Callable[[float], tuple[Model, Array]],
     what: str,
+    ways: Ways = BRINGING_ON,
 ) -> Equilibrium:
     """Follow an equilibrium while something grows, which gives a model and a load for each part."""
-    # Where Newton's method fails the structure may creep there, once; then steps are halved.
-    factor, step, find = 0.0, 1.0, _found_or_crept
+    find, halved, smallest = ways
+    factor, step = 0.0, 1.0
     while factor < 1.0:
         target = min(1.0, factor + step)
         model, load = at(target)
         model = model.remembering(found.model.memory)
         try:
-            model, solved = find(solver, model, load, _followed(found, model))
+            model, solved = find(solver, model, load, _start(found, model))
         except DidNotConverge as error:
-            step, find = step / 2.0, _found
+            step /= 2.0
+            find = halved if step > SMALLEST_STEP else smallest
             if step >= SMALLEST_STEP:
                 continue
             raise DidNotConverge(
@@ -221,33 +223,7 @@ def _grown(
     return found
 
 
-def _found(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
-    """An equilibrium by Newton's method, and the model with what its joints then remember."""
-    solved = solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
-    return model.remembering(model.remembered(solved.q)), solved
-
-
-def _found_or_crept(
-    solver: Solver, model: Model, load: Array, start: Array
-) -> tuple[Model, Solved]:
-    """The same; where Newton's method fails, the structure creeps there."""
-    try:
-        return _found(solver, model, load, start)
-    except DidNotConverge:
-        return relaxed(solver, model, load, start)
-
-
-def _followed(found: Equilibrium, model: Model) -> Array:
-    """Coordinates if the structure follows its supports, with its joints as they are now (n,)."""
-    before, q = found.model, found.q
-    moved = model.supports - before.supports
-    if not moved.any():
-        return q
-    part = A_LITTLE / np.abs(moved).max()
-    ahead = before.moved(before.supports + part * moved).remembering(before.memory)
-    change = (ahead.force(q) - before.force(q)) / part
-    try:
-        followed: Array = q - splu(before.tangent(q).tocsc()).solve(change)
-    except RuntimeError:  # the tangent is singular
-        return q
-    return followed
+def _start(found: Equilibrium, model: Model) -> Array:
+    """Where the search for the next equilibrium begins: the last one, on its supports (n,)."""
+    moved = model.supports - found.model.supports
+    return followed(found.model, found.q, moved) if moved.any() else found.q

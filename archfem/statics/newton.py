@@ -23,9 +23,15 @@ Tangent = Callable[[Array], sparse.csr_matrix]
 ROUGHLY = 1e-7
 """Residual, relative to the load, above which round-off is no excuse."""
 
-_SEARCHES = {"basic": 12, "cp": 60}
+SEARCHES = {"basic": 12, "cp": 60}
 """Line searches in the order tried, and the iterations each may take; more than a dozen full
 steps are a cycle of statuses."""
+
+SYMMETRIC = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
+"""Methods that take a matrix for symmetric, by the options of PETSc that choose them."""
+
+ASYMMETRY = 1e-9
+"""Difference of a matrix and its transpose, relative to its largest entry, that is round-off."""
 
 _REASONS = {
     -3: "the tangent is singular",
@@ -42,7 +48,8 @@ class Newton:
 
     Attributes:
         tolerance: largest residual, relative to the load [-].
-        petsc: further options for PETSc, without a prefix, e.g. {"pc_type": "cholesky"}.
+        petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. Methods for
+            symmetric matrices are refused where joints slide, for tangents then are not.
     """
 
     tolerance: float = 1e-10
@@ -52,7 +59,7 @@ class Newton:
         """Refuse what no solve could reach, and options without names."""
         if not 0.0 < real(self.tolerance, "tolerance of a solve [-]") < 1.0:
             raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
-        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"pc_type": "cholesky"}')
+        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,7 @@ class Solver:
         tangent: Tangent,
         start: Array,
         scale: float,
-        searches: Iterable[str] = tuple(_SEARCHES),
+        searches: Iterable[str] = tuple(SEARCHES),
     ) -> Solved:
         """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm.
 
@@ -148,7 +155,7 @@ class Solver:
         chosen = {
             "snes_linesearch_type": search,
             "snes_linesearch_max_it": "40",
-            "snes_max_it": str(_SEARCHES[search]),
+            "snes_max_it": str(SEARCHES[search]),
             "ksp_type": "preonly",
             "pc_type": "lu",
             **self.settings.petsc,
@@ -187,10 +194,21 @@ class Solver:
 
     def _load(self, snes: PETSc.SNES, q: PETSc.Vec, matrix: PETSc.Mat, _: PETSc.Mat) -> None:
         tangent = self._tangent(q.array_r)  # type: ignore[misc]
+        self._check_symmetry(tangent)
         if tangent is not self._loaded:
             matrix.setValuesCSR(tangent.indptr, tangent.indices, tangent.data)
             matrix.assemble()
             self._loaded = tangent
+
+    def _check_symmetry(self, tangent: sparse.csr_matrix) -> None:
+        """Refuse methods for symmetric matrices where the tangent is not symmetric."""
+        chosen = self.settings.petsc
+        asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
+        if asked and abs(tangent - tangent.T).max() > ASYMMETRY * abs(tangent).max():
+            raise InvalidInput(
+                f"petsc = {asked} is for symmetric matrices, and where joints slide the tangent is "
+                "not: leave it out, and each tangent is factorised by LU"
+            )
 
 
 def magnitude(load: Array) -> float:

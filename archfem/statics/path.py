@@ -17,6 +17,7 @@ from archfem.models.model import Model
 from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
+from archfem.statics.search import followed, found_or_crept
 
 TOLERANCE, ITERATIONS = 1e-9, 30
 """Force left out of balance, relative to the sum of all loads; Newton's iterations in a step."""
@@ -363,19 +364,14 @@ class SupportPath:
             Whether there is one.
         """
         part = self.parts[-1] + distance * self.unit[0] / self.reach
-        model = self._moved(part)
+        model, solver = self._moved(part), Solver(self.model.size)
         try:
-            solved = Solver(model.size).solve(
-                lambda q: model.force(q) - self.dead,
-                model.tangent,
-                self._ahead(part),
-                magnitude(self.dead),
-            )
+            model, solved = found_or_crept(solver, model, self.dead, self._ahead(part))
         except DidNotConverge:
             return False
         self.parts.append(part)
         self.states.append(solved.q)
-        self.model = model.remembering(model.remembered(solved.q))
+        self.model = model
         self.resisted.append(model.resultants(solved.q))
         self.iterations.append(solved.iterations)
         if len(self.parts) == 2:
@@ -386,10 +382,9 @@ class SupportPath:
 
     def _ahead(self, part: float) -> Array:
         """Coordinates if the structure went on as in its last step, a first guess (n,)."""
-        # From the last state all of the motion would fall to the joint at the support: it slides.
         last = self.states[-1]
         if len(self.parts) < 2:
-            return last
+            return followed(self.model, last, (part - self.parts[-1]) * self.motion)
         going = (last - self.states[-2]) / (self.parts[-1] - self.parts[-2])
         ahead: Array = last + (part - self.parts[-1]) * going
         return ahead

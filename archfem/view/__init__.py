@@ -2,6 +2,7 @@
 
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
+    states     what a state's joints carry
     structure  a structure at an instant; several side by side
     names      which joint is which
     joints     joints over time

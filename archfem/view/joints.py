@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria
+from archfem.joints.criteria import Criteria, sliding_limits
 from archfem.view.envelopes import draw_faces
 from archfem.view.style import COLUMN, INK, LINES, NORMAL, SLIP, SMALL, WIDE, dress
 
@@ -119,11 +119,19 @@ def _friction(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
     """Draw mobilised friction with the sense of the shear force, between its limits."""
     dress(axes, "", "V / N [-]")
     limit = float(criteria.coefficients(joint["friction_limit"].values))
-    for side in (1.0, -1.0):
-        axes.axhspan(side * limit, side * LOOSE * limit, color=SLIP, alpha=0.12, lw=0)
-        axes.axhline(side * limit, color=SLIP, lw=0.9, ls="--")
+    if np.isfinite(limit):  # else it never slides
+        _friction_limits(axes, joint, criteria, limit)
     axes.plot(joint["time"], np.sign(joint["V"]) * joint["friction"], color=LINES[0], lw=0.6)
-    axes.set_ylim(-LOOSE * limit, LOOSE * limit)
+
+
+def _friction_limits(axes: Axes, joint: xr.Dataset, criteria: Criteria, limit: float) -> None:
+    """Draw the ratios at which a joint slides: μ, and more by cohesion."""
+    limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
+    top = LOOSE * float(limits[0])
+    for side in (1.0, -1.0):
+        axes.plot(joint["time"], side * limits, color=SLIP, lw=0.9, ls="--")
+        axes.fill_between(joint["time"], side * limits, side * top, color=SLIP, alpha=0.12, lw=0)
+    axes.set_ylim(-top, top)
     axes.annotate(
         f"μ = {limit:g}", (1.0, limit), (-3, 1), xycoords=("axes fraction", "data"),
         textcoords="offset points", fontsize=SMALL, ha="right", va="bottom", color=SLIP,

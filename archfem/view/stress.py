@@ -19,9 +19,11 @@ from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
 from archfem.models.model import Model
+from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.stress import at_corners, cell_stress, principal_values
 from archfem.units import MPa, kPa
 from archfem.view.marks import joint_marks
+from archfem.view.states import drawn
 from archfem.view.structure import draw_blocks, draw_thrust
 from archfem.view.style import BEYOND, EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
 
@@ -49,7 +51,11 @@ Numbers = NDArray[np.intp]
 
 
 def draw_stress(
-    model: Model, q: Array, *, parts: Collection[str] | None = None, axes: Axes | None = None
+    model: Model,
+    q: Equilibrium | Array,
+    *,
+    parts: Collection[str] | None = None,
+    axes: Axes | None = None,
 ) -> Figure:
     """Map the largest principal compression, with thrust lines and principal directions.
 
@@ -58,7 +64,8 @@ def draw_stress(
 
     Args:
         model: any rung with a mesh.
-        q: coordinates (n,).
+        q: an equilibrium, or coordinates (n,) of a model that knows how its joints began, as that
+            of a dead load in stages does.
         parts: whose blocks are shaded, for example ["backfill"]; by default all but soil.
         axes: where to draw; by default a new figure.
 
@@ -66,8 +73,9 @@ def draw_stress(
         The page, with a bar of colours; that of `axes` where given.
 
     Raises:
-        InvalidInput: the blocks are rigid, or there is no such part.
+        InvalidInput: the blocks are rigid, there is no such part, or q is another model's.
     """
+    model, q = drawn(model, q)
     structure, cells = model.structure, model.cells
     chosen = _chosen(structure, parts)
     corners = (at_corners(cells) @ q).reshape(-1, 3)

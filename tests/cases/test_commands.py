@@ -34,7 +34,7 @@ def test_run_command(tmp_path, capsys):
     assert "joint 17" in capsys.readouterr().out
 
 
-def test_criteria_of_a_case_are_obeyed(tmp_path, capsys):
+def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     """Four joints reach |e| = 0.38 at once, and never 0.46."""
     changes = ["model.fidelity=rigid", "motion.end=4", "analysis.halt=true"]
     changes += ["output.animation=false"]

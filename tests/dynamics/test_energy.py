@@ -26,8 +26,15 @@ def test_balance_counts_what_comes_and_goes():
     assert balance.gain == pytest.approx(4.5)
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
-@pytest.mark.parametrize("joints", ["closed", "initial"])
+@pytest.mark.parametrize(
+    ("rule", "joints"),
+    [
+        ("lobatto", "closed"),
+        ("exact", "initial"),
+        pytest.param("lobatto", "initial", marks=pytest.mark.slow),
+        pytest.param("exact", "closed", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize(("scheme", "fast"), WAYS)
 def test_all_steppers_keep_the_same_balance(ring, rule, joints, scheme, fast):
     """To the 1e-8 within which their histories agree; by the conserving scheme without drift."""
@@ -42,7 +49,7 @@ def test_all_steppers_keep_the_same_balance(ring, rule, joints, scheme, fast):
     }
     drifts = []
     for method in ("snes", fast):
-        run = af.time_history(model, MOTION.cut(0.8, 1.8), method=method, **given)
+        run = af.time_history(model, MOTION.cut(1.2, 1.6), method=method, **given)
         drifts.append(run.dataset["energy_drift"].values)
     kinetic = 0.5 * model.mass.diagonal().sum() * 0.01**2  # of the ring at 1 cm/s [J]
     assert (np.abs(drifts[0]).max() > 1e-6 * kinetic) == (not slides)
@@ -66,7 +73,7 @@ def test_balance_is_exact_while_joints_stay_closed(stack, scheme, method):
     """Average acceleration keeps it, with damping and with work of the ground, to a millionth."""
     model = af.build(stack if scheme == CONSERVING else glued(stack), fidelity="rigid")
     given = {"damping": DAMPING, "scheme": scheme, "method": method, "dt": 0.005}
-    run = af.time_history(model, MOTION.scaled(0.05), **given)
+    run = af.time_history(model, MOTION.cut(1.0, 2.0).scaled(0.05), **given)
     assert run.dataset["iterations"].max() <= 1
     assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
 

@@ -15,6 +15,9 @@ from archfem.dynamics.events import (
 
 WEIGHT = 1e4
 
+STEP = 0.005
+"""Length of a step, in which a mechanism lasts for long enough [s]."""
+
 
 def ring():
     return af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
@@ -44,7 +47,7 @@ SAME_SIDE = {0: -0.5, 6: -0.5, 12: -0.5, 17: -0.5}
 def told(event, structure, *states, criteria=None):
     """What a fresh watch says of the last of some states, one after another."""
     watch = event.watch(structure, criteria or af.Criteria())
-    return [watch(resultants) for resultants in states][-1]
+    return [watch(resultants, STEP) for resultants in states][-1]
 
 
 def test_both_events_see_four_alternating_hinges():
@@ -135,8 +138,19 @@ def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
     moving = state(structure, {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
     assert possible_counts(structure) == ("any four joints", "four in a ring", "ring and pier")
     for resultants in (state(structure), in_ring, in_ring, with_pier):
-        assert watch(resultants) is None
-    assert "by each definition" in watch(moving)
+        assert watch(resultants, STEP) is None
+    assert "by each definition" in watch(moving, STEP)
     assert told(event, structure, moving) is None  # a fresh watch: never four in the ring
     assert "by each definition" in told(EveryMechanism(), ring(), state(ring(), ALTERNATING))
     assert possible_counts(af.column(breadth=1.0, heights=[1.0])) == ()
+
+
+def test_events_wait_for_as_long_as_a_mechanism_lasts():
+    """0.6 ms, a break, then twice 0.6 ms by different joints: only the last is long enough."""
+    hinges = [state(ring(), each) for each in (ALTERNATING, ALTERNATING | {9: 0.5})]
+    for event in (CountedMechanism(), MovingMechanism(), EveryMechanism()):
+        watch = event.watch(ring(), af.Criteria())
+        said = [watch(each, 6e-4) for each in (hinges[0], state(ring()), *hinges)]
+        assert said[:3] == [None] * 3
+        assert "a mechanism" in said[3]
+        assert event.watch(ring(), af.Criteria(duration=0.0))(hinges[0], 6e-4) is not None

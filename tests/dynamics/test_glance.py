@@ -18,28 +18,44 @@ def state(structure, hinges):
     return resultants
 
 
-def test_nothing_is_seen_while_no_joint_fails_and_nothing_twice(ring):
-    glance = Glance(ring, af.Criteria(), range(18))
+class Asked:
+    """Takes note of the joints of which it was asked, and says that they hold."""
+
+    def __init__(self):
+        self.seen = []
+
+    def __call__(self, joints):
+        self.seen.append(joints)
+        return frozenset({str(len(self.seen))})
+
+
+def test_nothing_is_asked_while_no_joint_fails_and_nothing_twice(ring):
+    asked = Asked()
+    glance = Glance(ring, af.Criteria(), range(18), asked)
     first, second = state(ring, {0: -0.5, 6: -0.5}), state(ring, {0: -0.5, 6: 0.5})
-    assert glance(state(ring, {}), 1) is None
-    for hinges in (first, second):
-        seen = glance(hinges, 1)
-        assert np.flatnonzero(seen["hinge"]).tolist() == [0, 6]
-        assert seen["M"].values == pytest.approx(hinges[:, 2])
-        assert glance(1.1 * hinges, 1) is None  # other forces, the same joints on the same faces
+    assert glance(state(ring, {}), 1) == frozenset()
+    for number, hinges in enumerate((first, second), 1):
+        assert glance(hinges, 1) == {str(number)}
+        assert np.flatnonzero(asked.seen[-1]["hinge"]).tolist() == [0, 6]
+        assert asked.seen[-1]["M"].values == pytest.approx(hinges[:, 2])
+        # other forces, the same joints on the same faces
+        assert glance(1.1 * hinges, 1) == {str(number)}
+    assert len(asked.seen) == 2
 
 
 def test_a_joint_may_slide_either_way_or_come_apart(ring):
-    glance = Glance(ring, af.Criteria(), range(18))
-    for force in ([WEIGHT, WEIGHT, 0.0], [WEIGHT, -WEIGHT, 0.0], [0.0, 0.0, 0.0]):
+    asked = Asked()
+    glance = Glance(ring, af.Criteria(), range(18), asked)
+    for number, force in enumerate(
+        ([WEIGHT, WEIGHT, 0.0], [WEIGHT, -WEIGHT, 0.0], [0.0, 0.0, 0.0]), 1
+    ):
         resultants = state(ring, {})
         resultants[3] = force
-        assert glance(resultants, 1) is not None
-        assert glance(resultants, 1) is None
+        assert glance(resultants, 1) == glance(resultants, 1) == {str(number)}
 
 
 def test_only_some_joints_and_so_many_of_them_count(ring):
-    glance = Glance(ring, af.Criteria(), [1, 2, 3])
-    assert glance(state(ring, {0: 0.5}), 1) is None
-    assert glance(state(ring, {0: 0.5, 1: 0.5}), 2) is None
-    assert glance(state(ring, {1: 0.5, 2: 0.5}), 2) is not None
+    glance = Glance(ring, af.Criteria(), [1, 2, 3], Asked())
+    assert not glance(state(ring, {0: 0.5}), 1)
+    assert not glance(state(ring, {0: 0.5, 1: 0.5}), 2)
+    assert glance(state(ring, {1: 0.5, 2: 0.5}), 2)

@@ -73,7 +73,7 @@ def test_a_run_that_did_not_finish_says_so_first(model, motion):
     assert first == f"outcome: {halted.outcome}"
     assert "a mechanism of arch by joint" in first
     assert f"{halted.time[-1]:.3f} s by joint" in counted
-    assert "it begins as the record ends, open by " in counted
+    assert "it lasts 5 ms, opens by up to " in counted
 
 
 def test_the_verdict_of_files(run, tmp_path):
@@ -101,7 +101,7 @@ def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelit
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity=fidelity)
     given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), "scheme": scheme, "dt": 0.005}
-    record, short = af.Record(every=3, fields_every=15), motion.cut(1.2, 1.8)
+    record, short = af.Record(every=3, fields_every=15), motion.cut(1.2, 1.5)
     gauges = af.models.Gauges.on(model)
     runs = {
         method: af.time_history(model, short, record=record, method=method, **given)
@@ -131,3 +131,44 @@ def test_displacements_of_blocks_against_their_coordinates(model, motion):
     assert free["largest_displacement_time"].values == pytest.approx(when, abs=0.011)
     fixed = run.dataset["largest_displacement"].values[[b.fixed for b in model.structure.blocks]]
     assert (fixed == 0.0).all()
+
+
+@pytest.fixture(scope="module")
+def paced(model, motion):
+    """A run whose steps choose their lengths, from 0.1 ms on."""
+    return af.time_history(model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)))
+
+
+def test_mechanisms_too_short_to_count_are_told(paced):
+    """By a loop over the record: what counts lasts long enough, and what came before is named."""
+    step = np.diff(paced.time, prepend=0.0)
+    failed = (paced.joints["hinge"].values != 0) | paced.joints["slide"] | paced.joints["open"]
+    runs, begin = [], None
+    for k, up in enumerate([*(failed.sum("joint").values >= 4), False]):
+        begin = k if up and begin is None else begin
+        if not up and begin is not None:
+            runs.append((paced.time[begin], step[begin:k].sum()))
+            begin = None
+    first, longest = runs[0], max(length for _, length in runs)
+    assert first[1] < longest
+    assert paced.judged_by(af.Criteria(duration=0.0)).mechanism.time == first[0]
+    assert "what begins at" not in paced.judged_by(af.Criteria(duration=0.0)).verdict
+    for least in (1.01 * first[1], 1.01 * longest):
+        strict = paced.judged_by(af.Criteria(duration=least))
+        counts = [time for time, length in runs if length >= least]
+        assert (strict.mechanism and strict.mechanism.time) == (counts[0] if counts else None)
+        counted = strict.verdict.splitlines()[1]
+        assert f"begins at {first[0]:.4f} s lasts less than {1e3 * least:.3g} ms, and" in counted
+    assert f"4 failed joints at once in rings and piers for {1e3 * least:.3g} ms; what" in counted
+
+
+def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, motion):
+    halted = af.time_history(
+        model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)), until=af.CountedMechanism()
+    )
+    found = halted.mechanism
+    assert found.time == paced.mechanism.time
+    held = halted.time[halted.time >= found.time]
+    before = halted.time[len(halted.time) - len(held) - 1]
+    assert held[-1] - before >= 1e-3 * (1.0 - 1e-6)
+    assert len(held) == 1 or held[-2] - before < 1e-3

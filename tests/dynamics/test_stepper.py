@@ -22,7 +22,7 @@ def test_contact_stepper_falls_back(ring, rule, scheme):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity="rigid", quadrature=rule)
-    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(0.8, 1.8)
+    newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.6)
     equation = af.dynamics.Equation(model, short, DAMPING, scheme)
     solves, given = af.dynamics.Exact(equation, newton), {"newton": newton, "dt": 0.005}
     exact = af.time_history(model, short, method=Stepper(equation, exact=solves), **given)
@@ -71,7 +71,8 @@ class _Doubled:
 
 
 def _one_pass(series, memories, results, ground, system):
-    """Stop before the first step that took more than one pass."""
-    count = advance(series, memories, results, ground, system)
+    """Stop before the first step that took more than one pass, four steps at most at a time."""
+    few = tuple(each[:4] for each in results)
+    count = advance(series[:5], memories[:5], few, ground[:, :4].copy(), system)
     many = np.flatnonzero(results[1][:count] > 1)
     return int(many[0]) if len(many) else count

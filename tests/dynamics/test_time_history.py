@@ -15,7 +15,9 @@ GIVEN = {"damping": DAMPING, "dt": 0.005}
 
 
 def test_a_model_knows_what_was_predicted_of_it(model):
-    foreseen = af.models.Prediction(error=0.003, tolerance=0.005, dt=0.0025, considered=())
+    foreseen = af.models.Prediction(
+        error=0.003, in_time=0.001, tolerance=0.005, dt=0.0025, pace=None, considered=()
+    )
     chosen = model.predicted(foreseen)
     assert (chosen.prediction, model.prediction) == (foreseen, None)
     assert chosen.moved(chosen.supports).prediction == foreseen

@@ -7,6 +7,7 @@ import pytest
 from kinematics import gaps
 
 import archfem as af
+from archfem.joints.criteria import flagged
 from archfem.limit.collapse import Outcome
 from archfem.limit.movement import End
 from archfem.units import kPa
@@ -132,3 +133,67 @@ def test_a_support_moves_as_far_with_enough_cohesion_as_without_sliding():
     assert dry.end is End.SLIDES
     assert dry.largest < held.largest == never.largest
     assert held.end is never.end is End.FALLS
+
+
+# ---- verdicts obey the joints' own law
+
+
+def held_block(angle, friction, cohesion):
+    """A low block on a face that rises to the right, at rest on a stiff joint."""
+    contact = af.Contact(1e10, 4e9, friction, cohesion=cohesion)
+    bare = block_on_incline(angle, contact)
+    blocks = tuple(replace(block, role="pier") for block in bare.blocks)
+    return replace(bare, blocks=blocks, joints=tuple(replace(j, role="pier") for j in bare.joints))
+
+
+@pytest.mark.parametrize("factor", [1.0 + 1e-5, 1.05])
+def test_a_block_that_cohesion_holds_counts_as_sliding_only_when_it_is_used_up(factor):
+    """W sin φ = μ W cos φ + c A: far beyond μ N either way."""
+    angle, friction = np.radians(40.0), 0.5
+    used = factor < 1.01
+    bare = held_block(angle, friction, 0.0)
+    needed = bare.weight * (np.sin(angle) - friction * np.cos(angle)) / (1.2 * 0.7)
+    structure = held_block(angle, friction, factor * needed)
+    joints = af.dead_load(af.build(structure, fidelity="rigid")).joints
+    assert float(joints["friction"][0]) == pytest.approx(np.tan(angle), rel=1e-6)
+    assert bool(joints["slide"][0]) == used
+    assert (af.verified_mechanism(structure, joints).kind == "local") == used
+    alone = af.verified_mechanism(structure, joints, af.Criteria(friction=friction))
+    assert alone.kind == "local"  # who asks for |V| / N alone gets it
+    again = af.joints.joint_dataset(structure, joints[["N", "V", "M"]].to_array().values.T)
+    assert again["slide"].values.tolist() == joints["slide"].values.tolist()
+
+
+@pytest.mark.parametrize(("peak", "slides"), [(0.66, False), (0.74, True)])
+def test_a_shaken_block_is_a_mechanism_only_beyond_friction_and_cohesion(peak, slides):
+    """It holds up to a = (μ + c A / W) g = 0.7 g, and the event agrees with the record."""
+    contact = af.Contact(1e10, 4e9, 0.4, cohesion=0.3 * 8e3)
+    structure = af.column(breadth=1.0, heights=[0.4], contact=contact)
+    assert structure.weight == pytest.approx(8e3)
+    time = np.arange(0.0, 1.0, 0.005)
+    shaking = peak * structure.gravity * np.sin(2.0 * np.pi * 2.0 * time) * np.minimum(1, 2 * time)
+    given = {"damping": af.StiffnessDamping(0.05, 20.0), "dt": 0.005}
+    model = af.build(structure, fidelity="rigid")
+    run = af.time_history(model, af.Motion(shaking, 0.005), **given)
+    assert float(run.joints["friction"].max()) > 0.6
+    assert (run.verified is not None) == slides
+    assert bool(np.abs(run.dataset["last_memory"].values).max() > 1e-6) == slides
+    until = af.dynamics.MovingMechanism()
+    halted = af.time_history(model, af.Motion(shaking, 0.005), until=until, **given)
+    assert (halted.ended == "event") == slides
+    if slides:
+        assert halted.time[-1] == run.verified.moved.time
+
+
+def test_what_cohesion_holds_falls_as_a_joint_opens():
+    """Of a plane face pressed without tension 3 (1/2 - |e|) touches: 0.3 of it at e = 0.4."""
+    contact = af.Contact(1e9, 4e8, 0.5, cohesion=10e3)
+    structure = af.column(breadth=2.0, heights=[1.0], width=0.5, contact=contact)
+    normal, whole = 20e3, 10e3 * 2.0 * 0.5
+    for e, share in ((0.0, 1.0), (0.16, 1.0), (0.4, 0.3), (-0.4, 0.3), (0.49, 0.03)):
+        for used, slides in ((1.0, True), (0.98, False)):
+            shear = 0.5 * normal + used * share * whole
+            rows = np.array([[normal, -shear, e * normal * 2.0]])
+            found = af.joints.joint_dataset(structure, rows)
+            assert bool(found["slide"][0]) == slides
+            assert bool(flagged(found, af.Criteria(hinge=0.4))["slide"][0]) == slides

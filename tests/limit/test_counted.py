@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from mechanisms import failing, piers
+from mechanisms import ALTERNATING, arch, failing, piers
 
 import archfem as af
 from archfem.limit.counted import (
@@ -115,3 +115,25 @@ def test_two_rings_without_piers_are_local_each():
     assert counted_mechanism(failing(structure, few)).kind == "global"
     met = demirel_aldemir_mechanism(failing(structure, few | {of["left arch"][3]: 0.5}))
     assert (met.kind, met.part, met.joints) == ("local", "left arch", tuple(of["left arch"][:4]))
+
+
+def test_what_is_shorter_than_a_mechanism_lasts_does_not_count_by_any_definition():
+    """Four hinges for 0.2 ms, and later, first some and then others, for 1.1 ms in all."""
+    ring, other = arch(), {0: -0.5, 6: 0.5, 12: -0.5, 16: 0.5}
+    joints = history(ring, [{}, ALTERNATING, {}, ALTERNATING, other, {}])
+    joints = joints.assign_coords(time=[0.0, 2e-4, 1e-3, 1.6e-3, 2.1e-3, 4e-3])
+
+    def times(least):
+        criteria = af.Criteria(duration=least)
+        by_count = counted_mechanisms(joints, criteria)["four in a ring"]
+        moved = af.limit.first_verified_mechanism(ring, joints, criteria)
+        found = [counted_mechanism(joints, criteria), demirel_aldemir_mechanism(joints, criteria)]
+        return {
+            None if each is None else each.time
+            for each in (*found, by_count, None if moved is None else moved.moved)
+        }
+
+    assert af.Criteria().duration == 1e-3
+    assert times(0.0) == {2e-4}
+    assert times(1e-3) == times(1.1e-3) == {1.6e-3}
+    assert times(1.2e-3) == {None}

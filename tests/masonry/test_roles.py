@@ -125,7 +125,7 @@ def test_events_go_by_roles(event):
     for names in NAMES.values():
         made = viaduct(*names)
         watch = event().watch(made, af.Criteria())
-        ends = [watch(resultants) is not None for resultants in quake(made)]
+        ends = [watch(resultants, 0.005) is not None for resultants in quake(made)]
         endings.append(ends.index(True))
     assert len(set(endings)) == 1
 

@@ -19,7 +19,9 @@ def test_every_rung_answers_all_that_a_model_answers(model):
 
 
 def test_copies_leave_the_model_as_it_was(model):
-    promise = Prediction(error=0.01, tolerance=0.02, dt=0.005, considered=())
+    promise = Prediction(
+        error=0.01, in_time=0.001, tolerance=0.02, dt=0.005, pace=None, considered=()
+    )
     assert model.predicted(promise).prediction is promise
     down = af.Settlement("base", (0.0, -0.1, 0.0))
     twice = model.settled(down).settled(down)

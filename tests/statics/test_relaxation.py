@@ -73,3 +73,18 @@ def test_upright_ends_of_dry_sand_flow(bridge):
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=20.0)
     with pytest.raises(af.DidNotConverge, match="cannot carry it"):
         af.dead_load(af.build(fill, fidelity="rigid", cells=(1, 1)))
+
+
+def test_a_support_spreads_under_fill_in_pieces(bridge):
+    """Newton's method alone loses it after 3 cm; each step is in balance, and none beyond Coulomb.
+
+    The work of the weights is the thrust on the support, and falls as it gives way.
+    """
+    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    model = af.build(fill, fidelity="rigid", cells=(2, 1))
+    spread = af.Settlement("left wall, foundation", (-1.0, 0.0, 0.0))
+    stop = af.statics.Stop(displacement=0.01)
+    found = af.pushover(model, spread, stop=stop)
+    assert found.outcome.startswith("the support moved by")
+    assert at_most_coulomb(fill, found.joints, 10e3)
+    assert found.factor < 0.9 * float(found.curve["factor"][0])

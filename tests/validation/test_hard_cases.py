@@ -3,8 +3,29 @@
 import pytest
 from hard.table import CASES
 
+LONG = (
+    "contact stepper, faces, exact",
+    "chain stepper, faces, exact",
+    "paving on an eroded deck",
+    "filled span, 20 ms steps",
+    "wide flat span on a slender pier",
+    "viaduct of 8 spans, bare",
+    "record × 3",
+    "0.98 × least, soft joints",
+    "cover of 20 mm",
+    "flat ring, 20°",
+)
+"""Seconds each, and near to others that are quicker."""
 
-@pytest.mark.parametrize("case", [c for c in CASES if c.quick], ids=lambda case: case.name)
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=pytest.mark.slow if case.name in LONG else (), id=case.name)
+        for case in CASES
+        if case.quick
+    ],
+)
 def test_hard_case(case):
     cells, right = case.row()
     assert right, " | ".join(cells)

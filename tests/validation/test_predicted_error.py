@@ -7,8 +7,11 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.ladder import Setting, choose, finest
+from archfem.dynamics.candidates import LEVELS, best
+from archfem.dynamics.ladder import FINEST, choose
 from archfem.dynamics.probe import largest_difference, peaks, strongest, usual_damping
+from archfem.dynamics.tradeoff import Setting
+from archfem.dynamics.yardstick import SAFETY, Steps, Yardstick
 from archfem.models.build import build as plain
 from archfem.models.rigid import rigid
 
@@ -23,6 +26,13 @@ SCENES = {
     "column": (af.column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
 }
 
+FILLED = {"backfill": "full", "rest": "condensed"}
+
+
+def quick(structure, discretisation):
+    """As many models as are asked for, all of rigid stones with as many facets."""
+    return plain(structure, replace(discretisation, fidelity="rigid"))
+
 
 def damping_of(structure):
     return usual_damping(rigid(structure, rule=af.joints.Quadrature("exact")))
@@ -31,8 +41,8 @@ def damping_of(structure):
 @pytest.fixture(
     scope="module",
     params=[
-        "ring",
         "column",
+        pytest.param("ring", marks=pytest.mark.slow),
         pytest.param("semicircle", marks=pytest.mark.slow),
         pytest.param("stiff joints", marks=pytest.mark.slow),
     ],
@@ -42,39 +52,43 @@ def scene(request):
     structure, pga = SCENES[request.param]
     motion = af.Motion.synthetic(duration=12.0, pga=pga, seed=1)
     damping = damping_of(structure)
-    best = af.build(structure, fidelity="condensed", cells=(8, 8), quadrature="exact")
-    return structure, motion, damping, peaks(best, motion, damping, 0.00125)
+    finest = af.build(structure, fidelity="condensed", cells=(12, 12), quadrature="exact")
+    return structure, motion, damping, peaks(finest, motion, damping, 0.00125)
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005])
-def test_prediction_is_within_a_factor_of_three(scene, tolerance):
-    """Predicted over actual error, the actual one over a whole motion and on a finer model."""
+def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
+    """Predicted over actual error, the actual one over a whole motion and on a finer model.
+
+    What models and what steps err by is added up, though one may make up for the other.
+    """
     structure, motion, damping, reference = scene
     model = af.build(
         structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping
     )
     predicted = model.prediction
-    actual = largest_difference(peaks(model, motion, damping, predicted.dt), reference)
-    assert actual <= 1.5 * tolerance or not predicted.met
-    assert 1.0 / 3.0 < predicted.error / actual < 3.0
+    found = peaks(model, motion, damping, predicted.dt, tolerance=predicted.pace)
+    actual = largest_difference(found, reference)
+    assert actual <= tolerance or not predicted.met
+    assert 1.0 / 2.0 < predicted.error / actual < 5.0
 
 
 def test_choice_climbs_as_the_tolerance_falls():
     structure, pga = SCENES["ring"]
-    motion = af.Motion.synthetic(duration=3.0, pga=pga, seed=1)
+    motion = af.Motion.synthetic(duration=1.5, pga=pga, seed=1)
     tried = [
         len(af.build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
-        for t in (0.05, 0.005)
+        for t in (0.15, 0.02)
     ]
-    assert tried[0] == 1 < tried[1]
+    assert tried[0] == 2 < tried[1]  # the steps, and the first model
 
 
 @pytest.mark.parametrize("dt", [None, 0.005])
-def test_the_finest_model_is_built_once_and_asked_for_the_damping(ring, dt):
+def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_damping(ring, dt):
     built, asked = [], []
 
     def builder(structure, discretisation):
-        model = plain(structure, discretisation)
+        model = quick(structure, discretisation)
         built.append((discretisation, model))
         return model
 
@@ -82,17 +96,19 @@ def test_the_finest_model_is_built_once_and_asked_for_the_damping(ring, dt):
         asked.append(model)
         return af.Rayleigh(0.05, (8.0, 24.0))
 
-    motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
     choose(ring, 1e-9, motion, damping, dt, builder=builder)
-    assert [each for each, _ in built].count(finest(ring).discretisation) == 1
-    assert asked == [model for each, model in built if each == finest(ring).discretisation]
+    orders = [each for each, _ in built]
+    assert [orders.count(best(ring, level)) for level in LEVELS] == [1, 1]
+    assert orders[0] == best(ring, LEVELS[0])
+    assert asked == [built[0][1]]
 
 
 def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
     """A function of the model, and what it gives, are the same to the last digit."""
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
-    best = plain(ring, finest(ring).discretisation)
-    given = af.dynamics.effective_damping(best, about=af.dead_load(best))
+    finest = plain(ring, best(ring, LEVELS[0]))
+    given = af.dynamics.effective_damping(finest, about=af.dead_load(finest))
     found = [
         af.build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
         for damping in (
@@ -113,31 +129,31 @@ def test_a_soft_block_keeps_its_nodes():
     stack = af.column(breadth=1.0, heights=[1.0, 0.5])
     soft = replace(stack.blocks[1], material=af.masonry.BACKFILL)
     stack = replace(stack, blocks=(stack.blocks[0], soft, stack.blocks[2]))
-    model = af.build(stack, fidelity="auto", tolerance=0.01)
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    model = af.build(stack, fidelity="auto", tolerance=0.05, motion=motion)
     assert "block 1: full" in model.fidelity
     assert model.prediction.met
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [glued, lambda same: same], ids=["holds", "slides"])
 def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not(law):
-    """The error predicted of the model, against all nodes over the whole motion."""
+    """The error predicted, of mesh and steps, against a finer mesh in short steps."""
     arch = af.shapes.Arch(span=5.0, rise=2.0, thickness=0.5, voussoirs=13)
     structure = law(af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), width=4.0))
-    motion = af.Motion.synthetic(duration=10.0, pga=2.5, seed=2)
+    motion = af.Motion.synthetic(duration=3.0, pga=2.5, seed=2)
     damping = af.Rayleigh(0.05, (4.0, 20.0))
-    given = {"motion": motion, "damping": damping, "dt": 0.005}
-    model = af.build(structure, fidelity="auto", tolerance=0.005, **given)
+    model = af.build(
+        structure, fidelity="auto", tolerance=0.03, motion=motion, damping=damping, dt=0.005
+    )
+    told = model.prediction
     assert model.fidelity == "backfill: full, rest: faces"
-    assert model.prediction.met
-    assert model.prediction.dt == 0.005
-    runs = [
-        peaks(each, motion, damping, 0.005)
-        for each in (model, af.build(structure, quadrature="exact"))
-    ]
-    assert 0.3 < runs[1].max() < 0.5  # the motion is severe, and no ring comes apart
+    assert told.dt == 0.005
+    finest = af.build(structure, fidelity=FILLED, cells=(12, 12))
+    runs = [peaks(model, motion, damping, 0.005), peaks(finest, motion, damping, 0.00125)]
     actual = largest_difference(*runs)
-    assert actual <= 0.005
-    assert 1.0 / 3.0 < model.prediction.error / actual < 3.0
+    assert actual <= 0.03 or not told.met
+    assert 1.0 / 2.0 < told.error / actual < 5.0
 
 
 def test_without_a_motion_a_severe_one_is_assumed(ring):
@@ -145,15 +161,47 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
     assert model.prediction.met
     run = af.time_history(model, af.Motion.synthetic(duration=1.0, pga=1.0, seed=1))
     assert run.dataset.attrs["predicted_error"] == model.prediction.error
-    assert np.diff(run.time) == pytest.approx(model.prediction.dt)
+    assert run.dataset.attrs["tolerance"] == model.prediction.pace
 
 
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
-    motion = af.Motion.synthetic(duration=4.0, pga=4.0, seed=3)
-    motion = motion.cut(0.0, 2.0)
-    model = af.build(ring, fidelity="auto", tolerance=1e-6, motion=motion)
-    assert not model.prediction.met
-    assert "no rung of the ladder" in caplog.text
+    motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
+    model = choose(ring, 1e-9, motion, builder=quick)
+    told = model.prediction
+    assert not told.met
+    assert told.pace == FINEST
+    assert "no setting meets the tolerance" in caplog.text
+    assert told.text in caplog.text
+    tried = [name for name, _ in told.considered]
+    assert len(tried) == 1 + sum(len(level.rungs) for level in LEVELS)
+    assert all(name in told.text for name in tried)
+    assert [name for name, error in told.considered if error == told.error]
+
+
+def test_steps_alone_are_refined_where_they_err(ring):
+    """No finer mesh is tried for what steps of 20 ms err by; steps of any length do better."""
+    motion = af.Motion.synthetic(duration=1.5, pga=2.5, seed=5)
+    coarse = choose(ring, 0.04, motion, dt=0.02, builder=quick).prediction
+    assert not coarse.met
+    assert coarse.in_time > 0.04
+    assert len(coarse.considered) <= 3
+    free = choose(ring, 0.04, motion, builder=quick).prediction
+    assert free.met
+    assert free.in_time <= 0.02
+
+
+def test_error_in_time_is_that_against_very_short_steps(ring):
+    """By steps half as long alone, against 0.16 ms; the yardstick's margin taken off."""
+    motion = af.Motion.synthetic(duration=2.0, pga=2.5, seed=5)
+    model, damping = af.build(ring, fidelity="rigid"), damping_of(ring)
+    yardstick = Yardstick(model, motion, damping)
+    true = peaks(model, motion, damping, 1.5625e-4)
+    for steps in (Steps(0.005, None), Steps(0.0025, None), Steps(None, 0.005)):
+        found = yardstick.in_time(steps) / SAFETY
+        actual = largest_difference(
+            peaks(model, motion, damping, steps.dt, tolerance=steps.pace), true
+        )
+        assert 0.5 < found / actual < 2.0
 
 
 def test_the_strongest_part_holds_the_peak():

@@ -1,6 +1,7 @@
 """The ladder of models: each rung against the one above it, and against the assembled forms."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -64,24 +65,28 @@ def test_monolithic_history_is_that_of_full(ring):
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 
 
-@pytest.mark.parametrize(
-    ("slides", "bounds"), [(False, (2e-5, 0.005, 0.02)), (True, (2e-5, 0.08, 0.09))]
-)
-def test_errors_fall_up_the_ladder(ring, slides, bounds):
-    """Against all nodes on the same mesh; bounds about twice what was found on this motion.
+@pytest.mark.parametrize("law", [glued, lambda same: same], ids=["holds", "slides"])
+def test_errors_fall_up_the_ladder(ring, law):
+    """Against all nodes on the same mesh; bounds up to twice what was found on this motion.
 
-    Where joints slide, edges that are pressed little slide first. Rungs that know of a joint's
-    two ends alone see less of that, and err by 0.04 instead of 0.002 and 0.007.
+    Found are 8e-6, 0.0019 and 0.0070 where joints hold, 9e-6, 0.0021 and 0.0065 where they slide:
+    four facets a joint, which all rungs have here, follow the edges that are pressed little and
+    slide first.
     """
-    structure = ring if slides else glued(ring)
+    structure = law(ring)
     reference = envelope(af.build(structure, cells=(4, 4)))
     off = {
         rung: np.abs(envelope(af.build(structure, fidelity=rung)) - reference).max()
         for rung in ("rigid", "faces", "condensed")
     }
-    assert off["condensed"] < off["faces"] < off["rigid"]
-    assert off["condensed"] < bounds[0] < off["faces"] < bounds[1]
-    assert off["rigid"] < bounds[2]
+    assert off["condensed"] < 1.5e-5 < off["faces"] < 0.0035 < off["rigid"] < 0.012
+
+
+def test_one_facet_does_not_see_where_a_joint_begins_to_slide(ring):
+    """Found are 0.043 with one facet and 0.007 with four; where joints hold the number is idle."""
+    for structure, least, most in ((ring, 0.03, 0.06), (glued(ring), 0.0, 1e-9)):
+        one, four = (envelope(af.build(structure, fidelity="rigid", cells=(n, 1))) for n in (1, 4))
+        assert least <= np.abs(one - four).max() < most
 
 
 SCHEMES = [
@@ -90,11 +95,24 @@ SCHEMES = [
     ("closed", NEWMARK),
     ("initial", af.HHT(-0.1)),
 ]
+SLOW = pytest.mark.slow
 
 
-@pytest.mark.parametrize(("joints", "scheme"), SCHEMES)
-@pytest.mark.parametrize("rule", ["nodal", "lobatto", "gauss", "exact"])
-@pytest.mark.parametrize("rung", ["rigid", "faces", "condensed"])
+RUNGS, RULES = ("rigid", "faces", "condensed"), ("nodal", "lobatto", "gauss", "exact")
+
+
+def quick(rule, way):
+    """Springs at all ends and exact facets, by each law of joints: the rest is tested on faces."""
+    return rule in ("lobatto", "exact") and way in SCHEMES[::2]
+
+
+@pytest.mark.parametrize(
+    ("rung", "rule", "joints", "scheme"),
+    [
+        pytest.param(rung, rule, *way, marks=() if rung == "faces" or quick(rule, way) else SLOW)
+        for rung, rule, way in product(RUNGS, RULES, SCHEMES)
+    ],
+)
 def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, scheme):
     """To 1e-8 of the largest, joints opening and closing, and sliding where the scheme allows."""
     slides = scheme == CONSERVING
@@ -107,7 +125,7 @@ def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, sc
         "newton": TIGHT,
         "dt": 0.005,
     }
-    short = MOTION.cut(0.8, 2.3)
+    short = MOTION.cut(1.2, 1.8)
     slow = af.time_history(model, short, method="snes", **given)
     for method in ("contact", "compliance", *(() if slides else ("chain",))):
         fast = af.time_history(model, short, method=method, **given)
@@ -151,7 +169,7 @@ def test_damping_on_the_blocks_alone(ring, scheme, method):
     model = af.build(structure, fidelity="faces", cells=(2, 2), quadrature="nodal")
     damping = af.Rayleigh(0.05, (8.0, 16.0), "none")
     given = {"damping": damping, "scheme": scheme, "newton": TIGHT, "dt": 0.005}
-    short = MOTION.cut(0.8, 1.6)
+    short = MOTION.cut(1.2, 1.6)
     runs = [af.time_history(model, short, method=m, **given).joints["M"] for m in ("snes", method)]
     assert np.abs(runs[0] - runs[1]).max() < 1e-8 * np.abs(runs[0]).max()
 

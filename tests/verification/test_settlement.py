@@ -34,19 +34,52 @@ def force_on_higher(joints):
     return joints["N"].values[:, None] * COUPLE.normals - joints["V"].values[:, None] * tangents
 
 
-@pytest.mark.parametrize("rung", RUNGS)
-def test_supports_that_move_together_change_nothing(rung):
-    """The ring goes with them: a rigid motion of everything, by 1 cm and 1 mrad."""
-    model = af.build(RING, fidelity=rung, cells=(2, 2))
-    reference = af.dead_load(model, TIGHT)
+@pytest.mark.parametrize("motion", [(-0.05, 0.0, 0.0), (0.0, 0.0, 1e-3), (0.01, -0.01, 1e-3)])
+@pytest.mark.parametrize(
+    ("rung", "rule"),
+    [(rung, "exact") for rung in ("rigid", "faces", "condensed", "full")]
+    + [(rung, "lobatto") for rung in RUNGS]
+    + [(rung, rule) for rung in ("rigid", "faces", "condensed") for rule in ("nodal", "gauss")],
+)
+def test_supports_that_move_together_change_nothing(rung, rule, motion):
+    """The ring goes with them, a rigid motion of everything, although its joints could slide."""
+    model = af.build(RING, fidelity=rung, cells=(2, 2), quadrature=rule)
+    reference = af.dead_load(model)
     moved = model
     for block in (0, len(RING.blocks) - 1):
-        moved = moved.settled(af.Settlement(block, about(RING, block, 1e-3, (0.01, -0.01))))
-    found = af.dead_load(moved, TIGHT)
-    assert differ(found.joints, reference.joints) < 1e-5  # round-off of 1 cm against µm
+        moved = moved.settled(af.Settlement(block, about(RING, block, motion[2], motion[:2])))
+    found = af.dead_load(moved)
+    assert differ(found.joints, reference.joints) < 1e-8  # round-off of 5 cm against µm
     gap = model.cells.displacement(found.q - reference.q)
-    plane = motion_of(model.cells.places, np.zeros(2)) @ [0.01, -0.01, 1e-3]
-    np.testing.assert_allclose(gap, plane, atol=1e-7)
+    plane = motion_of(model.cells.places, np.zeros(2)) @ motion
+    np.testing.assert_allclose(gap, plane, atol=1e-8)
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+def test_what_supports_pull_is_the_derivative_of_the_force(rung):
+    """By differences, on joints that never slide, where some are open in part."""
+    model = af.build(glued(RING), fidelity=rung, cells=(2, 2), quadrature="lobatto")
+    q, motion = af.dead_load(model).q, np.zeros_like(model.supports)
+    motion[0] = [-1.0, 0.5, 0.3]
+    ahead, back = (model.moved(sign * 1e-9 * motion).force(q) for sign in (1.0, -1.0))
+    pulled = model.pulled(q, motion)
+    np.testing.assert_allclose((ahead - back) / 2e-9, pulled, atol=1e-6 * np.abs(pulled).max())
+
+
+@pytest.mark.parametrize("settlement", [(-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
+def test_a_support_that_moves_far_at_once_leads_where_small_steps_lead(settlement):
+    """Joints slide to and fro on the way, by 0.1 to 0.3 mm; 5 cm at once come to the same."""
+    model = af.build(RING, fidelity="rigid")
+    stop = af.statics.Stop(displacement=0.05 / RING.size)
+    path = af.pushover(model, af.Settlement(0, settlement), stop=stop)
+    far = float(path.curve["displacement"][-1])
+    once = af.dead_load(model.settled(af.Settlement(0, tuple(far * each for each in settlement))))
+    last = path.joints.isel(step=-1)
+    assert far > 0.05
+    assert len(path.curve["step"]) > 50
+    assert np.abs(last["slip"].values).max() > 1e-4
+    assert differ(once.joints, last) < 1e-8
+    np.testing.assert_allclose(once.joints["slip"], last["slip"], atol=1e-10)
 
 
 @pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss", "exact"])

@@ -1,7 +1,10 @@
 """Joints over time: what was recorded, and its limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from glued import glued
 from pictures import history
 
 import archfem as af
@@ -73,3 +76,21 @@ def test_one_joint_of_several_runs(runs):
     assert upper[0].get_ylim() == upper[1].get_ylim()
     with pytest.raises(af.InvalidInput, match="joint 44"):
         draw_joint(runs, "joint 44")
+
+
+def test_cohesion_raises_the_limit_that_is_drawn(ring):
+    """By c A / N, where the joint is closed all over."""
+    cohesive = [
+        replace(joint, contact=replace(joint.contact, cohesion=5e3)) for joint in ring.joints
+    ]
+    held = history(replace(ring, joints=tuple(cohesive)), 0.1)
+    held.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
+    line = draw_joints(held, [0]).axes[2].lines[0].get_ydata()
+    own = held.joints.isel(joint=0)
+    assert line == pytest.approx(0.6 + 0.99 * 5e3 * ring.depths[0] / own["N"].values)
+
+
+def test_joints_that_never_slide_have_no_limit(ring):
+    held = history(glued(ring), 0.1)
+    held.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
+    assert len(draw_joints(held, [0]).axes[2].lines) == 1

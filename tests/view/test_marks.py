@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from glued import glued
 from pictures import SLIDING, WEIGHT, resultants
 
 import archfem as af
@@ -66,7 +65,7 @@ def test_ends_of_joints_move_as_the_mean_of_their_blocks(ring):
 
 def test_joints_go_with_supports_that_have_moved(ring):
     """All of the ring 5 cm to the left, supports too: so are the joints' ends."""
-    moved = af.build(glued(ring), fidelity="rigid")
+    moved = af.build(ring, fidelity="rigid")
     for block in (0, 18):
         moved = moved.settled(af.Settlement(block, (-0.05, 0.0, 0.0)))
     dead = af.dead_load(moved)

@@ -12,15 +12,16 @@ from archfem.arrays import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.joints.resultants import joint_dataset
 from archfem.limit.verified import VerifiedMechanism
 from archfem.models.model import Model
+from archfem.statics.equilibrium import Equilibrium
 from archfem.view.films.colours import check_colour
 from archfem.view.films.page import Page
 from archfem.view.films.setup import Setup
 from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
+from archfem.view.states import drawn, joints_at
 
 SMALLEST = (480, 320)
 """Least width and height of a picture [pixels]: type would not fit into less."""
@@ -43,7 +44,9 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     Displacements are magnified. Blocks are coloured by displacement or by least principal
     stress. A red disc marks a hinge on the face where its blocks stay in contact, and leaves a
     faint trace; two opposite arrows mark a joint that slides. Below runs the acceleration of the
-    ground. The film is written in one stroke: a killed one leaves the old file or none.
+    ground. Frames follow one another at even times, whatever the steps: displacements run straight
+    between the fields that were kept, and marks are those of the nearest record. The film is
+    written in one stroke: a killed one leaves the old file or none.
 
     Args:
         model: that made the run.
@@ -66,15 +69,17 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     target = film_path(path)
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
-    frames, fps = _frames(run.dataset["frame_time"].values, fps, seconds)
-    setup = Setup.of(model, run.dataset["q"].values[frames], colour, magnification)
-    return write_film(target, _shots(_with(setup, mechanism), run, frames, size), fps)
+    times, fps = _times(run.dataset["frame_time"].values, fps, seconds)
+    fields = _fields(run, times)
+    setup = _with(Setup.of(model, fields, colour, magnification), mechanism)
+    return write_film(target, _shots(setup, run, (times, fields), size), fps)
 
 
 def picture(
     model: Model,
-    q: Array,
+    q: Equilibrium | Array,
     *,
+    joints: xr.Dataset | None = None,
     magnification: float | None = None,
     colour: str = "displacement",
     size: tuple[int, int] = (1280, 720),
@@ -84,22 +89,24 @@ def picture(
 
     Args:
         model: what stands.
-        q: coordinates (n,), e.g. of the dead load.
+        q: an equilibrium, or coordinates (n,).
+        joints: at that instant, e.g. `run.joints.sel(time=…)`; by default as the model has them,
+            with what they remember.
         magnification: of displacements [-]; by default a round number that shows them well.
         colour: "displacement" or, for blocks that are not rigid, "stress".
         size: width and height, even numbers [pixels].
-        criteria: what makes a joint fail; by default the usual ones.
+        criteria: what makes a joint fail; by default those of `joints`, or else the usual ones.
 
     Returns:
         The picture (height, width, 3), red, green and blue from 0 to 255.
 
     Raises:
-        InvalidInput: q is another model's, or an option cannot be meant.
+        InvalidInput: q or joints are another model's, or an option cannot be meant.
     """
     _check_picture(model, colour, magnification, size)
-    _check_size(model, len(q))
+    model, q = drawn(model, q)
+    joints = joints_at(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    joints = joint_dataset(model.structure, model.resultants(q), criteria=criteria)
     shift = _carrier(setup)(q)
     page = Page(setup, size)
     with Stage(setup, page.room) as stage:
@@ -116,18 +123,20 @@ def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
     return setup.with_outlines(outlines, mechanism.moved.time or 0.0)
 
 
-def _shots(setup: Setup, run: History, frames: Array, size: tuple[int, int]) -> Iterator[Image]:
-    """Yield the frames of a film, one after another; on a terminal a bar shows progress."""
+def _shots(
+    setup: Setup, run: History, frames: tuple[Array, Array], size: tuple[int, int]
+) -> Iterator[Image]:
+    """Yield the frames of a film, from their times and coordinates; a bar shows progress."""
     structure, carried = setup.model.structure, _carrier(setup)
-    times = run.dataset["frame_time"].values[frames]
+    times, fields = frames
     steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
     been = _been(run.joints)
     page = Page(setup, size, run)
-    shown = zip(times, steps, run.dataset["q"].values[frames], strict=True)
-    bar = tqdm(shown, total=len(frames), unit="frame", disable=None, leave=False)
+    shown = zip(times, steps, fields, strict=True)
+    bar = tqdm(shown, total=len(times), unit="frame", disable=None, leave=False)
     with Stage(setup, page.room) as stage:
         for time, step, q in bar:
-            joints = run.joints.isel(time=int(step))
+            joints = run.joints.isel(time=int(step)).assign_coords(time=time)
             shift = carried(q)
             marks = joint_marks(structure, joints, shift=shift)
             past = (structure.ends + shift)[been[step]]
@@ -152,14 +161,25 @@ def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
     return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
 
 
-def _frames(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
-    """Numbers of the fields to show, and the frames a second that make them last as asked."""
+def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
+    """Even times to show, and the frames a second that make them last as asked."""
     for key, value in (("fps", fps), ("seconds", seconds)):
         if value is not None and not 0.0 < value < 1e4:
             raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
     lasting = seconds or max(float(times[-1] - times[0]), 1.0 / fps)
     count = min(len(times), max(1, round(lasting * fps)))
-    return np.linspace(0, len(times) - 1, count).round().astype(int), count / lasting
+    return np.linspace(times[0], times[-1], count), count / lasting
+
+
+def _fields(run: History, times: Array) -> Array:
+    """Coordinates at some times, straight between those that were kept (frames, n)."""
+    kept, fields = run.dataset["frame_time"].values, run.dataset["q"].values
+    if len(kept) == 1:
+        return np.repeat(fields, len(times), axis=0)
+    after = np.searchsorted(kept, times).clip(1, len(kept) - 1)
+    share = ((times - kept[after - 1]) / (kept[after] - kept[after - 1]))[:, None]
+    found: Array = (1.0 - share) * fields[after - 1] + share * fields[after]
+    return found
 
 
 def _check_picture(

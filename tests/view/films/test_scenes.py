@@ -6,9 +6,10 @@ import sys
 import imageio.v2 as imageio
 import numpy as np
 import pytest
+import xarray as xr
 
 import archfem as af
-from archfem.view.films.scenes import film, picture
+from archfem.view.films.scenes import _fields, _times, film, picture
 from archfem.view.style import HINGE, MOVED
 
 SIZE = (640, 400)  # small: rendering takes the time
@@ -46,6 +47,51 @@ def test_a_film_lasts_as_long_as_asked(model, run, tmp_path, asked, frames, fps)
     with imageio.get_reader(path) as read:
         assert read.count_frames() == frames
         assert read.get_meta_data()["fps"] == pytest.approx(fps, rel=0.01)
+
+
+def test_frames_follow_at_even_times_whatever_the_steps(model):
+    """Fields crowd at first; coordinates that grow with time do so in the film."""
+    kept = np.concatenate([np.linspace(0.0, 0.1, 50), [0.3, 0.45, 1.0]])
+    q = np.outer(kept, np.arange(1.0, 4.0))
+    run = af.History(
+        xr.Dataset({"q": (("frame", "coordinate"), q)}, {"frame_time": ("frame", kept)})
+    )
+    times, fps = _times(kept, 20.0, None)
+    assert fps == 20.0
+    assert np.diff(times) == pytest.approx(1.0 / 19.0)
+    assert _fields(run, times) == pytest.approx(np.outer(times, np.arange(1.0, 4.0)))
+
+
+def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
+    """Each frame tells its own time, and its joints are of a record next to it."""
+    time = np.linspace(0.0, 0.3, 61)
+    motion = af.Motion(6.0 * np.sin(2.0 * np.pi * time / 0.3), 0.005)
+    run = af.time_history(model, motion, record=af.Record(fields_every=2))
+    steps = np.diff(run.dataset["frame_time"].values)
+    assert steps.max() > 5.0 * steps.min()
+    times, _ = _times(run.dataset["frame_time"].values, 100.0, None)
+    fields = _fields(run, times)
+    assert np.diff(times) == pytest.approx(times[1] - times[0])
+    nearest = run.dataset["q"].values[
+        np.abs(run.dataset["frame_time"].values[:, None] - times).argmin(axis=0)
+    ]
+    assert np.abs(fields - nearest).max() < 0.2 * np.abs(fields).max()
+    path = film(model, run, tmp_path / "film.gif", fps=10, size=SIZE)
+    assert len(imageio.mimread(path)) == 3
+
+
+def test_a_picture_knows_what_joints_remember_or_says_that_it_does_not(coarse, caplog):
+    """Of an equilibrium its own memory counts; coordinates alone are warned of."""
+    dead = af.dead_load(coarse)
+    assert dead.model.memory.any()
+    of_state = picture(coarse, dead, size=SIZE)
+    of_joints = picture(coarse, dead.q, joints=dead.joints, size=SIZE)
+    assert not caplog.records
+    assert (of_state == of_joints).all()
+    picture(coarse, dead.q, size=SIZE)
+    assert "does not remember how far they had slid" in caplog.text
+    with pytest.raises(af.InvalidInput, match="of the 18 joints of this structure"):
+        picture(coarse, dead, joints=dead.joints.isel(joint=slice(3)), size=SIZE)
 
 
 def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):

@@ -1,0 +1,47 @@
+"""How long something holds, over steps of any lengths."""
+
+import numpy as np
+import pytest
+
+from archfem.joints.duration import Unbroken, first_lasting, step_lengths
+
+TIME = np.array([0.0, 1e-3, 1.2e-3, 1.5e-3, 5e-3, 6e-3])
+
+
+def test_a_record_lasts_for_the_step_that_ends_with_it():
+    assert step_lengths(TIME) == pytest.approx([1e-3, 1e-3, 2e-4, 3e-4, 3.5e-3, 1e-3])
+    assert step_lengths(np.array([2.0])).tolist() == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("up", "least", "expected"),
+    [
+        ([2], 1e-3, None),  # 0.2 ms
+        ([2, 3], 5e-4, 2),
+        ([2, 3], 6e-4, None),
+        ([2, 3, 5], 1e-3, 5),  # a break begins it anew
+        ([2, 3, 4], 4e-3, 2),
+        ([0], 1e-3, 0),
+        ([2], 0.0, 2),
+        ([], 0.0, None),
+    ],
+)
+def test_the_first_of_what_lasts_is_found(up, least, expected):
+    assert first_lasting(up, TIME, least, lambda instant: instant) == expected
+    # the same where every record is looked at, and by a watch of each step
+    every = first_lasting(range(6), TIME, least, lambda k: k if k in up else None)
+    unbroken, lengths = Unbroken(least), step_lengths(TIME)
+    ends = [k for k in range(6) if unbroken.lasts(k in up, float(lengths[k]))]
+    assert every == expected
+    assert bool(ends) == (expected is not None)
+
+
+def test_a_single_record_is_a_state_that_stays():
+    assert first_lasting([0], np.array([1.0]), 1e-3, lambda instant: instant) == 0
+
+
+def test_steps_as_long_as_the_least_count_whatever_the_round_off():
+    time = 1e-3 * np.arange(3000)
+    assert np.diff(time).min() < 1e-3
+    for instant in range(1, 3000, 7):
+        assert first_lasting([instant], time, 1e-3, lambda number: number) == instant
