@@ -80,7 +80,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         dt: for "auto", the time step of the run to come [s]. Without it steps choose their length,
             by a tolerance that is chosen too. Their error counts either way.
         displacements: "small", or "large" where blocks may turn and slide as far as they like,
-            fall, on the rungs "rigid" and "faces"; without a rung "faces" is taken.
+            and fall, on the rungs "rigid" and "faces".
 
     Raises:
         InvalidInput: an option is not one of those above.

@@ -192,6 +192,17 @@ class Moving:
         """
         return self.assembled(1.0, 2.0, self._at(q).rate)
 
+    def pulled(self, q: Array, motion: Array) -> Array:
+        """Return the change of `force` by a small motion of the supports, nearly (n,).
+
+        As if blocks had not turned yet: it is a first guess that is asked for.
+
+        Args:
+            q: coordinates (n,).
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
+        return self.at_rest.remembering(self.memory).pulled(q, motion)
+
     def closed(self) -> sparse.csr_matrix:
         """Return the tangent before anything moves, with every joint closed (n, n)."""
         return self._pattern.spread(self.at_rest.closed())
