@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.joints.criteria import Criteria, failing
+from archfem.joints.criteria import Criteria, borne, failing
 from archfem.joints.resultants import joint_dataset, ratios
 from archfem.masonry.structure import Structure
 
@@ -27,6 +27,7 @@ class Glance:
         self._numbers = np.array(numbers, dtype=np.intp)
         self._depth = structure.depths[self._numbers]
         self._coefficients = criteria.coefficients(structure.friction[self._numbers])
+        self._tension = structure.tension[self._numbers]
         self._seen: set[bytes] = set()
 
     def __call__(self, resultants: Array, least: int) -> xr.Dataset | None:
@@ -42,7 +43,7 @@ class Glance:
         own = resultants[self._numbers]
         e, friction = ratios(own, self._depth)
         hinges, slides = failing(e, friction, self._coefficients, self._criteria.hinge)
-        apart = own[:, 0] <= 0.0
+        apart = borne(own[:, 0], self._tension) <= 0.0
         if np.count_nonzero(hinges | slides | apart) < least:
             return None
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)

@@ -22,6 +22,9 @@ USED_UP = 1e-6
 """Friction left, relative to its limit, below which it is used up: round-off decides nothing there.
 Well above that of programmes and equilibria (1e-9), well below what friction is known to."""
 
+BONDED = "tension"
+"""Coordinate of a dataset with the tensile strengths of its joints; left out where none has any."""
+
 PREFIX = "criteria_"
 """Of the attributes of a dataset that tell by which criteria its joints were judged."""
 
@@ -126,11 +129,12 @@ def flags(
 
     `hinge` is the face on which a joint hinges (1 extrados, -1 intrados, where it stays closed; 0
     none), `slide` says whether its mobilised friction has reached its coefficient, and `open`
-    whether it has come apart over its whole depth.
+    whether it has come apart over its whole depth. Bonds do not matter to the first two; a joint
+    that is pulled and holds is not open.
 
     Args:
         dims: names of the dimensions, the last that of the joints.
-        normal: N (…, n_joints) [N].
+        normal: N, its size alone where a joint has a bond (…, n_joints) [N].
         ratios: eccentricity and mobilised friction (…, n_joints) [-].
         coefficients: of friction (n_joints,) [-].
         hinge: |e| from which a joint hinges [-].
@@ -142,6 +146,16 @@ def flags(
         "slide": (dims, slides, {"long_name": "whether its friction is used up"}),
         "open": (dims, normal <= 0.0, {"long_name": "whether it has come apart"}),
     }
+
+
+def borne(normal: NDArray[np.float64], tension: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return normal forces, of joints with a bond their size alone: pulled, they are not open [N].
+
+    Args:
+        normal: N (…, n_joints) [N].
+        tension: tensile strengths (n_joints,) [Pa].
+    """
+    return np.where(tension > 0.0, np.abs(normal), normal)
 
 
 def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
@@ -159,8 +173,10 @@ def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
         for name in ("N", "eccentricity", "friction")
     )
     coefficients = criteria.coefficients(joints["friction_limit"].values)
-    ratios = e.values, friction.values
-    result = joints.assign(flags(e.dims, normal.values, ratios, coefficients, criteria.hinge))
+    ratios, carried = (e.values, friction.values), normal.values
+    if BONDED in joints.coords:
+        carried = borne(carried, joints[BONDED].values)
+    result = joints.assign(flags(e.dims, carried, ratios, coefficients, criteria.hinge))
     counts = np.isin(joints["part"].values.astype(str), judged_parts(roles_of(joints)))
     result.coords["judged"] = (joints["part"].dims, counts)
     others = {key: value for key, value in joints.attrs.items() if not key.startswith(PREFIX)}

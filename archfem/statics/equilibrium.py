@@ -18,7 +18,8 @@ from archfem.models.gauges import Gauges
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.unfinished import Unfinished
-from archfem.statics.newton import Newton, Solved, Solver, magnitude
+from archfem.statics.lasting import lasting
+from archfem.statics.newton import Newton, Solved, Solver
 from archfem.statics.relaxation import relaxed
 
 A_LITTLE = 1e-9
@@ -96,7 +97,8 @@ def dead_load(
 ) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
-    Joints open and slide as they must (nonlinear statics); where Newton's method fails the
+    Joints open and slide as they must (nonlinear statics), those that dilate ride up, and bonds
+    that are overstrained break, until none does any more; where Newton's method fails the
     structure creeps to rest, or steps of the load are halved. Displacements are small: the
     structure keeps its shape.
 
@@ -208,7 +210,7 @@ def _grown(
         try:
             model, solved = find(solver, model, load, _followed(found, model))
         except DidNotConverge as error:
-            step, find = step / 2.0, _found
+            step, find = step / 2.0, lasting
             if step >= SMALLEST_STEP:
                 continue
             raise DidNotConverge(
@@ -221,18 +223,12 @@ def _grown(
     return found
 
 
-def _found(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
-    """An equilibrium by Newton's method, and the model with what its joints then remember."""
-    solved = solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
-    return model.remembering(model.remembered(solved.q)), solved
-
-
 def _found_or_crept(
     solver: Solver, model: Model, load: Array, start: Array
 ) -> tuple[Model, Solved]:
-    """The same; where Newton's method fails, the structure creeps there."""
+    """An equilibrium by Newton's method; where that fails, the structure creeps there."""
     try:
-        return _found(solver, model, load, start)
+        return lasting(solver, model, load, start)
     except DidNotConverge:
         return relaxed(solver, model, load, start)
 

@@ -1,0 +1,61 @@
+"""Equilibria that last: joints which dilate, or break, upset the one in which they did.
+
+What a dry joint has slid changes none of its forces. Saw teeth raise what has slid on them, and a
+bond that breaks lets go of what it held: then equilibrium is sought again, from where the structure
+is, until nothing slides or breaks any more. Of bonds all break at once that are overstrained.
+"""
+
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.errors import DidNotConverge
+from archfem.models.model import Model
+from archfem.statics.newton import Solved, Solver, magnitude
+
+ROUNDS = 300
+"""In which joints may slide or break under the same load, each followed by an equilibrium."""
+
+
+def upset(model: Model) -> bool:
+    """Return whether what the joints remember may change their forces.
+
+    Args:
+        model: any rung.
+    """
+    return model.operator is not None and not model.operator.points.plain
+
+
+def lasting(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
+    """Find an equilibrium that what the joints remember of it does not upset.
+
+    Args:
+        solver: for the pattern of this model's tangents.
+        model: with what its joints remember at the start.
+        load: generalised forces (n,).
+        start: first guess (n,).
+
+    Returns:
+        The model with what its joints remember there, and the coordinates.
+
+    Raises:
+        DidNotConverge: there is no equilibrium, or joints go on sliding or breaking.
+    """
+    q, iterations = start, 0
+    for number in range(ROUNDS):
+        solved = _balanced(solver, model, load, q)
+        q, iterations = solved.q, iterations + solved.iterations
+        if number > 0 and solved.iterations == 0:  # it was in balance as it had been left
+            return model, Solved(q, iterations, solved.residual)
+        before, model = model.memory, model.remembering(model.remembered(q))
+        if not upset(model):
+            return model, solved
+    further = float(np.abs(model.memory - before).max())
+    raise DidNotConverge(
+        f"joints that dilate or break go on to do so in {ROUNDS} rounds under the same load, by "
+        f"{further:.2g} m in the last one: give less dilatancy, or softer joints across than along"
+    )
+
+
+def _balanced(solver: Solver, model: Model, load: Array, start: Array) -> Solved:
+    """An equilibrium by Newton's method, whatever the joints then remember."""
+    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, magnitude(load))
