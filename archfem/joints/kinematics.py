@@ -101,7 +101,9 @@ class JointKinematics:
         return (self.sums[0] @ sparse.diags(self.points.shear) @ self.slip).tocsr()
 
     def tangents(self, pattern: Pattern) -> sparse.csr_matrix:
-        """Return the linear map from `JointOperator.stiffness` to the entries of the tangent (nnz, m).
+        """Return the linear map from stiffnesses to the entries of the tangent (nnz, m).
+
+        Stiffnesses are those of `JointOperator.stiffness`.
 
         Args:
             pattern: that has all `couplings` (nnz entries).

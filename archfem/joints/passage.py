@@ -16,12 +16,16 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.joints.bonds import ridden
-from archfem.joints.law import excess, held, shear_over_step
+from archfem.joints.law import NONE, excess, held, shear_over_step
 from archfem.joints.operator import JointOperator
 
 RAISED = 1e-9
 """Difference between where teeth are taken to be at the end of a step and where slip puts them, of
 the farthest that they move or, if that is more, of an elastic slip up to the limit: rounding."""
+
+
+LEAST, MOST = 0.05, 2.0
+"""Shares of what teeth have missed that are made up in a turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +37,15 @@ class Passage:
         start: coordinates at its start (n,).
         late: lag of damping over the length of the step, β/Δt [-].
         raised: how far teeth raise each point at the end (p,) [m]; None as at the start.
+        turn: by how much that was missed the turn before (p,) [m], and the share of it that was
+            made up [-].
     """
 
     operator: JointOperator
     start: Array
     late: float
     raised: Array | None = None
+    turn: tuple[Array, float] | None = None
 
     @cached_property
     def _before(self) -> tuple[Array, Array]:
@@ -119,9 +126,11 @@ class Passage:
         assert found is not None
         far = np.abs(found - begun).max()
         elastic = (points.dilatancy * limit / points.shear).max()
-        if np.abs(found - taken).max() <= RAISED * max(far, elastic):
+        missed = found - taken
+        if np.abs(missed).max() <= RAISED * max(far, elastic):
             return self
-        return replace(self, raised=found)
+        share = 1.0 if self.turn is None else _share(missed, *self.turn)
+        return replace(self, raised=taken + share * missed, turn=(missed, share))
 
     def _rise(self) -> Array | float:
         """How far teeth rise over the step (p,) [m]."""
@@ -191,3 +200,13 @@ class Passage:
         by_change = 0.5 * (1.0 - slid) ** 2 + self.late
         by_limit = (1.0 - slid) * lost + slid * np.sign(change)
         return np.where(rubs, 0.0, by_change), np.where(rubs, np.sign(mean), by_limit)
+
+
+def _share(missed: Array, before: Array, share: float) -> float:
+    """Share of what is missed to make up in the next turn, by Aitken's method.
+
+    Irons and Tuck, Int. J. Numer. Meth. Eng. 1 (1969) 275-277.
+    """
+    change = missed - before
+    found = -share * float(before @ change) / max(float(change @ change), NONE)
+    return min(max(found, LEAST), MOST)

@@ -96,7 +96,8 @@ def stepper_for(
                 f"{equation.model.size} coordinates under this damping: contact needs at most "
                 f"{LARGEST} of them and damping on closed or initial joints, chain a bandwidth up "
                 f"to {WIDEST} and Newmark's method or HHT, with which all three need joints whose "
-                "supports have not moved; joints that dilate or resist tension and monolithic models have none; use method='snes'"
+                "supports have not moved; joints that dilate or resist tension have none, nor have "
+                "monolithic models; use method='snes'"
             )
     return Stepper(equation, strategy, exact=Exact(equation, newton))
 
