@@ -24,6 +24,9 @@ from archfem.joints.points import JointPoints
 EXCEEDED = 1e-9
 """Excess over the strength of a bond, relative to it, that is rounding of one that holds."""
 
+ALIKE = 1e-6
+"""Difference between gaps, relative, by which points of a joint gape alike and break together."""
+
 
 def ridden(points: JointPoints, slid: Array) -> Array | None:
     """Return how far saw teeth raise each point (p,) [m]; None where none has teeth.
@@ -82,16 +85,35 @@ class Bonds:
         stored: Array = self.pull * (felt + 0.5 * self.stretch)
         return stored
 
-    def after(self, felt: Array, excess: Array, limit: Array) -> Array:
+    def torn(self, felt: Array) -> NDArray[np.bool_]:
+        """Return which bonds are pulled beyond their strength (p,).
+
+        Args:
+            felt: gap that the law sees (p,) [m].
+        """
+        torn: NDArray[np.bool_] = self.intact & (felt > EXCEEDED * self.stretch)
+        return torn
+
+    def worst(self, felt: Array) -> NDArray[np.bool_]:
+        """Return which bonds are torn, of each joint only where it gapes most (p,).
+
+        Args:
+            felt: gap that the law sees (p,) [m].
+        """
+        torn, joint = self.torn(felt), self.law.points.joint
+        most = np.zeros(self.law.points.count)
+        np.maximum.at(most, joint, np.where(torn, felt, 0.0))
+        return torn & (felt >= (1.0 - ALIKE) * most[joint])
+
+    def after(self, torn: NDArray[np.bool_], excess: Array, limit: Array) -> Array:
         """Return where bonds are broken at the end of a step, as `broken` (p,).
 
         Args:
-            felt: gap that the law sees then (p,) [m].
+            torn: which are pulled apart (p,).
             excess: shear that friction did not hold, 0 where a point never slides (p,) [N].
             limit: of the shear (p,) [N].
         """
         points = self.law.points
-        torn = felt > EXCEEDED * self.stretch
         most = EXCEEDED * (limit + points.cohesion * points.weight)
         broken = self.intact & (torn | (np.abs(excess) > most))
         return np.where(broken, 1.0, self.broken)

@@ -172,28 +172,41 @@ class JointOperator(JointKinematics):
         return 0.0 if self.bonds is None else float(self.bonds.stored(felt).sum())
 
     def remembered(self, q: Array) -> Array:
-        """Return what the joints remember once they are at q, as `memory`.
+        """Return what the joints remember once they are at rest at q, as `memory`.
+
+        Of bonds that are torn those break first where each joint gapes most: what they held goes to
+        the others, which may bear it.
 
         Args:
             q: coordinates (n,).
         """
+        excess = self.elastic(q) - self.tractions(q)[1]
+        if self.bonds is None:
+            return self.slid_by(excess)
         felt = self.felt(q)
         limit = self.limits(self.law.forces(felt), self.law.closed(felt))
-        return self.further(felt, self.elastic(q) - self.tractions(q)[1], limit)
+        return self.further(self.bonds.worst(felt), excess, limit)
 
-    def further(self, felt: Array, excess: Array, limit: Array) -> Array:
-        """Return what the joints remember at the end of a step, as `memory`.
+    def slid_by(self, excess: Array) -> Array:
+        """Return how far each point has slid for good at the end of a step (p,) [m].
 
         Args:
-            felt: gap that the normal law sees there (p,) [m].
+            excess: shear that friction did not hold on the way (p,) [N].
+        """
+        slid: Array = self._slid + np.where(self.points.slides, excess / self.points.shear, 0.0)
+        return slid
+
+    def further(self, torn: Status, excess: Array, limit: Array) -> Array:
+        """Return what joints with bonds remember at the end of a step, as `memory` (2 p,).
+
+        Args:
+            torn: which bonds are pulled apart (p,).
             excess: shear that friction did not hold on the way (p,) [N].
             limit: of the shear (p,) [N].
         """
-        excess = np.where(self.points.slides, excess, 0.0)
-        slid: Array = self._slid + excess / self.points.shear
-        if self.bonds is None:
-            return slid
-        return np.concatenate([slid, self.bonds.after(felt, excess, limit)])
+        assert self.bonds is not None
+        over = np.where(self.points.slides, excess, 0.0)
+        return np.concatenate([self.slid_by(excess), self.bonds.after(torn, over, limit)])
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).

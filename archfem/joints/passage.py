@@ -104,8 +104,10 @@ class Passage:
             q: coordinates at the end (n,).
         """
         operator, (_, _, limit, last) = self.operator, self._over(q)
-        felt = operator.felt(q, self.raised)
-        return operator.further(felt, operator.elastic(q) - last, limit)
+        excess = operator.elastic(q) - last
+        if operator.bonds is None:
+            return operator.slid_by(excess)
+        return operator.further(operator.bonds.torn(operator.felt(q, self.raised)), excess, limit)
 
     def raising(self, q: Array) -> "Passage":
         """Return the same step with teeth where the slip on the way to q puts them.
@@ -203,10 +205,8 @@ class Passage:
 
 
 def _share(missed: Array, before: Array, share: float) -> float:
-    """Share of what is missed to make up in the next turn, by Aitken's method.
-
-    Irons and Tuck, Int. J. Numer. Meth. Eng. 1 (1969) 275-277.
-    """
+    """Share of what is missed to make up in the next turn, by Aitken's method."""
+    # Irons and Tuck, Int. J. Numer. Meth. Eng. 1 (1969) 275-277.
     change = missed - before
     found = -share * float(before @ change) / max(float(change @ change), NONE)
     return min(max(found, LEAST), MOST)

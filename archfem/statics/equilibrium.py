@@ -18,7 +18,7 @@ from archfem.models.gauges import Gauges
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.unfinished import Unfinished
-from archfem.statics.lasting import lasting
+from archfem.statics.lasting import lasting, upset
 from archfem.statics.newton import Newton, Solved, Solver
 from archfem.statics.relaxation import relaxed
 
@@ -230,7 +230,8 @@ def _found_or_crept(
     try:
         return lasting(solver, model, load, start)
     except DidNotConverge:
-        return relaxed(solver, model, load, start)
+        model, solved = relaxed(solver, model, load, start)
+        return lasting(solver, model, load, solved.q) if upset(model) else (model, solved)
 
 
 def _followed(found: Equilibrium, model: Model) -> Array:

@@ -2,7 +2,8 @@
 
 What a dry joint has slid changes none of its forces. Saw teeth raise what has slid on them, and a
 bond that breaks lets go of what it held: then equilibrium is sought again, from where the structure
-is, until nothing slides or breaks any more. Of bonds all break at once that are overstrained.
+is, until nothing slides or breaks any more. Of bonds that are torn those break first where each
+joint gapes most, so that a crack goes on from its tip, and stops where the rest bears the load.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from archfem.errors import DidNotConverge
 from archfem.models.model import Model
 from archfem.statics.newton import Solved, Solver, magnitude
 
-ROUNDS = 300
+ROUNDS = 1000
 """In which joints may slide or break under the same load, each followed by an equilibrium."""
 
 
@@ -23,6 +24,20 @@ def upset(model: Model) -> bool:
         model: any rung.
     """
     return model.operator is not None and not model.operator.points.plain
+
+
+def lasts(model: Model, q: Array, iterations: int) -> bool:
+    """Return whether an equilibrium lasts: it was in balance as it had been left, and none is torn.
+
+    Args:
+        model: with what its joints remember of the one before.
+        q: coordinates (n,).
+        iterations: by which it was found.
+    """
+    operator = model.operator
+    if iterations > 0 or operator is None or operator.bonds is None:
+        return iterations == 0
+    return not operator.bonds.torn(operator.felt(q)).any()
 
 
 def lasting(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
@@ -44,7 +59,7 @@ def lasting(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Mo
     for number in range(ROUNDS):
         solved = _balanced(solver, model, load, q)
         q, iterations = solved.q, iterations + solved.iterations
-        if number > 0 and solved.iterations == 0:  # it was in balance as it had been left
+        if number > 0 and lasts(model, solved.q, solved.iterations):
             return model, Solved(q, iterations, solved.residual)
         before, model = model.memory, model.remembering(model.remembered(q))
         if not upset(model):

@@ -15,7 +15,7 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
-from archfem.statics.lasting import ROUNDS, lasting, upset
+from archfem.statics.lasting import ROUNDS, lasting, lasts, upset
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
 
 TOLERANCE, ITERATIONS = 1e-9, 30
@@ -133,7 +133,7 @@ class LoadPath:
             if found is None:
                 return False
             x, taken = found[0], taken + found[1]
-            if not upset(model) or (number > 0 and found[1] == 0):
+            if not upset(model) or (number > 0 and lasts(model, x[:-1], found[1])):
                 self._add(model, x, taken)
                 return True
             model = model.remembering(model.remembered(x[:-1]))

@@ -46,7 +46,7 @@ def drift(energies):
     return np.abs(balance).max() / largest, energy[:, 3].min() / largest
 
 
-@pytest.mark.parametrize("dt", [4e-3, 1e-3])
+@pytest.mark.parametrize("dt", [8e-3, 2e-3])
 def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
     """m (g + t s̈) = N and m s̈ = -μ N: it stops after v² (1 + μ t) / (2 μ g), risen by t of that.
 
@@ -71,13 +71,13 @@ def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
     assert lost == pytest.approx((friction - teeth) * 2e3 / along * way, rel=1e-3)
 
 
-def test_without_teeth_the_same_block_stops_where_friction_alone_has_it():
-    """v² / (2 μ g), by the same stepper of every strategy: dilatancy 0 is the contact as it was."""
-    plain, given = block(1e10, friction=0.5), block(1e10, friction=0.5, dilatancy=0.0)
+def test_without_teeth_and_bonds_nothing_changes():
+    """Dilatancy 0 and tension 0 are the contact as it was, to the last bit of a history."""
+    plain, given = block(1e10, friction=0.5), block(1e10, friction=0.5, dilatancy=0.0, tension=0.0)
     assert plain is not given
     assert plain.structure == given.structure
     assert given.operator.points.plain
-    histories = [af.time_history(each, pulse(), dt=2e-3) for each in (plain, given)]
+    histories = [af.time_history(each, pulse(), dt=0.01, method="snes") for each in (plain, given)]
     assert np.array_equal(*(each.dataset["last_q"].values for each in histories))
 
 
@@ -92,7 +92,7 @@ def pulse(peak=8.0, duration=0.4, dt=0.05):
 def test_a_block_that_slides_to_and_fro_rises_by_how_far_it_is_out():
     """Whatever the way there: at every step the rise is tan ψ |slid|, but for how it is pressed."""
     model = block(1e10, friction=0.3, dilatancy=0.15)
-    start, states, _, energies = run(model, pulse(), 2e-3)
+    start, states, _, energies = run(model, pulse(), 4e-3)
     slid = np.array([state.memory.mean() for state in states])
     rise = np.array([state.q[1] - start.q[1] for state in states])
     assert np.ptp(slid) > 0.02
@@ -121,7 +121,7 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     times = np.array([state.time for state in states])
     moved = np.array([state.q[1] for state in states]) - start.q[1]
     size = 0.99 * speed / omega
-    assert moved == pytest.approx(size * np.sin(omega * times), abs=1e-3 * size)
+    assert moved == pytest.approx(size * np.sin(omega * times), abs=5e-3 * size)
     assert resultants[:, 0].min() == pytest.approx(2e3 - stiffness * size, rel=1e-3)
     assert drift(energies)[0] < 1e-8
     start, states, resultants, energies = run(model, short, 5e-4, [0.0, 1.1 * speed, 0.0])
@@ -132,7 +132,7 @@ def test_a_bonded_block_swings_as_a_linear_one_until_it_breaks():
     assert least >= -1e-12
     lost = energies[1][:, 3].sum()
     assert lost == pytest.approx(0.5 * tension**2 / stiffness, rel=0.05)
-    assert resultants[-1, 0] == 0.0  # it flies
+    assert np.sum(resultants[:, 0] == 0.0) > 100  # it flies
 
 
 def test_what_a_bond_loses_tends_to_its_elastic_energy():
@@ -140,9 +140,9 @@ def test_what_a_bond_loses_tends_to_its_elastic_energy():
     stiffness, mass, tension = 1e6, 2e3 / GRAVITY, 4e3
     model = block(stiffness, friction=None, tension=tension)
     speed = 1.1 * (tension + 2e3) / stiffness * np.sqrt(stiffness / mass)
-    short, expected = af.Motion(np.zeros(3), 0.05), 0.5 * tension**2 / stiffness
+    short, expected = af.Motion(np.zeros(2), 0.06), 0.5 * tension**2 / stiffness
     errors = []
-    for dt in (1e-3, 1e-4):
+    for dt in (1e-3, 2e-4):
         *_, energies = run(model, short, dt, [0.0, speed, 0.0])
         errors.append(energies[1][:, 3].sum() / expected - 1.0)
     assert 0.0 <= errors[1] < 0.02
@@ -171,19 +171,19 @@ def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
 
 def test_a_history_can_be_continued_from_its_file(tmp_path):
     """What is broken and slid passes with `last_state`, of a run as saved."""
-    given = {"friction": 0.3, "cohesion": 5e3, "tension": 2e3, "dilatancy": 0.1}
+    given = {"friction": 0.3, "cohesion": 6e2, "tension": 2e3, "dilatancy": 0.1}
     model = block(1e9, **given)
-    motion = pulse(peak=60.0)
-    whole = af.time_history(model, motion, dt=2e-3)
-    part = af.time_history(model, motion.cut(0.0, 0.3), dt=2e-3)
+    motion = pulse()
+    whole = af.time_history(model, motion, dt=5e-3)
+    part = af.time_history(model, motion.cut(0.0, 0.3), dt=5e-3)
     assert part.dataset.attrs["method"] == "snes"
     part.save(tmp_path / "part.nc")
-    kept = af.History.load(tmp_path / "part.nc")
+    kept = af.dynamics.History.read(tmp_path / "part.nc")
     state = af.dynamics.last_state(kept)
     count = len(model.operator.points.arm)
     assert state.memory.shape == (2 * count,)
     assert state.memory[count:].any()
-    rest = af.time_history(model, motion, dt=2e-3, start=state)
+    rest = af.time_history(model, motion, dt=5e-3, start=state)
     assert rest.dataset["last_q"].values == pytest.approx(whole.dataset["last_q"].values, rel=1e-6)
     assert "tension" in kept.joints.coords
 
@@ -194,4 +194,4 @@ def test_compiled_methods_and_old_schemes_say_that_they_cannot():
         af.time_history(model, STILL, dt=1e-3, method="contact")
     bonded = block(1e9, friction=None, tension=1e3)
     with pytest.raises(af.InvalidInput, match="follows no bonds"):
-        af.time_history(bonded, STILL, dt=1e-3, scheme=af.Newmark())
+        af.time_history(bonded, STILL, dt=1e-3, scheme=af.dynamics.Newmark())

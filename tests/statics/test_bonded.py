@@ -87,24 +87,25 @@ def cracked(moment, tension):
 def test_a_crack_stops_where_the_rest_bears_the_load(fidelity):
     """f_t = 10 kPa, M = 6 kN m: a crack of a quarter of the depth, to one of 32 facets.
 
-    The turn is that of the part that bears, to 5 %; a dry bed, which is open farther, turns more.
+    The turn is that of the part that bears, to 3 %; a dry bed, which is open farther, turns more.
+    Cohesion is so large that no bond breaks by shear, which is 12 kPa, nor dry does it slide.
     """
-    given = {"friction": 0.9, "cohesion": 20e3, "cells": 32}
+    given = {"friction": 0.9, "cohesion": 60e3, "cells": 32}
     state = under(block(fidelity, tension=10e3, **given), 0.6, -1.0)
     depth, turn = cracked(6e3, 10e3)
     assert 0.7 < depth < 0.8
     assert np.mean(broken(state)) == pytest.approx(1.0 - depth, abs=1.0 / 32.0)
     turned = abs(float(state.joints["rotation"][0]))
-    assert turned == pytest.approx(turn, rel=0.05)
+    assert turned == pytest.approx(turn, rel=0.03)
     dry = under(block(fidelity, **given), 0.6, -1.0)
-    assert turned < 0.9 * abs(float(dry.joints["rotation"][0]))
+    assert turned < 0.95 * abs(float(dry.joints["rotation"][0]))
     for key in ("N", "V", "M"):
         assert float(state.joints[key][0]) == pytest.approx(float(dry.joints[key][0]), rel=1e-8)
 
 
 def test_what_is_broken_stays_broken():
     """Unloaded and loaded again, to what a fresh bed bears unbroken, it turns more than that."""
-    model = block(friction=0.9, cohesion=20e3, tension=10e3, cells=16)
+    model = block(friction=0.9, cohesion=60e3, tension=10e3, cells=16)
     first = under(model, 0.6, -1.0)
     rest = under(model, 0.0, -1.0, first)
     again = under(model, 0.45, -1.0, rest)
@@ -223,3 +224,36 @@ def confined(steps):
     slid = np.abs(path.model.memory).mean()
     expected = 2.0 * TEETH["friction"] * STIFFNESS * TEETH["dilatancy"] * slid
     return path.factors[-1] * 2e3 / expected - 1.0
+
+
+def test_limit_analysis_refuses_bonds():
+    """Bonds break and do not yield; saw teeth are left out with a warning."""
+    with pytest.raises(af.InvalidInput, match="bonds break"):
+        af.collapse_factor(bonded().structure, live=af.BodyForce(1.0, 0.0))
+    with pytest.raises(af.InvalidInput, match="bonds break"):
+        af.stands(bonded().structure)
+
+
+def test_limit_analysis_tells_of_teeth_that_it_leaves_out(caplog):
+    structure = block(height=0.1, **TEETH).structure
+    found = af.collapse_factor(structure, live=af.BodyForce(1.0, 0.0), friction="nonassociated")
+    assert found.factor == pytest.approx(0.5, rel=1e-6)
+    assert "joints dilate by up to 0.2" in caplog.text
+
+
+def test_weak_forms_say_who_knows_teeth_and_bonds():
+    for given in (TEETH, {"friction": None, "tension": 1e3}):
+        structure = block(height=0.1, **given).structure
+        with pytest.raises(af.InvalidInput, match="use 'full'"):
+            af.build(structure, fidelity="monolithic")
+
+
+def test_bonds_of_a_structure_that_is_built_in_stages():
+    """A stack of two: laid one on the other it stands, unbroken, as built in one go."""
+    contact = af.Contact(STIFFNESS, STIFFNESS, 0.5, cohesion=1e5, tension=TENSION)
+    structure = af.column(breadth=1.0, heights=[1.0, 1.0], contact=contact)
+    model = af.build(structure, fidelity="rigid")
+    staged = af.dead_load(model, stages=af.masonry.usual_stages(structure))
+    whole = af.dead_load(model)
+    assert not staged.model.memory.any()
+    assert staged.joints["N"].values == pytest.approx(whole.joints["N"].values, rel=1e-9)
