@@ -91,16 +91,15 @@ def pulse(peak=8.0, duration=0.4, dt=0.05):
 
 def test_a_block_that_slides_to_and_fro_rises_by_how_far_it_is_out():
     """Whatever the way there: at every step the rise is tan ψ |slid|, but for how it is pressed."""
-    model = block(1e10, friction=0.3, dilatancy=0.15)
+    model = block(1e8, friction=0.3, dilatancy=0.15)
     start, states, _, energies = run(model, pulse(), 4e-3)
     slid = np.array([state.memory.mean() for state in states])
     rise = np.array([state.q[1] - start.q[1] for state in states])
     assert np.ptp(slid) > 0.02
     assert np.any(np.diff(np.abs(slid)) < -1e-5)  # it comes down as well
-    closed = np.array([model.operator.felt(state.q).min() for state in states[-50:]])
-    assert np.all(closed > -1.0)
-    landed = slice(-50, None)
-    assert rise[landed] == pytest.approx(0.15 * np.abs(slid[landed]), abs=1e-5)
+    pressed = 2.0 * 2e3 / 1e8  # twice what the weight alone does, where the motion lifts it
+    assert rise == pytest.approx(0.15 * np.abs(slid), abs=pressed)
+    assert rise.max() > 50.0 * pressed
     off, least = drift(energies)
     assert off < 1e-8
     assert least >= -1e-12
@@ -158,7 +157,7 @@ def test_a_ring_of_teeth_and_bonds_neither_gains_nor_loses(rule, damping):
         radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, contact=contact
     )
     model = af.build(structure, fidelity="rigid", quadrature=rule, cells=(1, 1))
-    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 1.2)
+    motion = af.Motion.synthetic(duration=2.0, pga=8.0, seed=3).cut(0.4, 0.9)
     _, states, _, energies = run(model, motion, 0.005, damping=damping)
     memory = states[-1].memory
     count = len(memory) // 2
