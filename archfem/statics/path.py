@@ -15,6 +15,7 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
+from archfem.statics.lasting import ROUNDS, lasts, upset
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
 from archfem.statics.search import followed, found_or_crept
 
@@ -122,39 +123,53 @@ class LoadPath:
     def _reached(
         self, row: sparse.csr_matrix, target: float, distance: float, share: float
     ) -> bool:
-        """Add the equilibrium where row × (q, λ) is the target; tangents share the closed one.
+        """Add the equilibrium where row × (q, λ) is the target, once it lasts.
 
         Returns:
             Whether Newton's method found it.
         """
-        column = sparse.csr_matrix(-self.live[:, None])
-        x = np.append(self.states[-1], self.factors[-1])
-        for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
-            tangent = self.model.tangent(x[:-1])
-            rest, ahead = self._rest(x), target - row @ x
-            if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
-                self._add(x, iteration)
-                return True
-            if share > 0.0:
-                tangent = (1.0 - share) * tangent + share * self.model.closed()
-            matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
-            try:
-                x = x + splu(matrix).solve(np.append(rest, ahead))
-            except RuntimeError:  # SuperLU: exactly singular
+        model, x, taken = self.model, np.append(self.states[-1], self.factors[-1]), 0
+        for number in range(ROUNDS):
+            found = self._balanced(model, x, (row, target, distance), share)
+            if found is None:
                 return False
+            x, taken = found[0], taken + found[1]
+            if not upset(model) or (number > 0 and lasts(model, x[:-1], found[1])):
+                self._add(model, x, taken)
+                return True
+            model = model.remembering(model.remembered(x[:-1]))
         return False
 
-    def _add(self, x: Array, iterations: int) -> None:
+    def _balanced(
+        self, model: Model, x: Array, ahead: tuple[sparse.csr_matrix, float, float], share: float
+    ) -> tuple[Array, int] | None:
+        """Find (q, λ) in one (n + 1,) and its iterations; tangents share the closed one."""
+        (row, target, distance), column = ahead, sparse.csr_matrix(-self.live[:, None])
+        for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
+            tangent = model.tangent(x[:-1])
+            rest, missing = self._rest(model, x), target - row @ x
+            if abs(missing) <= TOLERANCE * distance and self._fits(rest, x, tangent):
+                return x, iteration
+            if share > 0.0:
+                tangent = (1.0 - share) * tangent + share * model.closed()
+            matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
+            try:
+                x = x + splu(matrix).solve(np.append(rest, missing))
+            except RuntimeError:  # SuperLU: exactly singular
+                return None
+        return None
+
+    def _add(self, model: Model, x: Array, iterations: int) -> None:
         """Add an equilibrium, (q, λ) in one (n + 1,), and what the joints remember of it."""
         self.states.append(x[:-1])
-        self.resisted.append(self.model.resultants(x[:-1]))
-        self.model = self.model.remembering(self.model.remembered(x[:-1]))
+        self.resisted.append(model.resultants(x[:-1]))
+        self.model = model.remembering(model.remembered(x[:-1]))
         self.factors.append(float(x[-1]))
         self.iterations.append(iterations)
 
-    def _rest(self, x: Array) -> Array:
+    def _rest(self, model: Model, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
-        rest: Array = self.dead + x[-1] * self.live - self.model.force(x[:-1])
+        rest: Array = self.dead + x[-1] * self.live - model.force(x[:-1])
         return rest
 
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
