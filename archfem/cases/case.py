@@ -175,7 +175,7 @@ class Case:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        check_scheme(self.analysis, self.structure.friction)
+        check_scheme(self.analysis, self.structure)
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")

@@ -1,6 +1,5 @@
 """How a case file says that time is stepped: damping and scheme."""
 
-from archfem.arrays import Array
 from archfem.cases.settings import Table
 from archfem.dynamics.schemes import (
     HHT,
@@ -14,6 +13,7 @@ from archfem.dynamics.schemes import (
     check_sliding,
 )
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
 
 
 def damping_asked(analysis: Table) -> Viscous | EffectiveDamping | None:
@@ -64,21 +64,21 @@ def scheme_asked(analysis: Table) -> Scheme:
     return known[name]() if alpha is None else HHT(alpha)
 
 
-def check_scheme(analysis: Table, friction: Array) -> None:
+def check_scheme(analysis: Table, structure: Structure) -> None:
     """Refuse a scheme that cannot follow what the contacts say, in the words of the file.
 
     Args:
         analysis: the table of that name.
-        friction: coefficients of the joints, infinite where one never slides (n_joints,) [-].
+        structure: whose joints they are.
 
     Raises:
-        InvalidInput: joints slide, and the scheme has no memory.
+        InvalidInput: joints slide or break, and the scheme has no memory.
     """
     try:
-        check_sliding(scheme_asked(analysis), friction)
+        check_sliding(scheme_asked(analysis), structure)
     except InvalidInput as error:
         name = analysis.get("scheme", "conserving")
         raise InvalidInput(
             f'analysis.scheme = {name!r}: {error}; in a case file, scheme = "conserving", or '
-            'friction = "none" in the table of each of its [contacts]'
+            'friction = "none" and no tension in the table of each of its [contacts]'
         ) from error

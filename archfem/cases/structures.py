@@ -102,6 +102,8 @@ CONTACT = {
     "shear_stiffness": "Pa/m",
     "friction": NumberOr("1", {"none": None}),
     "cohesion": "Pa",
+    "dilatancy": "1",
+    "tension": "Pa",
 }
 """A friction of "none" is that of a joint that never slides."""
 

@@ -132,7 +132,9 @@ def collapse_scale(
     limits = (least, max(least, min(largest, largest_scale(motion))))
     return CollapseScale(
         {
-            step: search(lambda scale, step=step: shaken(scale, step), (COLLAPSE,), precision, limits)
+            step: search(
+                lambda scale, step=step: shaken(scale, step), (COLLAPSE,), precision, limits
+            )
             for step in dt
         }
     )

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.joints.criteria import Criteria, failing, ratio_at_sliding
+from archfem.joints.criteria import Criteria, borne, failing, ratio_at_sliding
 from archfem.joints.resultants import joint_dataset, ratios
 from archfem.masonry.structure import Structure
 
@@ -38,6 +38,7 @@ class Glance:
             criteria.coefficients(structure.friction[self._numbers]),
             criteria.cohesions(structure.cohesion[self._numbers]),
         )
+        self._tension = structure.tension[self._numbers]
         self._seen: dict[bytes, frozenset[str]] = {}
 
     def __call__(self, resultants: Array, least: int) -> frozenset[str]:
@@ -51,7 +52,7 @@ class Glance:
         e, friction = ratios(own, self._depth)
         limits = ratio_at_sliding(own[:, 0], e, *self._laws)
         hinges, slides = failing(e, friction, limits, self._criteria.hinge)
-        apart = own[:, 0] <= 0.0
+        apart = borne(own[:, 0], self._tension) <= 0.0
         if np.count_nonzero(hinges | slides | apart) < least:
             return frozenset()
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[:, 1]), 0.0)

@@ -95,9 +95,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
                 "'faces'"
             )
         return choose(structure, tolerance, motion, damping, dt)
-    asked = Discretisation(
-        fidelity, cells, cell, coarse, degree, quadrature, points, displacements
-    )
+    asked = Discretisation(fidelity, cells, cell, coarse, degree, quadrature, points, displacements)
     return plain.build(structure, asked)
 
 

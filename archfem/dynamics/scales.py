@@ -226,7 +226,9 @@ def mechanism_scales(
         return ScaledRun(scale, first_mechanisms(run), run.ended, run.outcome)
 
     asked = (*possible_counts(model.structure, criteria), "verified")
-    return search(shaken, asked, precision, (least, max(least, min(largest, largest_scale(motion)))))
+    return search(
+        shaken, asked, precision, (least, max(least, min(largest, largest_scale(motion))))
+    )
 
 
 def largest_scale(motion: Motion) -> float:

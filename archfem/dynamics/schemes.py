@@ -6,8 +6,8 @@ from math import pi
 import numpy as np
 
 from archfem.arguments import real, reals
-from archfem.arrays import Array
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
 
 JOINTS = ("closed", "initial", "none")
 
@@ -210,19 +210,28 @@ class Conserving:
 Scheme = Newmark | HHT | Conserving
 
 
-def check_sliding(scheme: Scheme, friction: Array) -> None:
-    """Refuse schemes that write the equation at an instant where joints can slide.
+def check_sliding(scheme: Scheme, structure: Structure) -> None:
+    """Refuse schemes that write the equation at an instant where joints can slide, or break.
 
     Args:
         scheme: of the run to come.
-        friction: coefficients of the joints, infinite where one never slides (n_joints,) [-].
+        structure: whose joints they are.
 
     Raises:
-        InvalidInput: joints can slide, and the scheme has no memory.
+        InvalidInput: joints can slide or have tensile strength, and the scheme has no memory.
     """
-    if not isinstance(scheme, Conserving) and np.isfinite(friction).any():
+    if isinstance(scheme, Conserving):
+        return
+    name, friction = type(scheme).__name__, structure.friction
+    if np.isfinite(friction).any():
         raise InvalidInput(
-            f"{type(scheme).__name__} follows no sliding, and joints slide at "
+            f"{name} follows no sliding, and joints slide at "
             f"μ = {np.min(friction):g}: use scheme=Conserving(), the default, or joints that never "
             "slide, Contact(friction=None)"
+        )
+    if structure.tension.any():
+        raise InvalidInput(
+            f"{name} follows no bonds that break, and joints have a tensile strength of "
+            f"{structure.tension.max():g} Pa: use scheme=Conserving(), the default, or joints "
+            "without, Contact(tension=0.0)"
         )

@@ -19,7 +19,8 @@ class State:
         q: coordinates (n,).
         velocity: their rates (n,).
         acceleration: the rates of those (n,).
-        memory: how far each joint point has slid for good (p,) [m]; None where nothing has.
+        memory: how far each joint point has slid for good (p,) [m], then which bonds are broken
+            where any joint has one (2 p,), as `Model.memory`; None where nothing has.
     """
 
     time: float

@@ -128,8 +128,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         method: "snes" solves each step through PETSc. Three compiled methods give the same history
             many times faster: "contact" works in the modes of the closed structure, "chain" on
             banded matrices, and "compliance", for large structures, with one sparse factor and
-            the open joint points alone. "auto" takes the fastest that applies. A `Stepper` is
-            taken as it is, with its own damping, scheme and solves.
+            the open joint points alone. "auto" takes the fastest that applies; none does where
+            joints dilate or resist tension, and "snes" takes the run. A `Stepper` is taken as it
+            is, with its own damping, scheme and solves.
 
     Returns:
         The history; its `ended` and, in words, its `outcome` say how the run ended.

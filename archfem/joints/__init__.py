@@ -5,8 +5,10 @@
     points      points on the joints, where openings and slips are taken
     springs     normal forces of points that are springs of their own
     facets      normal forces of facets, integrated exactly
+    bonds       saw teeth that dilate, bonds that break: what they add to the law
     integration which of both a quadrature rule asks for
-    operator    the joint operator G, from coordinates to forces
+    kinematics  the joint operator G, from coordinates to openings and slips, and back
+    operator    the same with forces from openings and slips, and memory
     passage     a step of the joints: means of their forces, and what they remember
     faces       opening, rotation and slip of whole joints
     given_limits  joints whose limits of friction stay as they are

@@ -32,6 +32,9 @@ AREA_OFF = 0.01
 """Relative: how much of cohesion is left out where a joint counts as sliding. The closed area that
 follows from the means of N and e over a step is off by less; cohesion is known less well."""
 
+BONDED = "tension"
+"""Coordinate of a dataset with the tensile strengths of its joints; left out where none has any."""
+
 PREFIX = "criteria_"
 """Of the attributes of a dataset that tell by which criteria its joints were judged."""
 
@@ -173,11 +176,12 @@ def flags(
 
     `hinge` is the face on which a joint hinges (1 extrados, -1 intrados, where it stays closed; 0
     none), `slide` says whether its mobilised friction has reached its limit, and `open` whether it
-    has come apart over its whole depth.
+    has come apart over its whole depth. Bonds do not matter to the first two; a joint that is
+    pulled and holds is not open.
 
     Args:
         dims: names of the dimensions, the last that of the joints.
-        normal: N (…, n_joints) [N].
+        normal: N, its size alone where a joint has a bond (…, n_joints) [N].
         ratios: eccentricity and mobilised friction (…, n_joints) [-].
         limits: of mobilised friction, as by `ratio_at_sliding` (…, n_joints) [-].
         hinge: |e| from which a joint hinges [-].
@@ -189,6 +193,16 @@ def flags(
         "slide": (dims, slides, {"long_name": "whether its friction is used up"}),
         "open": (dims, normal <= 0.0, {"long_name": "whether it has come apart"}),
     }
+
+
+def borne(normal: NDArray[np.float64], tension: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return normal forces, of joints with a bond their size alone: pulled, they are not open [N].
+
+    Args:
+        normal: N (…, n_joints) [N].
+        tension: tensile strengths (n_joints,) [Pa].
+    """
+    return np.where(tension > 0.0, np.abs(normal), normal)
 
 
 def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
@@ -206,7 +220,10 @@ def flagged(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
         for name in ("N", "eccentricity", "friction")
     )
     limits, ratios = sliding_limits(joints, criteria), (e.values, friction.values)
-    result = joints.assign(flags(e.dims, normal.values, ratios, limits, criteria.hinge))
+    carried = normal.values
+    if BONDED in joints.coords:
+        carried = borne(carried, joints[BONDED].values)
+    result = joints.assign(flags(e.dims, carried, ratios, limits, criteria.hinge))
     counts = np.isin(joints["part"].values.astype(str), judged_parts(roles_of(joints)))
     result.coords["judged"] = (joints["part"].dims, counts)
     others = {key: value for key, value in joints.attrs.items() if not key.startswith(PREFIX)}

@@ -32,7 +32,8 @@ class GivenLimits(JointOperator):
             joints: whose points, coordinates and memory they have.
             given: limits (p,) [N].
         """
-        return cls(joints.law, joints.opening, joints.slip, joints.offset, joints.slid, given)
+        parts = joints.law, joints.opening, joints.slip, joints.offset, joints.slid, joints.broken
+        return cls(*parts, given)
 
     def limits(self, normal: Array, closed: Array) -> Array:
         """Return the limits that were given (p,) [N].
@@ -49,7 +50,7 @@ class GivenLimits(JointOperator):
         Args:
             q: coordinates (n,).
         """
-        across = self.law.stiffness(self.openings(q))
+        across = self.law.stiffness(self.felt(q))
         over = self.points.slides & (np.abs(self.elastic(q)) > (1.0 + TOUCHING) * self.given)
         along = np.where(over, 0.0, self.points.shear)
         return np.concatenate([across, along, *([np.zeros_like(across)] if self.slides else [])])

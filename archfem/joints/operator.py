@@ -1,13 +1,13 @@
 """The joint operator: from coordinates to opening and slip at points, and back to forces.
 
-With G the sparse operator that takes generalised coordinates q to (opening, slip) at points along
-the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G. Whatever the
-coordinates are (nodes, rigid motions, modes), the rest is the same. How openings become normal
-forces is told in `springs` and `facets`; how slips become shear, and what of it friction holds, in
-`law`.
+With G the sparse operator of `kinematics`, that takes generalised coordinates q to (opening, slip)
+at points along the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G.
+How openings become normal forces is told in `springs` and `facets`; how slips become shear, and
+what of it friction holds, in `law`.
 
-Joints have memory: how far each point has slid for good. It belongs to the operator, whose forces
-are those after a load has changed since; `remembered` takes in what has slid meanwhile.
+Joints have memory: how far each point has slid for good, and which bonds are broken. It belongs to
+the operator, whose forces are those after a load has changed since; `remembered` takes in what has
+slid and broken meanwhile. What teeth and bonds do is told in `bonds`.
 """
 
 from collections.abc import Sequence
@@ -16,14 +16,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.bonds import Bonds, ridden
 from archfem.joints.facets import Facets
-from archfem.joints.integration import Law
+from archfem.joints.kinematics import JointKinematics
 from archfem.joints.law import held, is_closed
-from archfem.joints.points import JointPoints
-from archfem.joints.sparsity import Pattern
 
 Status = NDArray[np.bool_]
 
@@ -36,70 +34,61 @@ at all its joints, to either side, would be free, though it holds as soon as it 
 
 
 @dataclass(frozen=True, eq=False)
-class JointOperator:
+class JointOperator(JointKinematics):
     """Opening and slip along the joints as linear functions of coordinates, and their forces.
 
     Attributes:
-        law: normal forces from openings, and the points at which those are taken.
-        opening: rows of G for the opening, positive open (p, n).
-        slip: rows of G for the slip, of the higher block toward the extrados (p, n).
-        offset: opening and slip at q = 0, which supports cause that have moved (2, p) [m], or None.
         slid: how far each point has slid for good, that part of the slip which friction did not
             hold (p,) [m]; None where nothing has.
+        broken: where bonds are broken for good, 1, else 0 (p,); None where none is.
     """
 
-    law: Law
-    opening: sparse.csr_matrix
-    slip: sparse.csr_matrix
-    offset: Array | None = None
     slid: Array | None = None
-
-    @property
-    def points(self) -> JointPoints:
-        """Where openings and slips are taken."""
-        return self.law.points
+    broken: Array | None = None
 
     @property
     def memory(self) -> Array:
-        """How far each point has slid for good (p,) [m]."""
-        return np.zeros(len(self.points.arm)) if self.slid is None else self.slid
+        """How far each point has slid for good (p,) [m]; then where bonds are broken (2 p,)."""
+        slid = self._slid
+        return slid if self.bonds is None else np.concatenate([slid, self.bonds.broken])
 
     @property
-    def slides(self) -> bool:
-        """Whether any point can slide."""
-        return bool(self.points.slides.any())
+    def _slid(self) -> Array:
+        return np.zeros(len(self.points.arm)) if self.slid is None else self.slid
+
+    def remembering(self, memory: Array) -> "JointOperator":
+        """Return the same joints with another memory.
+
+        Args:
+            memory: as `memory` (p,) or (2 p,).
+        """
+        slid, broken = np.split(memory, [len(self.points.arm)])
+        return replace(
+            self, slid=slid if slid.any() else None, broken=broken if broken.any() else None
+        )
 
     @cached_property
-    def back(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """From forces at the points to generalised ones: of openings and of slips, each (n, p)."""
-        return self.opening.T.tocsr(), self.slip.T.tocsr()
+    def bonds(self) -> Bonds | None:
+        """Bonds of the points; None where none has tensile strength."""
+        if self.points.tension is None:
+            return None
+        return Bonds(self.law, np.zeros_like(self._slid) if self.broken is None else self.broken)
 
     @cached_property
-    def sums(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Matrices (n_joints, p) that sum forces over each joint, and their moments."""
-        points = self.points
-        shape = (points.count, len(points.arm))
-        places = (points.joint, np.arange(len(points.arm)))
-        force = sparse.csr_matrix((np.ones(shape[1]), places), shape)
-        return force, sparse.csr_matrix((points.arm, places), shape)
+    def ridden(self) -> Array | None:
+        """How far teeth have raised each point (p,) [m]; None where they have not."""
+        return None if self.slid is None else ridden(self.points, self.slid)
 
-    def openings(self, q: Array) -> Array:
-        """Return the openings at the points, positive where open (p,) [m].
+    def felt(self, q: Array, raised: Array | None = None) -> Array:
+        """Return the gaps that the normal law sees, less what teeth and bonds shift (p,) [m].
 
         Args:
             q: coordinates (n,).
+            raised: how far teeth raise each point (p,) [m]; by default as it is remembered.
         """
-        found: Array = self.opening @ q
-        return found if self.offset is None else found + self.offset[0]
-
-    def slips(self, q: Array) -> Array:
-        """Return the slips at the points, of the higher block toward the extrados (p,) [m].
-
-        Args:
-            q: coordinates (n,).
-        """
-        found: Array = self.slip @ q
-        return found if self.offset is None else found + self.offset[1]
+        gaps, raised = self.openings(q), self.ridden if raised is None else raised
+        gaps = gaps if raised is None else gaps - raised
+        return gaps if self.bonds is None else gaps - self.bonds.stretch
 
     def elastic(self, q: Array) -> Array:
         """Return the shear forces at the points if nothing slid any further (p,) [N].
@@ -114,13 +103,25 @@ class JointOperator:
         """Return Coulomb's limit of the shear at the points; 0 where one never slides (p,) [N].
 
         Args:
-            normal: forces, positive where they pull (p,) [N].
+            normal: forces of the normal law, without the pull of bonds (p,) [N].
             closed: area on which each point is closed (p,) [m²].
         """
         slides, points = self.points.slides, self.points
-        found: Array = points.cohesion * closed
+        found: Array = self._cohesion * closed
         found[slides] -= points.friction[slides] * normal[slides]
         return np.where(slides, found, 0.0)
+
+    @property
+    def _cohesion(self) -> Array:
+        return self.points.cohesion if self.bonds is None else self.bonds.cohesion
+
+    def pulled(self, normal: Array) -> Array:
+        """Return normal forces with the pull of bonds (p,) [N].
+
+        Args:
+            normal: forces of the normal law (p,) [N].
+        """
+        return normal if self.bonds is None else normal + self.bonds.pull
 
     def tractions(self, q: Array) -> tuple[Array, Array]:
         """Return normal and shear forces at the points, each (p,) [N].
@@ -128,12 +129,12 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        opening, shear = self.openings(q), self.elastic(q)
+        opening, shear = self.felt(q), self.elastic(q)
         normal = self.law.forces(opening)
         if not self.slides:
-            return normal, shear
+            return self.pulled(normal), shear
         limit = self.limits(normal, self.law.closed(opening))
-        return normal, np.where(self.points.slides, held(shear, limit), shear)
+        return self.pulled(normal), np.where(self.points.slides, held(shear, limit), shear)
 
     def force(self, q: Array) -> Array:
         """Return the generalised forces that the joints exert, as internal forces (n,).
@@ -143,35 +144,69 @@ class JointOperator:
         """
         return self.pushed(*self.tractions(q))
 
-    def pushed(self, normal: Array, shear: Array) -> Array:
-        """Return generalised forces from those at the points (n,).
-
-        Args:
-            normal: forces, positive where they pull (p,) [N].
-            shear: forces (p,) [N].
-        """
-        force: Array = self.back[0] @ normal + self.back[1] @ shear
-        return force
-
     def energy(self, q: Array) -> float:
         """Return the energy stored in the joints if nothing slid any further [J].
 
         Args:
             q: coordinates (n,).
         """
-        opening, shear = self.openings(q), self.elastic(q)
+        opening, shear = self.felt(q), self.elastic(q)
         stored = opening @ self.law.forces(opening) + shear @ (shear / self.points.shear)
-        return 0.5 * float(stored)
+        return 0.5 * float(stored) + self.tearing(opening)
+
+    def across(self, gaps: Array) -> float:
+        """Return the energy stored across the joints [J].
+
+        Args:
+            gaps: less what teeth raise (p,) [m].
+        """
+        felt = gaps if self.bonds is None else gaps - self.bonds.stretch
+        return 0.5 * float(felt @ self.law.forces(felt)) + self.tearing(felt)
+
+    def tearing(self, felt: Array) -> float:
+        """Return what bonds add to the energy stored across the joints [J].
+
+        Args:
+            felt: gaps that the normal law sees (p,) [m].
+        """
+        return 0.0 if self.bonds is None else float(self.bonds.stored(felt).sum())
 
     def remembered(self, q: Array) -> Array:
-        """Return how far each point has slid for good once it is at q (p,) [m].
+        """Return what the joints remember once they are at rest at q, as `memory`.
+
+        Of bonds that are torn those break first where each joint gapes most: what they held goes to
+        the others, which may bear it.
 
         Args:
             q: coordinates (n,).
         """
-        further = (self.elastic(q) - self.tractions(q)[1]) / self.points.shear
-        slid: Array = self.memory + np.where(self.points.slides, further, 0.0)
+        excess = self.elastic(q) - self.tractions(q)[1]
+        if self.bonds is None:
+            return self.slid_by(excess)
+        felt = self.felt(q)
+        limit = self.limits(self.law.forces(felt), self.law.closed(felt))
+        return self.further(self.bonds.worst(felt), excess, limit)
+
+    def slid_by(self, excess: Array) -> Array:
+        """Return how far each point has slid for good at the end of a step (p,) [m].
+
+        Args:
+            excess: shear that friction did not hold on the way (p,) [N].
+        """
+        slid: Array = self._slid + np.where(self.points.slides, excess / self.points.shear, 0.0)
         return slid
+
+    def further(self, torn: Status, excess: Array, limit: Array) -> Array:
+        """Return what joints with bonds remember at the end of a step, as `memory` (2 p,).
+
+        Args:
+            torn: which bonds are pulled apart (p,).
+            excess: shear that friction did not hold on the way (p,) [N].
+            limit: of the shear (p,) [N].
+        """
+        assert self.bonds is not None
+        over = np.where(self.points.slides, excess, 0.0)
+        return np.concatenate([self.slid_by(excess), self.bonds.after(torn, over, limit)])
 
     def status(self, q: Array) -> Status:
         """Return which points are closed (p,).
@@ -179,7 +214,7 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        return is_closed(self.openings(q))
+        return is_closed(self.felt(q))
 
     def stiffness(self, q: Array) -> Array:
         """Return the numbers on which the tangent depends, as `tangents` takes them (m,) [N/m].
@@ -187,7 +222,7 @@ class JointOperator:
         Args:
             q: coordinates (n,).
         """
-        opening, points = self.openings(q), self.points
+        opening, points = self.felt(q), self.points
         across = self.law.stiffness(opening)
         if not self.slides:
             return np.concatenate([across, points.shear])
@@ -211,12 +246,8 @@ class JointOperator:
         """
         row = self.law.entries[0]
         friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
-        coupled: Array = rate[row] * (self.points.cohesion[row] * closed - friction * across)
+        coupled: Array = rate[row] * (self._cohesion[row] * closed - friction * across)
         return coupled
-
-    def shear_resultants(self) -> sparse.csr_matrix:
-        """Elastic shear resultant of each joint from coordinates, sparse (n_joints, n) [N]."""
-        return (self.sums[0] @ sparse.diags(self.points.shear) @ self.slip).tocsr()
 
     def answered(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
         """Return the forces at the points that answer small gaps, each (p,) [N].
@@ -247,30 +278,6 @@ class JointOperator:
         parts = [across, self.points.shear]
         return np.concatenate([*parts, np.zeros_like(across)] if self.slides else parts)
 
-    def tangents(self, pattern: Pattern) -> sparse.csr_matrix:
-        """Return the linear map from `stiffness` to the entries of the tangent (nnz, m).
-
-        Args:
-            pattern: that has all `couplings` (nnz entries).
-        """
-        first, second = self.law.entries
-        maps = [
-            pattern.outer(self.opening[first], self.opening[second]),
-            pattern.outer(self.slip, self.slip),
-        ]
-        if self.slides:
-            maps.append(pattern.outer(self.slip[first], self.opening[second]))
-        return sparse.hstack(maps, "csr")
-
-    def couplings(self) -> sparse.csr_matrix:
-        """A matrix with an entry wherever the tangent may have one, whatever cancels (n, n)."""
-        first, second = self.law.entries
-        opening, slip = _ones(self.opening), _ones(self.slip)
-        across = opening[first].T @ opening[second] + slip.T @ slip
-        if self.slides:
-            across = across + slip[first].T @ opening[second]
-        return across.tocsr()
-
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m].
 
@@ -280,24 +287,6 @@ class JointOperator:
             q: coordinates (n,).
         """
         return self.summed(*self.tractions(q))
-
-    def summed(self, normal: Array, shear: Array) -> Array:
-        """Return N, V, M of every joint from the forces at the points (n_joints, 3) [N, N, N m].
-
-        Args:
-            normal: forces, positive where they pull (p,) [N].
-            shear: forces (p,) [N].
-        """
-        force, moment = self.sums
-        return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
-
-    def projected(self, basis: sparse.csr_matrix) -> "JointOperator":
-        """Return the same joints in the coordinates of a basis, G B.
-
-        Args:
-            basis: what each new coordinate is in the old ones (n, m).
-        """
-        return replace(self, opening=self.opening @ basis, slip=self.slip @ basis)
 
     def spanned(self, whole: Sequence[bool]) -> "JointOperator":
         """Return one facet instead of several on each joint whose faces stay plane.
@@ -321,8 +310,3 @@ class JointOperator:
         offset = None if self.offset is None else self.offset[:, kept]
         chosen = Facets(points.chosen(kept, weight[kept]))
         return JointOperator(chosen, self.opening[kept], self.slip[kept], offset)
-
-
-def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-    """A matrix of ones wherever another stores an entry, zero or not."""
-    return sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), matrix.shape)

@@ -115,8 +115,9 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     Returns:
         Energy that the lag takes [J].
     """
-    (l0, _), (l1, shrinks) = overlap(faces.depth[joint], ends[0, 1]), overlap(
-        faces.depth[joint], ends[1, 1]
+    (l0, _), (l1, shrinks) = (
+        overlap(faces.depth[joint], ends[0, 1]),
+        overlap(faces.depth[joint], ends[1, 1]),
     )
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks

@@ -25,6 +25,8 @@ class JointPoints:
         friction: μ, infinite where a point never slides (p,) [-].
         cohesion: c (p,) [Pa].
         count: number of joints.
+        dilatancy: tan ψ (p,) [-]; None where no point has saw teeth.
+        tension: f_t (p,) [Pa]; None where no point has a bond.
     """
 
     joint: Numbers
@@ -35,6 +37,8 @@ class JointPoints:
     friction: Array
     cohesion: Array
     count: int
+    dilatancy: Array | None = None
+    tension: Array | None = None
 
     @classmethod
     def on(cls, structure: Structure, rules: list[tuple[Array, Array]]) -> "JointPoints":
@@ -57,6 +61,8 @@ class JointPoints:
             np.array([each.coefficient for each in contacts])[joint],
             np.array([each.cohesion for each in contacts])[joint],
             len(rules),
+            _where_any([each.dilatancy for each in contacts], joint),
+            _where_any([each.tension for each in contacts], joint),
         )
 
     def chosen(self, rows: Numbers, weight: Array) -> "JointPoints":
@@ -75,7 +81,14 @@ class JointPoints:
             self.friction[rows],
             self.cohesion[rows],
             self.count,
+            None if self.dilatancy is None else self.dilatancy[rows],
+            None if self.tension is None else self.tension[rows],
         )
+
+    @property
+    def plain(self) -> bool:
+        """Whether all slide flat, and none has a bond."""
+        return self.dilatancy is None and self.tension is None
 
     @cached_property
     def slides(self) -> NDArray[np.bool_]:
@@ -86,3 +99,8 @@ class JointPoints:
     def shear(self) -> Array:
         """Elastic shear force of each point per slip (p,) [N/m]."""
         return self.weight * self.shear_stiffness
+
+
+def _where_any(values: list[float], joint: Numbers) -> Array | None:
+    """Values of the joints at their points (p,); None where all are zero."""
+    return np.array(values)[joint] if any(values) else None

@@ -10,7 +10,7 @@ import xarray as xr
 from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, flags, ratio_at_sliding
+from archfem.joints.criteria import BONDED, Criteria, borne, flags, ratio_at_sliding
 from archfem.joints.faces import MEASURES, measures
 from archfem.masonry.naming import number_of
 from archfem.masonry.structure import Structure
@@ -50,7 +50,8 @@ def joint_dataset(
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
-    without compression is open: its eccentricity and friction are undefined (NaN). Opening,
+    without compression is open, unless a bond holds it: its eccentricity and friction are
+    undefined (NaN). Opening,
     rotation and slip follow from displacements alone: `opening` is the largest gap between the
     faces, at the end that is more open (0 where they touch all over), `rotation` the turn of the
     higher face relative to the lower one, positive where it opens the intrados, `slip` the mean
@@ -85,7 +86,8 @@ def joint_dataset(
             variables[key] = dims, value, {"units": units, "long_name": words}
     laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
     limits = ratio_at_sliding(resultants[..., 0], found[0], *laws)
-    variables |= flags(dims, resultants[..., 0], found, limits, criteria.hinge)
+    carried = borne(resultants[..., 0], structure.tension)
+    variables |= flags(dims, carried, found, limits, criteria.hinge)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
@@ -96,6 +98,8 @@ def joint_dataset(
         "friction_limit": ("joint", structure.friction),
         "cohesion_limit": ("joint", structure.cohesion, {"units": "N"}),
     }
+    if structure.tension.any():
+        coordinates[BONDED] = "joint", structure.tension, {"units": "Pa"}
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)

@@ -123,6 +123,9 @@ def collapse_factor(
 
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
     not only on its closed part: the factor is an upper estimate where a joint with cohesion opens.
+    Joints with tensile strength are refused, since bonds break and do not yield. The dilatancy of
+    contacts plays no part: sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and
+    a warning says so where the latter leaves it out.
 
     A *settlement* s asks another question: of all states of equilibrium under self-weight, the
     movement of a support selects the one that resists it least, and the factor is the work of the
@@ -149,8 +152,8 @@ def collapse_factor(
         The factor, how it was found, and the mechanism.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure, or bodies too soft to
-            be rigid are without the strength of a fill.
+        InvalidInput: an option is unknown, an action misses the structure, joints have tensile
+            strength, or bodies too soft to be rigid are without the strength of a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
     Note:
@@ -180,6 +183,7 @@ def collapse_factor(
     found = associated = asked.solve()
     known = None
     if friction == "nonassociated":
+        _tell_of_dilatancy(structure)
         found, known = without_dilatancy(asked, associated, scale)
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
@@ -199,6 +203,17 @@ def collapse_factor(
             result.factor,
         )
     return result
+
+
+def _tell_of_dilatancy(structure: Structure) -> None:
+    """Warn of saw teeth that sliding without dilatancy leaves out."""
+    steepest = max(joint.contact.dilatancy for joint in structure.joints)
+    if steepest > 0.0:
+        logger.warning(
+            "joints dilate by up to %.3g, which friction='nonassociated' leaves out: the factor is "
+            "that of joints which slide flat, 'coulomb' gives that of joints which dilate by μ",
+            steepest,
+        )
 
 
 def stands(
@@ -228,8 +243,8 @@ def stands(
         Whether it stands.
 
     Raises:
-        InvalidInput: an option is unknown, or bodies too soft to be rigid are without the strength
-            of a fill.
+        InvalidInput: an option is unknown, joints have tensile strength, or bodies too soft to be
+            rigid are without the strength of a fill.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.

@@ -20,12 +20,18 @@ UNBALANCED = 1e-8
 """Force missing for equilibrium, per weight of the free blocks, above which they do not stand."""
 
 
-def _checked(friction: str | None, strength: float | None) -> None:
-    """Refuse options that mean nothing."""
+def _checked(structure: Structure, friction: str | None, strength: float | None) -> None:
+    """Refuse options that mean nothing, and bonds, which do not yield but break."""
     if friction not in FRICTION:
         raise InvalidInput(f"friction {friction!r} is not known: use one of {FRICTION}")
     if strength is not None and not real(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
+    if structure.tension.any():
+        raise InvalidInput(
+            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: limit analysis "
+            "is for joints that yield, and bonds break; for the safe answer without them give "
+            "Contact(tension=0.0, cohesion=0.0), with them follow a pushover"
+        )
 
 
 def self_weight(
@@ -43,7 +49,7 @@ def self_weight(
         InvalidInput: as for `collapse_factor`.
     """
     instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    _checked(friction, strength)
+    _checked(structure, friction, strength)
     stones = stones_of(structure, fill)
     left = stones.skeleton.structure
     blocks = RigidBlocks(left)

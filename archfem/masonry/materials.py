@@ -62,7 +62,18 @@ class Material:
 
 @dataclass(frozen=True)
 class Contact:
-    """How two faces touch along a dry joint.
+    """How two faces touch along a joint: dry, or bonded by mortar until its bond breaks.
+
+    Saw teeth: a point that has slid by s along a rough face rides up by tan ψ |s|, and comes down
+    where it slides back (Patton, Proc. 1st Congr. ISRM 1 (1966) 509-513). μ is the whole
+    resistance, in either sense, what the teeth add included: friction takes (μ - tan ψ) N |s| of
+    energy on the way up and (μ + tan ψ) N |s| on the way down.
+
+    A bond is brittle, point by point: it is linear elastic in tension up to f_t, and shear is held
+    up to μ |t_n| + c in compression, c - μ t_n in tension. Where either is exceeded it is broken
+    for good, and tensile strength and cohesion are both lost: the point goes on as a dry one of
+    friction μ (Itasca, 3DEC: Mohr-Coulomb joint model, whose residual values are zero). It is
+    looked at where each step of a load, or of time, ends.
 
     Attributes:
         normal_stiffness: compression per closing of the joint, k_n [Pa/m].
@@ -71,7 +82,11 @@ class Contact:
             itself, and remembers how far. None, kept as infinity, never slides: its shear is
             elastic whether the joint is open or closed, as in Demirel and Aldemir (2021).
         name: what it is called in tables and files.
-        cohesion: c, over the closed part of the joint; it stays as the joint slides [Pa].
+        cohesion: c, over the closed part of the joint; without tension it stays as the joint
+            slides, with tension it is that of the bond, and lost with it [Pa].
+        dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].
+        tension: tensile strength f_t of the bond, up to c / μ, the apex of Coulomb's limit; 0 has
+            no bond [Pa].
     """
 
     normal_stiffness: float
@@ -79,6 +94,8 @@ class Contact:
     friction: float | None = 0.60
     name: str = "contact"
     cohesion: float = 0.0
+    dilatancy: float = 0.0
+    tension: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a contact, or can only be a wrong unit."""
@@ -86,7 +103,7 @@ class Contact:
             object.__setattr__(self, "friction", inf)
         else:
             real(self.friction, f"friction of '{self.name}'")
-        for key in ("normal_stiffness", "shear_stiffness", "cohesion"):
+        for key in ("normal_stiffness", "shear_stiffness", "cohesion", "dilatancy", "tension"):
             real(getattr(self, key), f"{key} of '{self.name}'")
         for key in ("normal_stiffness", "shear_stiffness"):
             value = getattr(self, key)
@@ -104,6 +121,24 @@ class Contact:
             0.0 <= self.cohesion <= 1e9,
             f"cohesion {self.cohesion:.3g} Pa of '{self.name}' is not between 0 and 1 GPa",
             "give it in Pa, e.g. 5 * kPa",
+        )
+        self._check_teeth_and_bond()
+
+    def _check_teeth_and_bond(self) -> None:
+        """Refuse saw teeth steeper than friction, and a bond beyond the apex of its own limit."""
+        most = self.coefficient if self.slides else 0.0
+        _require(
+            0.0 <= self.dilatancy <= most,
+            f"dilatancy {self.dilatancy:.3g} of '{self.name}' is not between 0 and {most:.3g}",
+            "give tan ψ, not the angle, up to the coefficient of friction, which has it in; a "
+            "joint that never slides does not dilate",
+        )
+        apex = self.cohesion / self.coefficient if 0.0 < self.coefficient < inf else 1e9
+        _require(
+            0.0 <= self.tension <= apex,
+            f"tension {self.tension:.3g} Pa of '{self.name}' is not between 0 and {apex:.3g} Pa",
+            "give the tensile strength in Pa, up to cohesion / friction, where Coulomb's limit "
+            "ends",
         )
 
     @property

@@ -156,6 +156,11 @@ class Structure:
         return self.width * self.depths * [joint.contact.cohesion for joint in self.joints]
 
     @cached_property
+    def tension(self) -> Array:
+        """Tensile strengths f_t of the joints (n_joints,) [Pa]."""
+        return np.array([joint.contact.tension for joint in self.joints])
+
+    @cached_property
     def pairs(self) -> NDArray[np.intp]:
         """Numbers of the two blocks at each joint, the lower first (n_joints, 2)."""
         return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)

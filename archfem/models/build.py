@@ -30,7 +30,8 @@ def build(structure: Structure, asked: Discretisation) -> Model:
         The model; where a rung is too low for a soft block, a warning is logged.
 
     Raises:
-        InvalidInput: a rung is asked for blocks that there are not.
+        InvalidInput: a rung is asked for blocks that there are not, or "monolithic" for joints that
+            dilate or resist tension.
         MeshError: the blocks cannot be cut as asked.
     """
     if asked.displacements == "large":
@@ -44,6 +45,8 @@ def _small(structure: Structure, asked: Discretisation) -> Any:
     """Build a model of small displacements."""
     rungs = _rungs(structure, asked.fidelity)
     _doubt(structure, rungs)
+    if asked.fidelity == "monolithic":
+        _check_plain(structure)
     if asked.fidelity == "rigid":
         return rigid(structure, asked.through, asked.rule)
     from archfem.models.fem.mesh import mesh  # FEniCSx is needed from here on only
@@ -70,6 +73,20 @@ def _rungs(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]
         )
     rest = fidelity.get("rest", "full")
     return [fidelity.get(b.name, fidelity.get(b.part, rest)) for b in structure.blocks]
+
+
+def _check_plain(structure: Structure) -> None:
+    """Refuse joints whose law is not written as weak forms."""
+    names = {
+        joint.contact.name
+        for joint in structure.joints
+        if joint.contact.dilatancy > 0.0 or joint.contact.tension > 0.0
+    }
+    if names:
+        raise InvalidInput(
+            f"contacts {sorted(names)} have dilatancy or tension, which fidelity='monolithic' does "
+            "not write: use 'full', which is the same model"
+        )
 
 
 def _doubt(structure: Structure, rungs: Sequence[str]) -> None:

@@ -118,21 +118,21 @@ class Jointed:
 
     @property
     def memory(self) -> Array:
-        """How far each joint point has slid for good (p,) [m]."""
+        """How far each joint point has slid for good (p,) [m]; then which bonds broke (2 p,)."""
         return self.operator.memory
 
     def remembering(self, memory: Array) -> Self:
         """Return the same model, whose joints have slid so far.
 
         Args:
-            memory: how far each joint point has slid for good (p,) [m].
+            memory: as `memory`.
         """
         other = copy(self)
-        other.operator = replace(self.operator, slid=memory if memory.any() else None)
+        other.operator = self.operator.remembering(memory)
         return other
 
     def remembered(self, q: Array) -> Array:
-        """Return how far each joint point has slid for good once it is at q (p,) [m].
+        """Return what the joints remember once the model is at q, as `memory`.
 
         Args:
             q: coordinates (n,).
@@ -272,12 +272,21 @@ class JointedPassage:
         return self.joints.resultants(q)
 
     def remembered(self, q: Array) -> Array:
-        """Return how far each joint point has slid for good at the end (p,) [m].
+        """Return what the joints remember at the end, as `Model.memory`.
 
         Args:
             q: coordinates at the end (n,).
         """
         return self.joints.remembered(q)
+
+    def raising(self, q: Array) -> "JointedPassage":
+        """Return the same step with teeth where the slip on the way to q puts them.
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        joints = self.joints.raising(q)
+        return self if joints is self.joints else JointedPassage(self.model, joints)
 
     def lost(self, q: Array) -> float:
         """Return the energy that friction and the lag of damping take [J].

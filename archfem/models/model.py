@@ -90,8 +90,18 @@ class Passage(Protocol):
             q: coordinates at the end (n,).
         """
 
+    def raising(self, q: Array) -> "Passage":
+        """Return the same step with saw teeth where the slip on the way to q puts them.
+
+        Args:
+            q: coordinates at the end (n,).
+
+        Returns:
+            The very same object where they are there already, to rounding.
+        """
+
     def lost(self, q: Array) -> float:
-        """Return the energy that friction and the lag of damping take [J]; never negative.
+        """Return the energy that friction, bonds and the lag of damping take [J]; never negative.
 
         Args:
             q: coordinates at the end (n,).
@@ -177,7 +187,10 @@ class Model(Protocol):
 
     @property
     def memory(self) -> Array:
-        """How far each joint point has slid for good (p,) [m]."""
+        """How far each joint point has slid for good (p,) [m].
+
+        Where any joint has tensile strength, then which bonds are broken, 1, else 0 (2 p,).
+        """
 
     def remembering(self, memory: Array) -> Self:
         """Return the same model, whose joints have slid so far.
@@ -185,7 +198,7 @@ class Model(Protocol):
         Its `force` is that after a further change: elastic, but for what friction does not hold.
 
         Args:
-            memory: how far each joint point has slid for good (p,) [m].
+            memory: as `memory`.
         """
 
     def remembered(self, q: Array) -> Array:

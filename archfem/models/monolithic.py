@@ -238,6 +238,14 @@ class MonolithicPassage:
         """
         return self.model.steps.forms.facets.gathered(self._tractions(q)[2])
 
+    def raising(self, q: Array) -> "MonolithicPassage":
+        """Return the step itself, whose joints have no teeth.
+
+        Args:
+            q: coordinates at the end (n,).
+        """
+        return self
+
     def lost(self, q: Array) -> float:
         """Return the energy that friction and the lag of damping take [J].
 

@@ -433,8 +433,16 @@ class TurningCells(Cells):
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
         return np.column_stack(
             [
-                q[self.turns - 2] + less * arms[:, 0] - s * arms[:, 1] + c * strained[:, 0] - s * strained[:, 1],
-                q[self.turns - 1] + s * arms[:, 0] + less * arms[:, 1] + s * strained[:, 0] + c * strained[:, 1],
+                q[self.turns - 2]
+                + less * arms[:, 0]
+                - s * arms[:, 1]
+                + c * strained[:, 0]
+                - s * strained[:, 1],
+                q[self.turns - 1]
+                + s * arms[:, 0]
+                + less * arms[:, 1]
+                + s * strained[:, 0]
+                + c * strained[:, 1],
             ]
         )
 

@@ -172,7 +172,8 @@ def _condensed(
 def _spanned(model: Jointed, plane: set[int]) -> Jointed:
     """With exact facets, let one span each joint that never slides between plane faces.
 
-    Each end of a facet slides by itself, so that a joint which can slide keeps several.
+    Each end of a facet slides by itself, and has a bond of its own: a joint which can slide, or is
+    bonded, keeps several.
 
     Args:
         model: with all nodes.
@@ -184,6 +185,7 @@ def _spanned(model: Jointed, plane: set[int]) -> Jointed:
     if not isinstance(model.operator.law, Facets):
         return model
     whole = [
-        set(joint.blocks) <= plane and not joint.contact.slides for joint in model.structure.joints
+        set(joint.blocks) <= plane and not joint.contact.slides and joint.contact.tension == 0.0
+        for joint in model.structure.joints
     ]
     return model.with_operator(model.operator.spanned(whole))

@@ -20,15 +20,17 @@ def rigid(structure: Structure, cells: int = 4, rule: Quadrature | None = None) 
 
     Args:
         structure: what to model.
-        cells: facets on each joint; with exact quadrature one is enough where nothing slides.
+        cells: facets on each joint; with exact quadrature one is enough where nothing slides
+            or breaks.
         rule: quadrature on each facet; by default the exact one.
 
     Returns:
         The model, its coordinates in the order of `structure.free`.
     """
     rule = rule or Quadrature("exact")
-    whole = rule.rule == "exact" and not np.isfinite(structure.friction).any()
-    facets = 1 if whole else cells  # the gap between rigid faces is linear, but friction is not
+    linear = not np.isfinite(structure.friction).any() and not structure.tension.any()
+    whole = rule.rule == "exact" and linear
+    facets = 1 if whole else cells  # gaps between rigid faces are linear, friction and bonds not
     free = [structure.blocks[number] for number in structure.free]
     density = np.array([structure.density(block) * structure.width for block in free])
     mass = density * [block.area for block in free]

@@ -120,8 +120,10 @@ class Unfinished(Jointed):
             q: coordinates (n,).
         """
         joints, borne = self.operator, self._borne
-        opening, shear = joints.openings(q), joints.elastic(q)
+        opening, shear = joints.felt(q), joints.elastic(q)
         stored = opening * joints.law.forces(opening) + shear**2 / joints.points.shear
+        if joints.bonds is not None:
+            stored = stored + 2.0 * joints.bonds.stored(opening)
         return 0.5 * float(q @ (self.blocks @ q)) + 0.5 * float(np.sum(stored[borne]))
 
     def resultants(self, q: Array) -> Array:
@@ -133,12 +135,13 @@ class Unfinished(Jointed):
         return self.operator.summed(*self._tractions(q))
 
     def remembered(self, q: Array) -> Array:
-        """Return how far each joint point has slid for good once it is at q (p,) [m].
+        """Return what the joints remember once the model is at q, as `memory`.
 
         Args:
             q: coordinates (n,).
         """
-        return np.where(self._borne, super().remembered(q), 0.0)
+        found = super().remembered(q)
+        return np.where(np.resize(self._borne, len(found)), found, 0.0)
 
     def load(self, action: Action) -> Array:
         """Return the generalised forces of an action on the blocks that stand freely (n,).

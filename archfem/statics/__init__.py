@@ -1,6 +1,8 @@
 """A model at rest and about rest: dead load, pushover, modes, stress, free bodies.
 
     newton       one equilibrium solve through PETSc SNES
+    loading      loads that grow together
+    lasting      equilibria that joints which dilate or break do not upset
     relaxation   a structure creeps to rest where Newton's method fails
     search       the next equilibrium, from the last one
     equilibrium  dead load and other loads that stay

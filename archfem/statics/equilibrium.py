@@ -92,7 +92,8 @@ def dead_load(
 ) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
-    Joints open and slide as they must (nonlinear statics); where Newton's method fails the
+    Joints open and slide as they must (nonlinear statics), those that dilate ride up, and bonds
+    that are overstrained break, until none does any more; where Newton's method fails the
     structure creeps to rest, or steps of the load are halved. Displacements are small: the
     structure keeps its shape.
 

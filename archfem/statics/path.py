@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot
 
 import numpy as np
 from scipy import sparse
@@ -14,8 +13,9 @@ from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
-from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, self_weight
+from archfem.statics.loading import Load
+from archfem.statics.lasting import ROUNDS, lasts, upset
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
 from archfem.statics.search import followed, found_or_crept
 
@@ -49,7 +49,7 @@ class LoadPath:
 
     model: Model
     dead: Array
-    load: "Load"
+    load: Load
     unit: tuple[float, float]
     states: list[Array]
     resisted: list[Array]
@@ -151,39 +151,55 @@ class LoadPath:
         share: float,
         start: Array | None = None,
     ) -> bool:
-        """Add the equilibrium where row × (q, λ) is the target; tangents share the closed one.
+        """Add the equilibrium where row × (q, λ) is the target, once it lasts.
 
         Returns:
             Whether Newton's method found it.
         """
         x = np.append(self.states[-1], self.factors[-1]) if start is None else start
-        for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
-            tangent = self.model.tangent(x[:-1]) - x[-1] * self.load.rate(x[:-1])
-            rest, ahead = self._rest(x), target - row @ x
-            if abs(ahead) <= TOLERANCE * distance and self._fits(rest, x, tangent):
-                self._add(x, iteration)
+        model, taken = self.model, 0
+        for number in range(ROUNDS):
+            found = self._balanced(model, x, (row, target, distance), share)
+            if found is None:
+                return False
+            x, taken = found[0], taken + found[1]
+            if not upset(model) or (number > 0 and lasts(model, x[:-1], found[1])):
+                self._add(model, x, taken)
                 return True
+            model = model.remembering(model.remembered(x[:-1]))
+        return False
+
+    def _balanced(
+        self, model: Model, x: Array, ahead: tuple[sparse.csr_matrix, float, float], share: float
+    ) -> tuple[Array, int] | None:
+        """Find (q, λ) in one (n + 1,) and its iterations; tangents share the closed one."""
+        row, target, distance = ahead
+        for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
+            tangent = model.tangent(x[:-1]) - x[-1] * self.load.rate(x[:-1])
+            rest, missing = self._rest(model, x), target - row @ x
+            if abs(missing) <= TOLERANCE * distance and self._fits(rest, x, tangent):
+                return x, iteration
             if share > 0.0:
-                tangent = (1.0 - share) * tangent + share * self.model.closed()
+                tangent = (1.0 - share) * tangent + share * model.closed()
             column = sparse.csr_matrix(-self.load.forces(x[:-1])[:, None])
             matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
             try:
-                x = x + splu(matrix).solve(np.append(rest, ahead))
+                x = x + splu(matrix).solve(np.append(rest, missing))
             except RuntimeError:  # SuperLU: exactly singular
-                return False
-        return False
+                return None
+        return None
 
-    def _add(self, x: Array, iterations: int) -> None:
+    def _add(self, model: Model, x: Array, iterations: int) -> None:
         """Add an equilibrium, (q, λ) in one (n + 1,), and what the joints remember of it."""
         self.states.append(x[:-1])
-        self.resisted.append(self.model.resultants(x[:-1]))
-        self.model = self.model.remembering(self.model.remembered(x[:-1]))
+        self.resisted.append(model.resultants(x[:-1]))
+        self.model = model.remembering(model.remembered(x[:-1]))
         self.factors.append(float(x[-1]))
         self.iterations.append(iterations)
 
-    def _rest(self, x: Array) -> Array:
+    def _rest(self, model: Model, x: Array) -> Array:
         """Forces out of balance at q and λ in one (n,)."""
-        rest: Array = self.dead + x[-1] * self.load.forces(x[:-1]) - self.model.force(x[:-1])
+        rest: Array = self.dead + x[-1] * self.load.forces(x[:-1]) - model.force(x[:-1])
         return rest
 
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
@@ -191,77 +207,6 @@ class LoadPath:
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.load.forces(x[:-1]))
         rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
         return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """Actions that grow together, on a model.
-
-    Attributes:
-        model: that they act on.
-        actions: body forces and point loads.
-        size: of all [N].
-        first: generalised forces before anything moves (n,).
-    """
-
-    model: Model
-    actions: tuple[BodyForce | PointLoad, ...]
-    size: float
-    first: Array
-
-    @classmethod
-    def of(cls, model: Model, actions: Sequence[BodyForce | PointLoad]) -> "Load":
-        """Return actions on a model.
-
-        Args:
-            model: that they act on.
-            actions: body forces and point loads.
-
-        Raises:
-            InvalidInput: they come to nothing.
-        """
-        size = sum(_size(model, action) for action in actions)
-        if size == 0.0:
-            raise InvalidInput("the load is zero: give it a force or a multiple of g")
-        first = np.sum([model.load(action) for action in actions], axis=0)
-        return cls(model, tuple(actions), size, first)
-
-    def forces(self, q: Array) -> Array:
-        """Return the generalised forces (n,).
-
-        Args:
-            q: coordinates at which they act (n,).
-        """
-        if not isinstance(self.model, Moving):
-            return self.first
-        return np.sum([self.model.load(action, q) for action in self.actions], axis=0)
-
-    def rate(self, q: Array) -> sparse.csr_matrix | float:
-        """Return the derivative of `forces` (n, n); 0 where it does not depend on q.
-
-        Args:
-            q: coordinates (n,).
-        """
-        if not isinstance(self.model, Moving):
-            return 0.0
-        return sum(self.model.load_rate(action, q) for action in self.actions)
-
-    def moved(self, q: Array) -> float:
-        """Return the displacement of the load along itself [m].
-
-        Args:
-            q: coordinates (n,).
-        """
-        if isinstance(self.model, Moving):
-            return sum(self.model.work(action, q) for action in self.actions) / self.size
-        return float(self.first @ q) / self.size
-
-
-def _size(model: Model, action: BodyForce | PointLoad) -> float:
-    """Size of an action [N]."""
-    if isinstance(action, PointLoad):
-        return hypot(*action.force)
-    return model.structure.weight * hypot(action.horizontal, action.vertical)
 
 
 @dataclass(eq=False)

@@ -114,6 +114,8 @@ def pushover(
 
         λ = λ_limit - C d^(-1/2).
 
+    Bonds break between steps, so that with them the curve does fall; follow it by displacement.
+
     A *settlement* moves a support instead, under the dead load alone. What changes is the force
     with which the structure holds it back, and it tends to that of the limit state which resists
     the settlement least: spreading supports bring an arch to its least thrust.

@@ -87,7 +87,8 @@ def _crept(
     except DidNotConverge:
         if not isinstance(model, Jointed):
             raise
-    given, q, iterations = np.full(len(model.memory), magnitude(load)), start, 0
+    points = len(model.operator.points.arm)
+    given, q, iterations = np.full(points, magnitude(load)), start, 0
     for _ in range(ROUNDS):
         held = model.between(GivenLimits.of(model.operator, given))
         solved = _dragged(solver, held, load, (start, q), drag, ("basic", "cp"))
@@ -98,7 +99,7 @@ def _crept(
 
 def _limits(joints: JointOperator, q: Array) -> Array:
     """Coulomb's limits at q (p,) [N]."""
-    opening = joints.openings(q)
+    opening = joints.felt(q)
     return joints.limits(joints.law.forces(opening), joints.law.closed(opening))
 
 

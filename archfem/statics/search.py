@@ -11,7 +11,8 @@ from scipy.sparse.linalg import splu
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.models.model import Model
-from archfem.statics.newton import SEARCHES, Solved, Solver, magnitude
+from archfem.statics.lasting import lasting, upset
+from archfem.statics.newton import Solved, Solver
 from archfem.statics.relaxation import relaxed
 
 Way = Callable[[Solver, Model, Array, Array], tuple[Model, Solved]]
@@ -40,35 +41,8 @@ def followed(model: Model, q: Array, motion: Array) -> Array:
     return found
 
 
-def found(
-    solver: Solver,
-    model: Model,
-    load: Array,
-    start: Array,
-    searches: tuple[str, ...] = tuple(SEARCHES),
-) -> tuple[Model, Solved]:
-    """Find an equilibrium by Newton's method.
-
-    Args:
-        solver: for the pattern of this model's tangents.
-        model: with what its joints remember before.
-        load: generalised forces (n,).
-        start: first guess (n,).
-        searches: line searches to try, one after the other.
-
-    Returns:
-        The model with what its joints then remember, and the coordinates.
-
-    Raises:
-        DidNotConverge: neither full steps nor searches along them led to one.
-    """
-    scale = magnitude(load)
-    solved = solver.solve(lambda q: model.force(q) - load, model.tangent, start, scale, searches)
-    return model.remembering(model.remembered(solved.q)), solved
-
-
 def found_nearby(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
-    """Find an equilibrium by a few full steps of Newton's method, as `found`.
+    """Find an equilibrium by a few full steps of Newton's method, as `lasting`.
 
     Args:
         solver: for the pattern of this model's tangents.
@@ -82,11 +56,11 @@ def found_nearby(solver: Solver, model: Model, load: Array, start: Array) -> tup
     Raises:
         DidNotConverge: they did not lead to one.
     """
-    return found(solver, model, load, start, ("basic",))
+    return lasting(solver, model, load, start, ("basic",))
 
 
 def found_or_crept(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
-    """Find an equilibrium, as `found`; where Newton's method fails, the structure creeps there.
+    """Find an equilibrium, as `lasting`; where Newton's method fails, the structure creeps there.
 
     Args:
         solver: for the pattern of this model's tangents.
@@ -101,12 +75,13 @@ def found_or_crept(solver: Solver, model: Model, load: Array, start: Array) -> t
         DidNotConverge: it does not come to rest.
     """
     try:
-        return found(solver, model, load, start)
+        return lasting(solver, model, load, start)
     except DidNotConverge:
-        return relaxed(solver, model, load, start)
+        model, solved = relaxed(solver, model, load, start)
+        return lasting(solver, model, load, solved.q) if upset(model) else (model, solved)
 
 
-BRINGING_ON: Ways = (found_or_crept, found, found)
+BRINGING_ON: Ways = (found_or_crept, lasting, lasting)
 """While a load grows: the structure may creep, once, to all of it."""
 
 FOLLOWING: Ways = (found_nearby, found_nearby, found_or_crept)

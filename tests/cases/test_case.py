@@ -61,6 +61,10 @@ def test_changes_from_the_command_line():
         ("analysis.alpha=-0.1", "'conserving' with alpha -0.1: use .* 'hht' and alpha"),
         ("contacts.stone to stone.friction=nun", "friction = 'nun' is not .*, or \"none\""),
         ("contacts.stone to stone.cohesion='5 kN'", "cohesion = '5 kN' is not in a unit like Pa"),
+        (
+            "contacts.stone to stone.tension='1 kPa'",
+            "tension 1e.03 Pa .* is not between 0 and 0 Pa",
+        ),
         ("contacts.stone to stone.cohesion=-1", "cohesion -1 Pa of 'stone to stone' is not betw"),
         ("analysis.halt=maybe", "not true or false"),
         ("criteria.hinge=0.7", "criteria hinge = 0.7: .* at most 0.5"),
@@ -103,6 +107,12 @@ def test_joints_of_a_case_slide_by_friction_and_cohesion():
     held = af.Case.read(RING, [f"{table}.friction='0.7'", f"{table}.cohesion='5 kPa'"])
     contact = held.structure.joints[3].contact
     assert (contact.friction, contact.cohesion) == (0.7, pytest.approx(5e3))
+    bonded = af.Case.read(
+        RING,
+        [f"{table}.{each}" for each in ("cohesion='30 kPa'", "tension='20 kPa'", "dilatancy=0.1")],
+    )
+    contact = bonded.structure.joints[3].contact
+    assert (contact.tension, contact.dilatancy) == (pytest.approx(20e3), 0.1)
     glued = af.Case.read(RING, [GLUED])
     assert not glued.structure.joints[3].contact.slides
     assert af.Case.of(tomllib.loads(glued.text())).structure == glued.structure

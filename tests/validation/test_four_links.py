@@ -18,9 +18,7 @@ from archfem.models.discretisation import Discretisation
 
 def arch(normal):
     contact = af.Contact(normal, 0.4 * normal, friction=None)
-    return af.circular_arch(
-        radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7, contact=contact
-    )
+    return af.circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7, contact=contact)
 
 
 @cache

@@ -140,7 +140,9 @@ class Falling:
         still = 0.0
         for first, last in pairwise([*range(0, steps, stride), steps]):
             times = start.time + self.dt * (np.arange(first, last) + 0.5)
-            fastest = run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(times))
+            fastest = run.advance(
+                np.zeros((last - first, 2)) if motion is None else motion.at(times)
+            )
             time = start.time + self.dt * last
             shaken = motion is not None and time <= motion.duration
             still = 0.0 if shaken or fastest > STILL else still + self.dt * (last - first)

@@ -7,6 +7,7 @@ has shaken the structure over the steps before. The time until a strategy can be
 spread over the run. As all give one history, to rounding, the choice changes nothing but the time.
 """
 
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -53,6 +54,8 @@ WORTH = 0.25
 CLEARLY = 0.95
 """Part of the least time so far below which another strategy counts as faster."""
 
+logger = logging.getLogger("archfem")
+
 _chosen: WeakKeyDictionary[Model, dict[object, type[Strategy]]] = WeakKeyDictionary()
 
 
@@ -83,6 +86,9 @@ def stepper_for(
     strategy = None
     if method == "auto":
         strategy = chosen(equation, start, dt)
+        operator = equation.model.operator
+        if operator is not None and not operator.points.plain:
+            logger.info("joints dilate or resist tension: every step is solved by SNES")
     elif method != "snes":
         strategy = next(each for each in STRATEGIES if each.name == method).of(equation)
         if strategy is None:
@@ -91,7 +97,8 @@ def stepper_for(
                 f"{equation.model.size} coordinates under this damping: contact needs at most "
                 f"{LARGEST} of them and damping on closed or initial joints, chain a bandwidth up "
                 f"to {WIDEST} and Newmark's method or HHT, with which all three need joints whose "
-                "supports have not moved; no monolithic model has one; use method='snes'"
+                "supports have not moved; joints that dilate or resist tension have none, nor have "
+                "monolithic models; use method='snes'"
             )
     return Stepper(equation, strategy, exact=Exact(equation, newton))
 

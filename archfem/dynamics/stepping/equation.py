@@ -41,7 +41,7 @@ class Equation:
         scheme: conserving, Newmark's or HHT-α.
 
     Raises:
-        InvalidInput: joints can slide, and the scheme has no memory.
+        InvalidInput: joints can slide or break, and the scheme has no memory.
     """
 
     model: Model
@@ -50,8 +50,8 @@ class Equation:
     scheme: Scheme = field(default_factory=Conserving)
 
     def __post_init__(self) -> None:
-        """Refuse sliding by schemes that write the equation at an instant."""
-        check_sliding(self.scheme, self.model.structure.friction)
+        """Refuse sliding and bonds by schemes that write the equation at an instant."""
+        check_sliding(self.scheme, self.model.structure)
 
     @property
     def conserving(self) -> bool:
@@ -96,11 +96,13 @@ class Equation:
     def joints(self) -> JointOperator | None:
         """The joints, where all that is not linear are joints that a compiled loop can follow.
 
-        Of joints on supports that have moved only the conserving scheme knows.
+        Of joints on supports that have moved only the conserving scheme knows; of saw teeth and
+        bonds none does.
         """
         joints = self.model.operator
-        known = joints is not None and (self.conserving or joints.offset is None)
-        return joints if known else None
+        if joints is None or not joints.points.plain:
+            return None
+        return joints if self.conserving or joints.offset is None else None
 
     @property
     def remembers(self) -> int:

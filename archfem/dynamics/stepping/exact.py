@@ -12,10 +12,14 @@ from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.newmark import Numbers
 from archfem.dynamics.steps import Batch, State, Step
 from archfem.errors import DidNotConverge
-from archfem.statics.newton import Newton, Solver, magnitude
+from archfem.models.model import Passage
+from archfem.statics.newton import Newton, Solved, Solver, magnitude
 
 HALVINGS = 8
 """Times that a step may be halved before giving up."""
+
+TURNS = 60
+"""In which a step and the rise of its saw teeth are found, one from the other."""
 
 Attempt = Callable[[State, float], Step]
 """From a state and a time step to the step."""
@@ -137,7 +141,6 @@ class Exact:
         """
         equation, (numbers, linear) = self.equation, self._prepared(dt)
         model = equation.remembering(state)
-        passage = model.passage(state.q, equation.lag / dt)
         ground = equation.ground(np.array([state.time + dt]), dt)[0, 0]
         load = equation.weight - model.body @ ground
         gain = numbers.velocity[1]
@@ -145,25 +148,28 @@ class Exact:
         def speed(q: Array) -> Array:
             return np.asarray(gain * (q - state.q) - state.velocity)
 
-        def unbalanced(q: Array) -> Array:
-            change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
-            moving = model.mass @ change + equation.viscous @ drag
-            return np.asarray(moving + passage.force(q) - load)
+        def solved(passage: Passage, guess: Array) -> Solved:
+            def unbalanced(q: Array) -> Array:
+                change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
+                moving = model.mass @ change + equation.viscous @ drag
+                return np.asarray(moving + passage.force(q) - load)
 
-        def tangent(q: Array) -> sparse.csr_matrix:
-            matrix = passage.tangent(q)
-            matrix.data = matrix.data + linear.data / numbers.gain
-            return matrix
+            def tangent(q: Array) -> sparse.csr_matrix:
+                matrix = passage.tangent(q)
+                matrix.data = matrix.data + linear.data / numbers.gain
+                return matrix
 
-        guess = state.q + dt * state.velocity
-        solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
-        q, moved = solved.q, solved.q - state.q
+            return self._solver.solve(unbalanced, tangent, guess, self._scale)
+
+        passage = model.passage(state.q, equation.lag / dt)
+        passage, found = _raised(passage, solved, state.q + dt * state.velocity)
+        q, moved = found.q, found.q - state.q
         memory, velocity = passage.remembered(q), speed(q)
         new = State(state.time + dt, q, velocity, (velocity - state.velocity) / dt, memory)
         lost = passage.lost(q) + float(moved @ (equation.viscous @ moved)) / dt
         work = -float(moved @ (model.body @ ground))
         energy = equation.energy(new) + np.array([0.0, 0.0, work, lost])
-        return Step(new, passage.resultants(q), solved.iterations, dt, energy)
+        return Step(new, passage.resultants(q), found.iterations, dt, energy)
 
     def _prepared(self, dt: float) -> tuple[Numbers, sparse.csr_matrix]:
         """Numbers of a step, and μ M + ν R; the same objects as before while the step stays."""
@@ -198,6 +204,21 @@ class Exact:
             first = self._advance(state, state.time + dt / 2.0, halvings + 1)
             return self._advance(first.state, target, halvings + 1).after(first)
         return replace(step, state=replace(step.state, time=target))
+
+
+def _raised(
+    passage: Passage, solve: Callable[[Passage, Array], Solved], guess: Array
+) -> tuple[Passage, Solved]:
+    """Solve a step by turns with where its saw teeth end; at once where there are none."""
+    iterations = 0
+    for _ in range(TURNS):
+        found = solve(passage, guess)
+        guess, iterations = found.q, iterations + found.iterations
+        following = passage.raising(guess)
+        if following is passage:
+            return passage, replace(found, iterations=iterations)
+        passage = following
+    raise DidNotConverge(f"saw teeth of joints that slide do not settle in {TURNS} turns")
 
 
 def _written(start: State, end: State, share: float) -> State:

@@ -213,7 +213,9 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     for turn in range(ITERATIONS):
         new[0] = old[0] + move
         left = _left(system, kept, old[0], new[0])
-        if left <= system.enough[0] or (last <= system.enough[1] and left <= 1e4 * system.enough[0]):
+        if left <= system.enough[0] or (
+            last <= system.enough[1] and left <= 1e4 * system.enough[0]
+        ):
             new[1] = (2.0 / dt) * move - old[1]
             new[2] = (new[1] - old[1]) / dt
             return turn + 1
