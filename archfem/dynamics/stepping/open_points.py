@@ -137,9 +137,9 @@ def square(matrix, rows):  # type: ignore
     """
     result = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
-        line = matrix[rows[i]]
+        row = rows[i]
         for j in range(len(rows)):
-            result[i, j] = line[rows[j]]
+            result[i, j] = matrix[row, rows[j]]
     return result
 
 

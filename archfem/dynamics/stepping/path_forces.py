@@ -109,9 +109,13 @@ def facet_means(ends, first, second):  # type: ignore
         second: change of the end with it [-].
     """
     a, c, b, d = ends
-    if a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0:
+    if max(ends) <= 0.0 or min(ends) > 0.0:
         near, far = (a + b) / 12.0, (c + d) / 12.0
-        return (2.0 * near + far, near + 2.0 * far), (0.0, 0.0), (0.0, 0.0, 0.0), (0.5, 0.5)
+        both, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
+        if max(ends) <= 0.0:
+            return both, none, (0.0, 0.0, 0.0), (0.5, 0.5)
+        rate = (first + second) / 12.0
+        return none, both, (2.0 * rate, rate, 2.0 * rate), none
     low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
     high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
     breaks = (0.0, min(low, high), max(low, high), 1.0)

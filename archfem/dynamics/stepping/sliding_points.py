@@ -119,17 +119,21 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     size, local = len(rows), np.full(len(start), -1)
     for k in range(size):
         local[rows[k]] = k
+    slips = rows[np.searchsorted(rows, len(law.stiffness)) :]
+    known = local, np.flatnonzero((local[law.near] >= 0) & (local[law.far] >= 0)), slips
     matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
-    gap, z, last = start.copy(), chosen(law.guess, rows), np.inf
+    gap, z, last = law.guess.copy(), chosen(law.guess, rows), np.inf
     wanted, share, calm = np.empty(size), 1.0, 0
-    rooms = (law.work.places, law.work.values)
-    count = _taken(law, (gap, z), rows, local, wanted)
+    entries = (law.work.places, law.work.values)
+    count = _taken(law, gap, known, wanted)
     for passes in range(1, ITERATIONS + 1):
-        wanted += _newton(matrix, free + matrix @ wanted - z, rooms, count)
+        wanted += _newton(matrix, free + matrix @ wanted - z, entries, count)
         for k in range(size):
             own[k] += share * (wanted[k] - own[k])
         z = free + matrix @ own
-        count = _taken(law, (gap, z), rows, local, wanted)
+        for k in range(size):
+            gap[rows[k]] = z[k]
+        count = _taken(law, gap, known, wanted)
         off = np.max(np.abs(wanted - own))
         if off <= enough or last <= off <= ROUNDED * enough:
             for k in range(size):
@@ -153,13 +157,9 @@ solved_by(
 
 
 @numba.njit(cache=True)
-def _taken(law, gaps, rows, local, wanted):  # type: ignore
+def _taken(law, gap, known, wanted):  # type: ignore
     """λ of the rows, and its derivatives as entries of a matrix; returns how many those are."""
-    (gap, z), openings, work = gaps, len(law.stiffness), law.work
-    for k in range(len(rows)):
-        gap[rows[k]] = z[k]
-    stretches = np.flatnonzero((local[law.near] >= 0) & (local[law.far] >= 0))
-    slips = rows[np.searchsorted(rows, openings) :]
+    (local, stretches, slips), openings, work = known, len(law.stiffness), law.work
     press(law, gap, stretches)
     slide(law, gap, slips)
     count, entries = 0, (work.places, work.values)
@@ -214,12 +214,12 @@ def _newton(matrix, rest, entries, count):  # type: ignore
     rows = np.flatnonzero(changes)
     if len(rows) > FEW:
         return _gradients(matrix, change, entries, count)
-    number, whole = np.cumsum(changes) - 1, np.eye(len(rows))
+    whole = np.eye(len(rest))
     for entry in range(count):
-        line, row = matrix[places[entry, 1]], number[places[entry, 0]]
-        for k in range(len(rows)):
-            whole[row, k] -= values[entry] * line[rows[k]]
-    change[rows] = np.linalg.solve(whole, change[rows])
+        row, column, value = places[entry, 0], places[entry, 1], values[entry]
+        for k in range(len(rest)):
+            whole[row, k] -= value * matrix[column, k]
+    change[rows] = np.linalg.solve(square(whole, rows), chosen(change, rows))
     return change
 
 
