@@ -46,6 +46,16 @@ class GapRows(NamedTuple):
     share: Array
     group: Any
 
+    @property
+    def stretch(self) -> Any:
+        """To which stretch each point belongs (p,)."""
+        return np.repeat(np.arange(len(self.near)), np.diff(self.begin))
+
+    @property
+    def sizes(self) -> Any:
+        """How many points each row of slips has (g,)."""
+        return np.bincount(self.group[self.group >= 0], minlength=len(self.offset))[self.openings :]
+
 
 def gap_rows(joints: JointOperator) -> GapRows:
     """Return the rows of gaps of some joints.
@@ -53,31 +63,23 @@ def gap_rows(joints: JointOperator) -> GapRows:
     Args:
         joints: whose slips are followed where any of them can slide.
     """
-    points, facets = joints.points, isinstance(joints.law, Facets)
+    points = joints.points
     offset = np.zeros((2, len(points.arm))) if joints.offset is None else joints.offset
     kept: list[int] = []
     slipping: list[int] = []
-    stretches: list[tuple[int, int, int]] = []
+    stretches: list[Any] = []
     share, group = np.zeros(len(points.arm)), np.full(len(points.arm), -1)
     for joint in range(points.count):
         own = np.flatnonzero(points.joint == joint)
         gaps = _dense(joints.opening[own], offset[0][own])
-        ends, shares = _between(points.arm[own])
-        if np.abs(gaps - (1.0 - shares) * gaps[ends[0]] - shares * gaps[ends[1]]).max() <= SAME:
-            first, which = np.array(ends), shares.ravel()
-            stretches.append((own[0], len(kept), len(kept) + 1))
-        else:
-            first, number = _distinct(gaps)
-            number, step = number + len(kept), 2 if facets else 1
-            which = np.resize([0.0, 1.0], len(own)) if facets else np.zeros(len(own))
-            stretches += zip(own[::step], number[::step], number[step - 1 :: step], strict=True)
-        share[own] = which
+        first, parts, share[own] = _stretches(joints, own, gaps)
+        stretches.append(parts + np.array([own[0], len(kept), len(kept)]))
         kept += own[first].tolist()
         if joints.slides:
             first, number = _distinct(_dense(joints.slip[own], offset[1][own]))
             group[own] = number + len(slipping)
             slipping += own[first].tolist()
-    begin, near, far = np.array(stretches).T
+    begin, near, far = np.concatenate(stretches).T
     return GapRows(
         sparse.vstack([joints.opening[kept], joints.slip[slipping]], "csr"),
         np.concatenate([offset[0][kept], offset[1][slipping]]),
@@ -90,11 +92,22 @@ def gap_rows(joints: JointOperator) -> GapRows:
     )
 
 
+def _stretches(joints: JointOperator, own: Any, gaps: Array) -> tuple[Any, Any, Array]:
+    """Rows kept of a joint; where its stretches begin, near and far row (s, 3); ξ of its points."""
+    ends, shares = _between(joints.points.arm[own])
+    if np.abs(gaps - (1.0 - shares) * gaps[ends[0]] - shares * gaps[ends[1]]).max() <= SAME:
+        return np.array(ends), np.array([[0, 0, 1]]), shares.ravel()
+    first, number = _distinct(gaps)
+    step = 2 if isinstance(joints.law, Facets) else 1
+    places = np.arange(len(own))
+    parts = [places[::step], number[::step], number[step - 1 :: step]]
+    return first, np.stack(parts, axis=1), (places % step).astype(float)
+
+
 def _dense(rows: sparse.csr_matrix, offset: Array) -> Array:
     """Rows without their empty columns, and their offsets, each in parts of the largest (k, m)."""
-    dense = np.column_stack([rows[:, np.unique(rows.indices)].toarray()])
-    parts = [each / max(np.abs(each).max(initial=0.0), 1e-300) for each in (dense, offset[:, None])]
-    return np.hstack(parts)
+    parts = rows[:, np.unique(rows.indices)].toarray(), offset[:, None]
+    return np.hstack([each / max(np.abs(each).max(initial=0.0), 1e-300) for each in parts])
 
 
 def _between(arm: Array) -> tuple[tuple[int, int], Array]:

@@ -23,47 +23,49 @@ def press(law, gap, stretches):  # type: ignore
     for stretch in stretches:
         near, far = law.near[stretch], law.far[stretch]
         moved = half * (gap[near] - law.start[near]), half * (gap[far] - law.start[far])
-        before, after = (
-            (gap[near] - moved[0], gap[far] - moved[1]),
-            (gap[near] + moved[0], gap[far] + moved[1]),
-        )
-        e0 = e1 = r0 = r1 = r2 = 0.0
-        for point in range(law.begin[stretch], law.begin[stretch + 1]):
+        before = gap[near] - moved[0], gap[far] - moved[1]
+        after = gap[near] + moved[0], gap[far] + moved[1]
+        for point in range(law.begin[stretch], law.begin[stretch + 1], 2 if facets else 1):
+            other = point + 1 if facets else point
+            a, b = law.share[point], law.share[other]
+            ends = between(before, a), between(before, b), between(after, a), between(after, b)
+            normal, taken, rate, time = _means(ends, (1.0 - half, 1.0 + half), facets)
             stiffness, area = law.still.stiffness[point], law.area[point]
-            share = law.share[point]
-            if not facets:
-                ends = between(before, share), between(after, share)
-                normal, taken, rate, time = point_means(ends[0], ends[1], 1.0 - half, 1.0 + half)
-                by0, by1 = rate * (1.0 - share), rate * share
-            elif point % 2 == 0:
-                other = law.share[point + 1]
-                ends4 = (
-                    between(before, share),
-                    between(before, other),
-                    between(after, share),
-                    between(after, other),
-                )
-                normals, takens, rates, times = facet_means(ends4, 1.0 - half, 1.0 + half)
-                normal, taken, time = normals[0], takens[0], times[0]
-                by0 = rates[0] * (1.0 - share) + rates[1] * (1.0 - other)
-                by1 = rates[0] * share + rates[1] * other
-            else:
-                other = law.share[point - 1]
-                normal, taken, time = normals[1], takens[1], times[1]
-                by0 = rates[1] * (1.0 - other) + rates[2] * (1.0 - share)
-                by1 = rates[1] * other + rates[2] * share
-            work.normal[point], work.taken[point] = stiffness * normal, stiffness * taken
-            work.area[point] = area * time
-            by0 *= stiffness
-            by1 *= stiffness
-            work.rate[point, 0], work.rate[point, 1] = by0, by1
-            e0 += (1.0 - share) * stiffness * taken
-            e1 += share * stiffness * taken
-            r0 += (1.0 - share) * by0
-            r1 += (1.0 - share) * by1
-            r2 += share * by1
-        work.ends[stretch, 0], work.ends[stretch, 1] = e0, e1
-        work.rates[stretch, 0], work.rates[stretch, 1], work.rates[stretch, 2] = r0, r1, r2
+            for k in range(other - point + 1):
+                work.normal[point + k] = stiffness * normal[k]
+                work.taken[point + k] = stiffness * taken[k]
+                work.area[point + k] = area * time[k]
+                by = stiffness * rate[k], stiffness * rate[k + 1]
+                work.rate[point + k, 0] = by[0] * (1.0 - a) + by[1] * (1.0 - b)
+                work.rate[point + k, 1] = by[0] * a + by[1] * b
+    _sum_up(law, stretches)
+
+
+@numba.njit(cache=True)
+def _sum_up(law, stretches):  # type: ignore
+    """λ of stretches and its derivatives, from those of their points."""
+    work = law.work
+    for stretch in stretches:
+        near = far = first = mixed = last = 0.0
+        for point in range(law.begin[stretch], law.begin[stretch + 1]):
+            share, taken = law.share[point], work.taken[point]
+            near += (1.0 - share) * taken
+            far += share * taken
+            first += (1.0 - share) * work.rate[point, 0]
+            mixed += (1.0 - share) * work.rate[point, 1]
+            last += share * work.rate[point, 1]
+        work.ends[stretch, 0], work.ends[stretch, 1] = near, far
+        work.rates[stretch, 0], work.rates[stretch, 1] = first, mixed
+        work.rates[stretch, 2] = last
+
+
+@numba.njit(cache=True)
+def _means(ends, rates, facets):  # type: ignore
+    """What `facet_means` gives of a facet, or with zeros `point_means` of a spring."""
+    if facets:
+        return facet_means(ends, rates[0], rates[1])
+    normal, taken, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
+    return (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0)
 
 
 @numba.njit(cache=True)
@@ -110,12 +112,7 @@ def facet_means(ends, first, second):  # type: ignore
     """
     a, c, b, d = ends
     if max(ends) <= 0.0 or min(ends) > 0.0:
-        near, far = (a + b) / 12.0, (c + d) / 12.0
-        both, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
-        if max(ends) <= 0.0:
-            return both, none, (0.0, 0.0, 0.0), (0.5, 0.5)
-        rate = (first + second) / 12.0
-        return none, both, (2.0 * rate, rate, 2.0 * rate), none
+        return _whole_means(ends, 0.5 * (first + second))
     low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
     high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
     breaks = (0.0, min(low, high), max(low, high), 1.0)
@@ -141,6 +138,17 @@ def facet_means(ends, first, second):  # type: ignore
             s0 += weight * near * time
             s1 += weight * far * time
     return (n0, n1), (t0, t1), (r00, r01, r11), (s0, s1)
+
+
+@numba.njit(cache=True)
+def _whole_means(ends, rate):  # type: ignore
+    """The same of a facet that is closed, or open, everywhere and all the way."""
+    a, c, b, d = ends
+    near, far = (a + b) / 12.0, (c + d) / 12.0
+    means, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
+    if max(ends) <= 0.0:
+        return means, none, (0.0, 0.0, 0.0), (0.5, 0.5)
+    return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
 
 
 @numba.njit(cache=True)
@@ -179,14 +187,13 @@ def slide(law, gap, rows):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _rub(start_, change, late, limit):  # type: ignore
+def _rub(first, change, late, limit):  # type: ignore
     """Shear of a point that slides during the step, as `joints.law.shear_over_step`.
 
     Returns:
         Mean shear, what the elastic shear loses by sliding, derivatives of the mean by its elastic
         change and by the limit, and the energy lost times the stiffness.
     """
-    first = start_
     start = min(max(first, -limit), limit)
     last = min(max(start + change, -limit), limit)
     over = start + change - last

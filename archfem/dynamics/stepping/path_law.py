@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.gap_rows import gap_rows
+from archfem.dynamics.stepping.gap_rows import GapRows, gap_rows
 from archfem.dynamics.stepping.joint_law import Law, law_of
 from archfem.dynamics.stepping.newmark import Numbers
 from archfem.joints.operator import JointOperator
@@ -127,14 +127,6 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
     points, still, gaps = joints.points, law_of(joints), gap_rows(joints)
     count, rows = len(points.arm), len(gaps.offset)
     offset = np.zeros((2, count)) if joints.offset is None else joints.offset
-    area = points.weight.copy()
-    if still.facets:
-        area = np.repeat(area[0::2] + area[1::2], 2)
-    stretch = np.repeat(np.arange(len(gaps.near)), np.diff(gaps.begin))
-    stiffness = np.zeros(gaps.openings)
-    for ends in (gaps.near, gaps.far):
-        np.maximum.at(stiffness, ends[stretch], still.stiffness)
-    sizes = np.bincount(gaps.group[gaps.group >= 0], minlength=rows)[gaps.openings :]
     law = PathLaw(
         still,
         numbers.gain,
@@ -142,16 +134,16 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
         gaps.begin,
         gaps.near,
         gaps.far,
-        stretch,
+        gaps.stretch,
         gaps.share,
         _closed(still, gaps.share),
-        stiffness,
-        area,
+        _largest(gaps, still.stiffness),
+        still.stiffness / points.normal_stiffness,
         points.friction,
         points.cohesion,
         points.shear,
         gaps.group,
-        np.append(0, np.cumsum(sizes)),
+        np.append(0, np.cumsum(gaps.sizes)),
         np.argsort(gaps.group, kind="stable"),
         gaps.offset,
         np.zeros(rows),
@@ -159,9 +151,17 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
         np.zeros(count),
         np.zeros(rows),
         0.5 * float(np.sum(offset * joints.bonded(offset))),
-        _room(count, len(gaps.near), len(sizes)),
+        _room(count, len(gaps.near), len(gaps.sizes)),
     )
     return law, gaps.rows
+
+
+def _largest(gaps: GapRows, stiffness: Array) -> Array:
+    """The largest stiffness of the points of each row of openings (o,) [N/m]."""
+    largest: Array = np.zeros(gaps.openings)
+    for ends in (gaps.near, gaps.far):
+        np.maximum.at(largest, ends[gaps.stretch], stiffness)
+    return largest
 
 
 def _closed(still: Law, share: Array) -> Array:
@@ -170,7 +170,8 @@ def _closed(still: Law, share: Array) -> Array:
     if still.facets:
         other = ends.reshape(-1, 2, 2)[:, ::-1].reshape(-1, 2)
         ends = ends / 3.0 + other / 6.0
-    return still.stiffness[:, None] * ends
+    closed: Array = still.stiffness[:, None] * ends
+    return closed
 
 
 def _room(points: int, stretches: int, slips: int) -> Work:
