@@ -15,7 +15,9 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     linear           a step of what is linear but for its joints, written at an instant
     passing          the same with the means over a step, of joints that open, close and slide
     joint_law        what joints do not carry at an instant, compiled
-    path_law         the same on the mean of a step
+    path_law         the same on the mean of a step: what it knows and remembers
+    path_forces      and what joints carry by it
+    gap_rows         gaps of the joints from which all others follow
     small_problem    of the joint points that open or slide: what solves it
     open_points      its solution at an instant
     sliding_points   its solution over a step

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.dynamics.stepping import open_points  # noqa: F401  (solves the small problem)
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.joint_law import Law, joint_resultants, law_of, pulls
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.newmark import Numbers, add_mixed, follow, mix
-from archfem.dynamics.stepping.open_points import is_law
 from archfem.dynamics.stepping.path_law import PathLaw, path_law
+from archfem.dynamics.stepping.small_problem import add_held, is_of
 from archfem.dynamics.stepping.sparse_rows import Rows, add_rows, rows_of, stored, times, trimmed
 
 Matrix = Rows | Array
@@ -151,15 +152,6 @@ def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:
     raise NotImplementedError
 
 
-def is_linear(system: types.Type) -> bool:
-    """Return whether this is the type of a system of a linear strategy.
-
-    Args:
-        system: as numba types it.
-    """
-    return is_law(law_type(system))
-
-
 def law_type(system: types.Type) -> types.Type | None:
     """Return the type of the law of a system, or None where it has no field `linear`.
 
@@ -175,49 +167,63 @@ def law_type(system: types.Type) -> types.Type | None:
 
 @overload(begin)
 def _begin(system, state, memory):  # type: ignore
-    return _started if is_linear(system) else None
+    return _started if is_of(law_type(system), Law) else None
 
 
 @overload(settle)
 def _settle(system, kept, step, states, ground):  # type: ignore
-    return _settled if is_linear(system) else None
+    return _settled if law_type(system) else None
 
 
 @overload(measure)
 def _measure(system, kept, step, states, ground, results, memory):  # type: ignore
-    return _measured if is_linear(system) else None
+    return _measured if is_of(law_type(system), Law) else None
 
 
 def _started(system, state, memory):  # type: ignore
     """Images of a state under M, K and R, its gaps and what the joints do there."""
     linear, size, points = system.linear, state.shape[1], len(system.linear.law.stiffness)
-    images, gaps = np.zeros((2, 3, 3, size)), np.zeros((2, 5, points))
-    gap, force = np.empty(points), np.empty(points)
+    gaps, gap, force = np.zeros((2, 5, points)), np.empty(points), np.empty(points)
+    for k in range(3):
+        times(linear.opening, state[k], gaps[0, k])
+    mix(gap, gaps[0], (1.0, linear.numbers.lag, 0.0))
+    pulls(gap, linear.law, force)
+    _late(gaps[0], linear.numbers.lag, linear.law)
+    images = images_of(linear, state)
+    return Kept(images, gaps, gap, gap.copy(), force, np.empty(size), np.empty(size))
+
+
+@numba.njit(cache=True)
+def images_of(linear, state):  # type: ignore
+    """Return images of a state under M, K and R, as the first of two ends of a step (2, 3, 3, n).
+
+    Args:
+        linear: `Linear`.
+        state: u, v and a (3, n).
+    """
+    images = np.zeros((2, 3, 3, state.shape[1]))
     for k in range(3):
         times(linear.mass, state[k], images[0, 0, k])
         times(linear.closed, state[k], images[0, 1, k])
         if stored(linear.rest) > 0:
             times(linear.rest, state[k], images[0, 2, k])
-        times(linear.opening, state[k], gaps[0, k])
-    mix(gap, gaps[0], (1.0, linear.numbers.lag, 0.0))
-    pulls(gap, linear.law, force)
-    _late(gaps[0], linear.numbers.lag, linear.law)
-    return Kept(images, gaps, gap, gap.copy(), force, np.empty(size), np.empty(size))
+    return images
 
 
 def _settled(system, kept, step, states, ground):  # type: ignore
     """Take a step, and let the images follow."""
     linear, right, contact = system.linear, kept.right, kept.contact
     old, new = kept.images[step % 2], kept.images[(step + 1) % 2]
-    add_load(right, ground, linear.weight, linear.body)
+    _add_load(right, ground, linear.weight, linear.body)
     add_mixed(right, old[0], linear.numbers.pushed)
     if stored(linear.rest) > 0:
         add_mixed(right, old[2], linear.numbers.dragged)
+    add_held(linear.law, linear.opening, right)
     contact[:] = right
     passes = solve(system, contact, kept.gap, kept.before, kept.force)
     if passes > 0:
         add_rows(linear.opening, np.flatnonzero(kept.force), kept.force, right)
-        follow_images(contact, right, (old, new), linear)
+        _follow_images(contact, right, (old, new), linear)
         follow(contact, states[0], states[1], linear.numbers)
     return passes
 
@@ -244,7 +250,7 @@ def _measured(system, kept, step, states, ground, results, memory):  # type: ign
 
 
 @numba.njit(cache=True)
-def add_load(result, ground, weight, body):  # type: ignore
+def _add_load(result, ground, weight, body):  # type: ignore
     """Forces of gravity and of the ground."""
     across, up = body[0], body[1]
     x, y = ground[0], ground[1]
@@ -253,7 +259,7 @@ def add_load(result, ground, weight, body):  # type: ignore
 
 
 @numba.njit(cache=True)
-def follow_images(contact, right, images, linear):  # type: ignore
+def _follow_images(contact, right, images, linear):  # type: ignore
     """Images of the state under M, K and R after a step; overwrites its right side."""
     (old, new), numbers = images, linear.numbers
     image = np.empty(len(contact))

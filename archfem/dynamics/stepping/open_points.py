@@ -14,11 +14,8 @@ lie between 0 and 1, few of them near 0, so conjugate gradients take a few produ
 from the gaps of the last pass, and those of the first pass from the λ of the last step.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
-from numba.extending import overload
 
 from archfem.dynamics.stepping.joint_law import Law, integrals, open_part, pull, pulls
 from archfem.dynamics.stepping.loop import ITERATIONS
@@ -26,11 +23,13 @@ from archfem.dynamics.stepping.small_problem import (
     AHEAD,
     EXACT,
     ROUNDED,
+    add_held,
     exact,
     expected,
     largest,
     release,
     shift,
+    solved_by,
 )
 
 FEW = 24
@@ -39,42 +38,6 @@ FEW = 24
 ROUGH = 1e-3
 """What the first pass leaves of its residual; later ones leave the less the better they converge,
 as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
-
-
-@overload(release)
-def _release(law, start, rows, compliance, force, enough):  # type: ignore
-    return _released if is_law(law) else None
-
-
-@overload(exact)
-def _exact(law, gap, force, near):  # type: ignore
-    return _fits if is_law(law) else None
-
-
-@overload(expected)
-def _expected(law, gap, before, force):  # type: ignore
-    return _foreseen if is_law(law) else None
-
-
-@overload(largest)
-def _largest(law, gap):  # type: ignore
-    if is_law(law):
-        return lambda law, gap: np.max(law.stiffness * np.abs(gap))
-    return None
-
-
-@overload(shift)
-def _shift(law, gap):  # type: ignore
-    return (lambda law, gap: None) if is_law(law) else None
-
-
-def is_law(law: Any) -> bool:
-    """Return whether this is the type of a law at an instant.
-
-    Args:
-        law: as numba types it, or None where there is none.
-    """
-    return getattr(law, "instance_class", None) is Law
 
 
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
@@ -126,6 +89,30 @@ def _foreseen(law, gap, before, force):  # type: ignore
     return near
 
 
+def _largest(law, gap):  # type: ignore
+    """Return the largest force of a point if all joints held tension."""
+    return np.max(law.stiffness * np.abs(gap))
+
+
+def _same(law, gap):  # type: ignore
+    """Leave gaps as they are."""
+
+
+def _none(law, opening, right):  # type: ignore
+    """Add nothing."""
+
+
+solved_by(
+    Law,
+    (expected, _foreseen),
+    (release, _released),
+    (exact, _fits),
+    (shift, _same),
+    (largest, _largest),
+    (add_held, _none),
+)
+
+
 @numba.njit(cache=True)
 def chosen(vector, rows):  # type: ignore
     """Return entries of a vector (rows,).
@@ -150,9 +137,9 @@ def square(matrix, rows):  # type: ignore
     """
     result = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
-        line = matrix[rows[i]]
+        row = rows[i]
         for j in range(len(rows)):
-            result[i, j] = line[rows[j]]
+            result[i, j] = matrix[row, rows[j]]
     return result
 
 

@@ -14,18 +14,12 @@ from numba.extending import overload
 from archfem.arrays import Array
 from archfem.dynamics.stepping import sliding_points  # noqa: F401  (solves the small problem)
 from archfem.dynamics.stepping.joint_law import pulls
-from archfem.dynamics.stepping.linear import (
-    add_load,
-    closed_energies,
-    follow_images,
-    law_type,
-    solve,
-)
-from archfem.dynamics.stepping.loop import begin, measure, settle
-from archfem.dynamics.stepping.newmark import add_mixed, follow
-from archfem.dynamics.stepping.path_law import facet_means, point_means
-from archfem.dynamics.stepping.sliding_points import is_path_law
-from archfem.dynamics.stepping.sparse_rows import add_rows, stored, times
+from archfem.dynamics.stepping.linear import closed_energies, images_of, law_type
+from archfem.dynamics.stepping.loop import begin, measure
+from archfem.dynamics.stepping.path_forces import between, facet_means, point_means
+from archfem.dynamics.stepping.path_law import PathLaw
+from archfem.dynamics.stepping.small_problem import is_of
+from archfem.dynamics.stepping.sparse_rows import stored, times
 
 
 class Passed(NamedTuple):
@@ -36,92 +30,43 @@ class Passed(NamedTuple):
         gap: z, that the law sees (r,).
         before: the same a step earlier (r,).
         force: λ (r,).
-        slid: what joints hold back of what they would carry had nothing slid before (r,).
         contact: w (n,).
         right: right side of a step (n,).
-        pulled: tension taken out at the end of the step (p,).
+        room: for openings at the end of the step, and for the tension taken out there (2, p).
     """
 
     images: Array
     gap: Array
     before: Array
     force: Array
-    slid: Array
     contact: Array
     right: Array
-    pulled: Array
+    room: Array
 
 
 @overload(begin)
 def _begin(system, state, memory):  # type: ignore
-    return _started if is_path_law(law_type(system)) else None
-
-
-@overload(settle)
-def _settle(system, kept, step, states, ground):  # type: ignore
-    return _settled if is_path_law(law_type(system)) else None
+    return _started if is_of(law_type(system), PathLaw) else None
 
 
 @overload(measure)
 def _measure(system, kept, step, states, ground, results, memory):  # type: ignore
-    return _measured if is_path_law(law_type(system)) else None
+    return _measured if is_of(law_type(system), PathLaw) else None
 
 
 def _started(system, state, memory):  # type: ignore
     """Images of a state under M, K and R, its gaps, and the shear that its joints remember."""
     linear, law = system.linear, system.linear.law
     size, rows, points = state.shape[1], len(law.start), len(law.group)
-    images, gap, rate = np.zeros((2, 3, 3, size)), np.empty(rows), np.empty(rows)
-    for k in range(3):
-        times(linear.mass, state[k], images[0, 0, k])
-        times(linear.closed, state[k], images[0, 1, k])
-        if stored(linear.rest) > 0:
-            times(linear.rest, state[k], images[0, 2, k])
+    gap, rate = np.empty(rows), np.empty(rows)
     times(linear.opening, state[0], gap)
     times(linear.opening, state[1], rate)
     gap += law.offset
     law.start[:], law.speed[:] = gap, rate * (2.0 / linear.numbers.velocity[1])
     law.slid[: len(memory)] = memory
-    before = gap - law.speed
-    return Passed(
-        images,
-        gap,
-        before,
-        np.zeros(rows),
-        np.zeros(rows),
-        np.empty(size),
-        np.empty(size),
-        np.empty(points),
-    )
-
-
-def _settled(system, kept, step, states, ground):  # type: ignore
-    """Take a step, and let the images follow."""
-    linear, right, contact = system.linear, kept.right, kept.contact
-    old, new = kept.images[step % 2], kept.images[(step + 1) % 2]
-    add_load(right, ground, linear.weight, linear.body)
-    add_mixed(right, old[0], linear.numbers.pushed)
-    if stored(linear.rest) > 0:
-        add_mixed(right, old[2], linear.numbers.dragged)
-    _hold(linear.law, kept.slid)
-    add_rows(linear.opening, np.flatnonzero(kept.slid), kept.slid, right)
-    contact[:] = right
-    passes = solve(system, contact, kept.gap, kept.before, kept.force)
-    if passes > 0:
-        add_rows(linear.opening, np.flatnonzero(kept.force), kept.force, right)
-        follow_images(contact, right, (old, new), linear)
-        follow(contact, states[0], states[1], linear.numbers)
-    return passes
-
-
-@numba.njit(cache=True)
-def _hold(law, slid):  # type: ignore
-    """What rows of slips would carry more had nothing slid before the step."""
-    slid[:] = 0.0
-    for point in range(len(law.group)):
-        row = law.group[point]
-        if row >= 0:
-            slid[row] += law.shear[point] * law.slid[point]
+    images, room = images_of(linear, state), np.empty((2, points))
+    before, force = gap - law.speed, np.zeros(rows)
+    return Passed(images, gap, before, force, np.empty(size), np.empty(size), room)
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
@@ -161,10 +106,10 @@ def _go_on(law, kept, energy, memory):  # type: ignore
     Energies are as if joints held tension and did not slide: what open ones do not store or damp
     is taken off, and what friction takes is added.
     """
-    work, late, points, start = law.work, law.late, len(law.group), law.start
-    for row in range(0, points, 2 if law.still.facets else 1):
-        energy[3] += _lagged(law, kept.gap, row)
-    for point in range(points):
+    work, late, start, (opened, pulled) = law.work, law.late, law.start, kept.room
+    if late > 0.0:
+        energy[3] += _lagged(law, kept.gap)
+    for point in range(len(law.group)):
         row = law.group[point]
         if row >= 0:
             stiffness, slip = law.shear[point], law.gain * (kept.gap[row] - start[row])
@@ -173,9 +118,13 @@ def _go_on(law, kept, energy, memory):  # type: ignore
         moved = law.gain * (kept.gap[row] - start[row])
         start[row] += moved
         law.speed[row] = 2.0 * moved - law.speed[row]
-    pulls(start[:points], law.still, kept.pulled)
-    for point in range(points):
-        energy[1] -= 0.5 * start[point] * kept.pulled[point]
+    for point in range(len(law.group)):
+        stretch = law.stretch[point]
+        ends = start[law.near[stretch]], start[law.far[stretch]]
+        opened[point] = between(ends, law.share[point])
+    pulls(opened, law.still, pulled)
+    for point in range(len(law.group)):
+        energy[1] -= 0.5 * opened[point] * pulled[point]
         row = law.group[point]
         if row >= 0:
             law.slid[point] += work.slid[point]
@@ -186,21 +135,25 @@ def _go_on(law, kept, energy, memory):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _lagged(law, gap, row):  # type: ignore
-    """What the lag of damping takes at a point, or on its facet, less that if it were closed."""
-    start, gain, work, stiffness = law.start, law.gain, law.work, law.still.stiffness[row]
-    if law.late == 0.0:
-        return 0.0
-    moved = gain * (gap[row] - start[row])
-    a, b = start[row], start[row] + moved
-    if not law.still.facets:
-        taken = point_means(a, b, 0.0, 0.0)[1]
-        return moved * (stiffness * taken - work.taken[row])
-    far = row + 1
-    other = gain * (gap[far] - start[far])
-    c, d = start[far], start[far] + other
-    near, beyond = 0.0, 0.0
-    if a > 0.0 or b > 0.0 or c > 0.0 or d > 0.0:
-        near, beyond = facet_means((a, c, b, d), 0.0, 0.0)[1]
-    lost = moved * (stiffness * near - work.taken[row])
-    return lost + other * (stiffness * beyond - work.taken[far])
+def _lagged(law, gap):  # type: ignore
+    """What the lag of damping takes on openings, less that if joints were closed."""
+    work, start, lost = law.work, law.start, 0.0
+    for stretch in range(len(law.near)):
+        near, far = law.near[stretch], law.far[stretch]
+        first = start[near], start[far]
+        moved = law.gain * (gap[near] - first[0]), law.gain * (gap[far] - first[1])
+        last = first[0] + moved[0], first[1] + moved[1]
+        lost -= moved[0] * work.ends[stretch, 0] + moved[1] * work.ends[stretch, 1]
+        if max(first[0], first[1], last[0], last[1]) <= 0.0:
+            continue
+        for point in range(law.begin[stretch], law.begin[stretch + 1]):
+            stiffness, share = law.still.stiffness[point], law.share[point]
+            a, b, way = between(first, share), between(last, share), between(moved, share)
+            if not law.still.facets:
+                lost += way * stiffness * point_means(a, b, 0.0, 0.0)[1]
+            elif point % 2 == 0:
+                other = law.share[point + 1]
+                ends = (a, between(first, other), b, between(last, other))
+                taken = facet_means(ends, 0.0, 0.0)[1]
+                lost += stiffness * (way * taken[0] + between(moved, other) * taken[1])
+    return lost

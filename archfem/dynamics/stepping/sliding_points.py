@@ -11,25 +11,26 @@ stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (
 they are many. Where the passes go round in a circle of holding and sliding they go less far.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
-from numba.extending import overload
 
 from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.open_points import chosen, square
-from archfem.dynamics.stepping.path_law import PathLaw, press, slide
+from archfem.dynamics.stepping.path_forces import press, slide
+from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import (
     AHEAD,
     EXACT,
     ROUNDED,
+    add_held,
     exact,
     expected,
     largest,
     release,
     shift,
+    solved_by,
 )
+from archfem.dynamics.stepping.sparse_rows import add_rows
 
 FEW = 60
 """Rows up to which the problem is solved directly."""
@@ -47,101 +48,70 @@ ROUGH = 1e-3
 """Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
 
 
-def is_path_law(law: Any) -> bool:
-    """Return whether this is the type of a law over a step.
-
-    Args:
-        law: as numba types it, or None where there is none.
-    """
-    return getattr(law, "instance_class", None) is PathLaw
-
-
-@overload(release)
-def _release(law, start, rows, compliance, force, enough):  # type: ignore
-    return _released if is_path_law(law) else None
-
-
-@overload(exact)
-def _exact(law, gap, force, near):  # type: ignore
-    return _fits if is_path_law(law) else None
-
-
-@overload(expected)
-def _expected(law, gap, before, force):  # type: ignore
-    return _foreseen if is_path_law(law) else None
-
-
-@overload(largest)
-def _largest(law, gap):  # type: ignore
-    if is_path_law(law):
-        return lambda law, gap: np.max(law.still.stiffness * np.abs(gap[: len(law.group)]))
-    return None
-
-
-@overload(shift)
-def _shift(law, gap):  # type: ignore
-    return _shifted if is_path_law(law) else None
-
-
 def _shifted(law, gap):  # type: ignore
     """Add to gaps found from displacements those before anything moves."""
     for row in range(len(gap)):
         gap[row] += law.offset[row]
 
 
+def _held(law, opening, right):  # type: ignore
+    """Add to a right side what joints would carry more had nothing slid before the step."""
+    force, openings = np.zeros(len(law.start)), len(law.stiffness)
+    for point in range(len(law.group)):
+        if law.group[point] >= 0:
+            force[law.group[point]] += law.shear[point] * law.slid[point]
+    add_rows(opening, np.arange(openings, len(force)), force, right)
+
+
+def _largest(law, gap):  # type: ignore
+    """Return the largest force of a point if all joints held tension."""
+    return np.max(law.stiffness * np.abs(gap[: len(law.stiffness)]))
+
+
 def _foreseen(law, gap, before, force):  # type: ignore
     """Return which rows are at work, or will be soon if they go on as they did (r,)."""
-    near = np.zeros(len(gap), dtype=np.bool_)
+    works, near = force != 0.0, force != 0.0
     for row in range(len(gap)):
         law.guess[row] = law.start[row] + law.speed[row] / law.gain
-    for row in range(len(law.group)):
-        if gap[row] + AHEAD * (gap[row] - before[row]) > 0.0 or force[row] != 0.0:
-            _involve(law, row, near)
-            if law.group[row] >= 0:
-                _involve(law, law.group[row], near)
-    for row in range(len(law.group), len(gap)):
-        if force[row] != 0.0:
-            _involve(law, row, near)
+        if row < len(law.stiffness) and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
+            works[row] = True
+    for stretch in range(len(law.near)):
+        a, b = law.near[stretch], law.far[stretch]
+        if works[a] or works[b]:
+            near[a] = near[b] = True
+            for point in range(law.begin[stretch], law.begin[stretch + 1]):
+                if law.group[point] >= 0:
+                    near[law.group[point]] = True
+    _involve(law, near)
     return near
 
 
 @numba.njit(cache=True)
-def _involve(law, row, near):  # type: ignore
-    """Take a row to be at work, with the other end of its facet or what presses on its points."""
-    near[row] = True
-    points = len(law.group)
-    if row < points:
-        if law.still.facets:
-            near[row ^ 1] = True
-        return
-    for place in range(law.first[row - points], law.first[row - points + 1]):
-        _involve_point(law, law.members[place], near)
-
-
-@numba.njit(cache=True)
-def _involve_point(law, point, near):  # type: ignore
-    """Take the opening at a point to be at work."""
-    near[point] = True
-    if law.still.facets:
-        near[point ^ 1] = True
+def _involve(law, near):  # type: ignore
+    """Add to rows of slips at work the openings that press on their points."""
+    for point in range(len(law.group)):
+        if law.group[point] >= 0 and near[law.group[point]]:
+            stretch = law.stretch[point]
+            near[law.near[stretch]] = near[law.far[stretch]] = True
 
 
 def _fits(law, gap, force, near):  # type: ignore
     """Return whether the gaps ask for the λ they were found with; adds rows at work to near."""
-    taken, points = law.work.taken, len(law.group)
-    for row in range(0, points, 2 if law.still.facets else 1):
-        press(law, gap, row)
-    for row in range(points, len(gap)):
-        slide(law, gap, row)
-    most, off = 0.0, 0.0
-    for row in range(len(gap)):
-        if row < points:
-            most = max(most, law.still.stiffness[row] * abs(gap[row]))
-        off = max(off, abs(taken[row] - force[row]))
-        law.guess[row] = gap[row]
-        if taken[row] != 0.0 and not near[row]:
-            _involve(law, row, near)
-    return off <= EXACT * most
+    openings, wanted = len(law.stiffness), np.zeros(len(gap))
+    law.guess[:] = gap
+    press(law, gap, np.arange(len(law.near)))
+    slide(law, gap, np.arange(openings, len(gap)))
+    for stretch in range(len(law.near)):
+        a, b = law.near[stretch], law.far[stretch]
+        wanted[a] += law.work.ends[stretch, 0]
+        wanted[b] += law.work.ends[stretch, 1]
+        if law.work.ends[stretch, 0] != 0.0 or law.work.ends[stretch, 1] != 0.0:
+            near[a] = near[b] = True
+    for row in range(openings, len(gap)):
+        wanted[row] = law.work.along[row - openings, 0]
+        near[row] = near[row] or wanted[row] != 0.0
+    _involve(law, near)
+    return np.max(np.abs(wanted - force)) <= EXACT * largest(law, gap)
 
 
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
@@ -149,22 +119,21 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     size, local = len(rows), np.full(len(start), -1)
     for k in range(size):
         local[rows[k]] = k
+    slips = rows[np.searchsorted(rows, len(law.stiffness)) :]
+    known = local, np.flatnonzero((local[law.near] >= 0) & (local[law.far] >= 0)), slips
     matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
-    gap, z, last = start.copy(), chosen(law.guess, rows), np.inf
+    gap, z, last = law.guess.copy(), chosen(law.guess, rows), np.inf
     wanted, share, calm = np.empty(size), 1.0, 0
-    rooms = (
-        np.empty((5 * size + len(law.group), 2), dtype=np.int64),
-        np.empty(5 * size + len(law.group)),
-    )
-    count = _taken(law, (gap, z), rows, local, wanted, rooms)
+    entries = (law.work.places, law.work.values)
+    count = _taken(law, gap, known, wanted)
     for passes in range(1, ITERATIONS + 1):
-        step = _newton(matrix, free + matrix @ wanted - z, rooms, count)
-        for entry in range(count):
-            wanted[rooms[0][entry, 0]] += rooms[1][entry] * step[rooms[0][entry, 1]]
+        wanted += _newton(matrix, free + matrix @ wanted - z, entries, count)
         for k in range(size):
             own[k] += share * (wanted[k] - own[k])
         z = free + matrix @ own
-        count = _taken(law, (gap, z), rows, local, wanted, rooms)
+        for k in range(size):
+            gap[rows[k]] = z[k]
+        count = _taken(law, gap, known, wanted)
         off = np.max(np.abs(wanted - own))
         if off <= enough or last <= off <= ROUNDED * enough:
             for k in range(size):
@@ -176,49 +145,52 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     return -1
 
 
+solved_by(
+    PathLaw,
+    (expected, _foreseen),
+    (release, _released),
+    (exact, _fits),
+    (shift, _shifted),
+    (largest, _largest),
+    (add_held, _held),
+)
+
+
 @numba.njit(cache=True)
-def _taken(law, gaps, rows, local, wanted, entries):  # type: ignore
+def _taken(law, gap, known, wanted):  # type: ignore
     """λ of the rows, and its derivatives as entries of a matrix; returns how many those are."""
-    (gap, z), points = gaps, len(law.group)
-    for k in range(len(rows)):
-        gap[rows[k]] = z[k]
-    count, facets, work = 0, law.still.facets, law.work
-    for k in range(len(rows)):
-        row = rows[k]
-        if row < points:
-            if not facets or row % 2 == 0:
-                press(law, gap, row)
-            if work.rate[row, 0] != 0.0:
-                count = _enter(entries, count, k, k, work.rate[row, 0])
-            if facets and work.rate[row, 1] != 0.0:
-                count = _enter(entries, count, k, local[row ^ 1], work.rate[row, 1])
-        else:
-            rate = slide(law, gap, row)
-            if rate != 0.0 or work.taken[row] != 0.0:
-                count = _enter(entries, count, k, k, rate)
-                count = _pressed(law, k, row, local, entries, count)
-        wanted[k] = work.taken[row]
-    return count
-
-
-@numba.njit(cache=True)
-def _pressed(law, k, row, local, entries, count):  # type: ignore
-    """Enter how λ of a row of slips changes with the openings at its points."""
-    work, facets, group = law.work, law.still.facets, row - len(law.group)
-    for place in range(law.first[group], law.first[group + 1]):
-        point = law.members[place]
-        by_limit = work.rates[point, 1]
-        if by_limit == 0.0 or law.friction[point] == 0.0:
+    (local, stretches, slips), openings, work = known, len(law.stiffness), law.work
+    press(law, gap, stretches)
+    slide(law, gap, slips)
+    count, entries = 0, (work.places, work.values)
+    wanted[:] = 0.0
+    for stretch in stretches:
+        a, b = local[law.near[stretch]], local[law.far[stretch]]
+        wanted[a] += work.ends[stretch, 0]
+        wanted[b] += work.ends[stretch, 1]
+        if work.rates[stretch, 0] != 0.0 or work.rates[stretch, 2] != 0.0:
+            count = _enter(entries, count, a, a, work.rates[stretch, 0])
+            count = _enter(entries, count, a, b, work.rates[stretch, 1])
+            count = _enter(entries, count, b, a, work.rates[stretch, 1])
+            count = _enter(entries, count, b, b, work.rates[stretch, 2])
+    for row in slips:
+        k, group, last = local[row], row - openings, -1
+        wanted[k] = work.along[group, 0]
+        if work.along[group, 1] == 0.0 and wanted[k] == 0.0:
             continue
-        factor, whole = by_limit * law.friction[point], law.still.stiffness[point]
-        if not facets:
-            value = factor * (whole - work.rate[point, 0])
-            count = _enter(entries, count, k, local[point], value)
-        else:
-            near = factor * (whole / 3.0 - work.rate[point, 0])
-            far = factor * (whole / 6.0 - work.rate[point, 1])
-            count = _enter(entries, count, k, local[point], near)
-            count = _enter(entries, count, k, local[point ^ 1], far)
+        count = _enter(entries, count, k, k, work.along[group, 1])
+        for place in range(law.first[group], law.first[group + 1]):
+            point = law.members[place]
+            if work.held[point, 1] == 0.0 or law.friction[point] == 0.0:
+                continue
+            factor, stretch = work.held[point, 1] * law.friction[point], law.stretch[point]
+            if stretch != last:
+                count = _enter(entries, count, k, local[law.near[stretch]], 0.0)
+                count = _enter(entries, count, k, local[law.far[stretch]], 0.0)
+                last = stretch
+            for end in range(2):
+                value = factor * (law.closed[point, end] - work.rate[point, end])
+                work.values[count - 2 + end] += value
     return count
 
 
@@ -232,52 +204,53 @@ def _enter(entries, count, row, column, value):  # type: ignore
 
 @numba.njit(cache=True)
 def _newton(matrix, rest, entries, count):  # type: ignore
-    """Solve (1 - F λ') δ = rest for those rows on which some λ depends; 0 elsewhere."""
-    places, values = entries
-    used = np.zeros(len(rest), dtype=np.bool_)
+    """Solve (1 - λ' F) μ = λ' rest for the change μ of λ, which is 0 where no row of λ' is."""
+    (places, values), changes = entries, np.zeros(len(rest), dtype=np.bool_)
+    change = np.zeros(len(rest))
     for entry in range(count):
-        used[places[entry, 1]] = True
-    rows = np.flatnonzero(used)
+        row, column = places[entry, 0], places[entry, 1]
+        changes[row] = True
+        change[row] += values[entry] * rest[column]
+    rows = np.flatnonzero(changes)
     if len(rows) > FEW:
-        return _gradients(matrix, rest, entries, count)
-    number = np.cumsum(used) - 1
-    whole = np.eye(len(rows))
+        return _gradients(matrix, change, entries, count)
+    whole = np.eye(len(rest))
     for entry in range(count):
-        line, column = matrix[places[entry, 0]], number[places[entry, 1]]
-        for k in range(len(rows)):
-            whole[column, k] -= values[entry] * line[rows[k]]  # transposed, as F is symmetric
-    step = np.zeros(len(rest))
-    step[rows] = np.linalg.solve(whole.T, rest[rows])
-    return step
+        row, column, value = places[entry, 0], places[entry, 1], values[entry]
+        for k in range(len(rest)):
+            whole[row, k] -= value * matrix[column, k]
+    change[rows] = np.linalg.solve(square(whole, rows), chosen(change, rows))
+    return change
 
 
 @numba.njit(cache=True)
 def _applied(matrix, vector, entries, count):  # type: ignore
-    """(1 - F λ') times a vector."""
-    image = np.zeros(len(vector))
+    """(1 - λ' F) times a vector."""
+    (places, values), image, result = entries, matrix @ vector, vector.copy()
     for entry in range(count):
-        image[entries[0][entry, 0]] += entries[1][entry] * vector[entries[0][entry, 1]]
-    return vector - matrix @ image
+        result[places[entry, 0]] -= values[entry] * image[places[entry, 1]]
+    return result
 
 
 @numba.njit(cache=True)
-def _gradients(matrix, rest, entries, count):  # type: ignore
-    """Solve (1 - F λ') δ = rest by stabilised biconjugate gradients from zero."""
-    solution, left, shadow = np.zeros(len(rest)), rest.copy(), rest.copy()
-    direction, rho = rest.copy(), rest @ rest
+def _gradients(matrix, right, entries, count):  # type: ignore
+    """Solve (1 - λ' F) μ = right by stabilised biconjugate gradients from zero."""
+    solution, left = np.zeros(len(right)), right.copy()
+    direction, rho = right.copy(), right @ right
     end = (ROUGH**2) * rho
-    for _ in range(2 * len(rest)):
-        if left @ left <= end:
-            break
+    for _ in range(2 * len(right)):
         image = _applied(matrix, direction, entries, count)
-        length = rho / (shadow @ image)
+        seen = right @ image
+        if left @ left <= end or seen == 0.0:
+            break
+        length = rho / seen
         half = left - length * image
         other = _applied(matrix, half, entries, count)
         square_of = other @ other
         weight = (other @ half) / square_of if square_of > 0.0 else 0.0
         solution += length * direction + weight * half
         left = half - weight * other
-        new = shadow @ left
+        new = right @ left
         if new == 0.0 or weight == 0.0:
             break
         direction = left + (new / rho) * (length / weight) * (direction - weight * image)

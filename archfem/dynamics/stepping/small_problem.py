@@ -10,7 +10,10 @@ instant, and `sliding_points` where they open and slide, over a step: which, the
 says as numba compiles what calls these.
 """
 
+from collections.abc import Callable
 from typing import Any
+
+from numba.extending import overload
 
 SETTLED = 1e-12
 """Error of a contact force, relative to the largest of all joints as if closed, that ends the
@@ -77,6 +80,17 @@ def shift(law: Any, gap: Any) -> None:
     raise NotImplementedError
 
 
+def add_held(law: Any, opening: Any, right: Any) -> None:
+    """Add to a right side what joints would carry more had nothing slid before the step.
+
+    Args:
+        law: of the joints.
+        opening: rows of their gaps (r, n).
+        right: side of the equation of a step, changed (n,).
+    """
+    raise NotImplementedError
+
+
 def largest(law: Any, gap: Any) -> Any:
     """Return the largest force of a point if all joints held tension [N].
 
@@ -85,3 +99,28 @@ def largest(law: Any, gap: Any) -> Any:
         gap: that the law saw at the end of the last step (p,) [m].
     """
     raise NotImplementedError
+
+
+def is_of(law: Any, kind: type) -> bool:
+    """Return whether this is the type of a kind of law.
+
+    Args:
+        law: as numba types it, or None where there is none.
+        kind: of laws, a NamedTuple.
+    """
+    return getattr(law, "instance_class", None) is kind
+
+
+def solved_by(kind: type, *solutions: tuple[Callable[..., Any], Callable[..., Any]]) -> None:
+    """Say what solves the problem for a kind of law.
+
+    Args:
+        kind: of laws, a NamedTuple.
+        *solutions: functions of this module, each with what to compile in its place.
+    """
+    for function, solution in solutions:
+
+        def typed(law: Any, *_: Any, solution: Any = solution) -> Any:
+            return solution if is_of(law, kind) else None
+
+        overload(function, strict=False)(typed)
