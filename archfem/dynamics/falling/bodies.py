@@ -1,5 +1,6 @@
 """Masses, shapes and friction of a structure's blocks, as arrays that compiled loops take."""
 
+from itertools import pairwise
 from math import inf, isinf
 from typing import NamedTuple
 
@@ -109,7 +110,7 @@ def _pieces(block: Block) -> list[tuple[Array, NDArray[np.bool_]]]:
     return [
         (
             points[list(piece)],
-            np.array([(a + 1) % count == b for a, b in zip(piece, piece[1:] + piece[:1])]),
+            np.array([(a + 1) % count == b for a, b in pairwise((*piece, piece[0]))]),
         )
         for piece in convex_pieces(points)
     ]

@@ -26,7 +26,7 @@ SLOW = 0.05
 RISE = 1e-4
 """Energy that a run may gain beyond the ground's work, relative to what was exchanged."""
 
-NOISE = 1e-5
+NOISE = 1e-6
 """The same for a run that exchanges nothing: height, relative to the structure's size, to which
 its weight would be lifted."""
 
@@ -51,7 +51,8 @@ class Balance:
         potential: of their weight, zero at the start.
         work: that the motion of the ground has done.
         lost: in impacts and by friction.
-        gained: sum over the steps that ended with more energy than the ground had given.
+        gained: by which, at most, it rose above what it had been at any time before, the work of
+            the ground apart; of a true solution nothing.
     """
 
     kinetic: float
@@ -140,7 +141,9 @@ class Falling:
         still = 0.0
         for first, last in pairwise([*range(0, steps, stride), steps]):
             times = start.time + self.dt * (np.arange(first, last) + 0.5)
-            fastest = run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(times))
+            fastest = run.advance(
+                np.zeros((last - first, 2)) if motion is None else motion.at(times)
+            )
             time = start.time + self.dt * last
             shaken = motion is not None and time <= motion.duration
             still = 0.0 if shaken or fastest > STILL else still + self.dt * (last - first)
@@ -201,9 +204,8 @@ class _Run:
             np.empty((len(contacts.key), 9)),
             np.zeros((len(self._q) + 1, 3)),
         )
-        self._energy = np.array([_kinetic(bodies, self._v), 0.0, 0.0, 0.0, 0.0])
-        self._first = float(self._energy[0])
-        self._exchanged = self._first
+        self._energy = np.array([_kinetic(bodies, self._v), 0.0, 0.0, 0.0, 0.0, 0.0])
+        self._exchanged = float(self._energy[0])
         self._overlap, self._unsettled, self._time = 0.0, 0, start.time
 
     def advance(self, ground: Array) -> float:
@@ -230,7 +232,7 @@ class _Run:
         """Return the blocks as they are, once the energy is found to be right."""
         self._time = time
         self._check(time)
-        balance = Balance(*self._energy.tolist())
+        balance = Balance(*self._energy[:5].tolist())
         told = balance, self._overlap, self._unsettled, resting
         return Frame(time, self._q.copy(), self._v.copy(), *told)
 
@@ -261,7 +263,8 @@ def advance(bodies, laws, room, state):  # type: ignore
         laws: that hold.
         room: to work with.
         state: poses and velocities, moved on (b, 3); mean acceleration of the ground over each step
-            (steps, 2) [m/s²]; energies as in `Balance`, brought up to date (5,) [J].
+            (steps, 2) [m/s²]; energies as in `Balance`, and the most that was lost at any time, all
+            brought up to date (6,) [J].
 
     Returns:
         Deepest overlap [m]; steps whose impulses did not settle, -1 where there was no room for
@@ -284,12 +287,12 @@ def advance(bodies, laws, room, state):  # type: ignore
             work -= mass * (ground[k, 0] * moved[0] + ground[k, 1] * moved[1])
             rise += mass * laws.gravity * moved[1]
         kinetic = _kinetic(bodies, v)
-        loss = work - rise - (kinetic - energy[0])
+        energy[3] += work - rise - (kinetic - energy[0])
         energy[0] = kinetic
         energy[1] += rise
         energy[2] += work
-        energy[3] += max(loss, 0.0)
-        energy[4] += max(-loss, 0.0)
+        energy[5] = max(energy[5], energy[3])
+        energy[4] = max(energy[4], energy[5] - energy[3])
         exchanged = max(exchanged, kinetic + energy[3])
     for b in range(len(q)):
         fastest = max(fastest, np.hypot(v[b, 0], v[b, 1]) + bodies.reach[b] * abs(v[b, 2]))

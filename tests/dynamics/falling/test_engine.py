@@ -90,10 +90,14 @@ def test_a_ring_falls_to_the_ground_and_comes_to_rest(chords):
     last = frames[-1]
     assert last.resting
     assert last.time < 10.0
-    levels = [block.centroid[1] + pose[1] for block, pose in zip(chords.blocks, last.poses, strict=True)]
+    levels = [
+        block.centroid[1] + pose[1] for block, pose in zip(chords.blocks, last.poses, strict=True)
+    ]
     assert max(levels) - falling.bodies.level < 1.0  # no stone lies higher than on another
     assert last.overlap < 0.01
-    spent = [frame.balance.work - frame.balance.potential - frame.balance.kinetic for frame in frames]
+    spent = [
+        frame.balance.work - frame.balance.potential - frame.balance.kinetic for frame in frames
+    ]
     exchanged = max(spent)
     assert np.diff(spent).min() > -1e-5 * exchanged
     assert last.balance.gained < 1e-5 * exchanged
@@ -111,9 +115,7 @@ def test_a_ring_at_rest_stays(chords):
 
 @pytest.mark.parametrize("chords", [None, 2])
 def test_stones_of_several_pieces_fall_as_far(chords):
-    ring = af.circular_arch(
-        radius=2.95, thickness=0.55, embrace=150.0, voussoirs=5, chords=chords
-    )
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=150.0, voussoirs=5, chords=chords)
     falling = Falling(ring, dt=1e-3)
     assert len(falling.bodies.owner) > len(ring.blocks)
     end = falling.last(Loose.built(ring), 15.0, pulse(1.2, 0.5))

@@ -44,7 +44,9 @@ def test_a_voussoir_of_chords_is_cut_along_its_depth():
 @given(st.lists(st.floats(0.2, 1.0), min_size=4, max_size=12))
 def test_any_star_is_covered_once(radii):
     angles = 2.0 * np.pi * np.arange(len(radii)) / len(radii)
-    points = corners_of(np.array(radii)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
+    points = corners_of(
+        np.array(radii)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    )
     area = shapely.Polygon(points).area
     assert covered(points, convex_pieces(points)) == pytest.approx((area, area), rel=1e-9)
 
