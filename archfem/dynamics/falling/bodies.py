@@ -1,5 +1,6 @@
 """Masses, shapes and friction of a structure's blocks, as arrays that compiled loops take."""
 
+import logging
 from itertools import pairwise
 from math import inf, isinf
 from typing import NamedTuple
@@ -12,7 +13,10 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.pieces import convex_pieces, corners_of
 from archfem.errors import InvalidInput
 from archfem.masonry.block import Block
+from archfem.masonry.softness import soft_blocks
 from archfem.masonry.structure import TOUCHING, Structure
+
+logger = logging.getLogger("archfem")
 
 CHORD = np.radians(15.0)
 """Angle of a ring [rad] up to which one chord stands for a stone's arc: it leaves the arc by less
@@ -93,6 +97,29 @@ def bodies_of(
         ground,
         TOUCHING * structure.size,
     )
+
+
+def check_dry(structure: Structure) -> None:
+    """Refuse joints with cohesion, and say where a block is no rigid body.
+
+    Args:
+        structure: of stones.
+
+    Raises:
+        InvalidInput: a joint has cohesion.
+    """
+    for joint in structure.joints:
+        if joint.contact.cohesion > 0.0:
+            raise InvalidInput(
+                f"joint '{joint.name}' has cohesion {joint.contact.cohesion:.3g} Pa, which is not "
+                "known of blocks that fall: leave cohesion out"
+            )
+    for number in soft_blocks(structure):
+        if not structure.blocks[number].fixed:
+            logger.warning(
+                "block '%s' is soft, and falls here as one rigid body: cut it with jointed_fill",
+                structure.blocks[number].name,
+            )
 
 
 def _mass(structure: Structure, block: Block) -> tuple[float, float]:
