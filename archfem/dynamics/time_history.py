@@ -9,9 +9,9 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
+from archfem.dynamics.collapse import Parting, fallen, left_standing
 from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
-from archfem.dynamics.collapse import Parting, fallen, left_standing
 from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.recorder import Recorder
 from archfem.dynamics.schemes import (

@@ -39,7 +39,7 @@ class Sides(NamedTuple):
 
 @numba.njit(cache=True)
 def _reach(sides, joint, side, q):  # type: ignore
-    """r + U ξ."""
+    """R + U ξ."""
     x, y = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     start = sides.start[joint, side] + 3
     for k in range(sides.size[joint, side] - 3):

@@ -7,7 +7,7 @@ mass stays constant and diagonal; that inertia forces act on the modes as a bloc
 """
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 

@@ -14,8 +14,8 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
-from archfem.statics.loading import Load
 from archfem.statics.lasting import ROUNDS, lasts, upset
+from archfem.statics.loading import Load
 from archfem.statics.newton import ROUGHLY, Solver, magnitude
 from archfem.statics.search import followed, found_or_crept
 

@@ -1,5 +1,7 @@
 """Masses, shapes and friction of a structure's blocks, as arrays that compiled loops take."""
 
+import logging
+from itertools import pairwise
 from math import inf, isinf
 from typing import NamedTuple
 
@@ -11,7 +13,10 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.pieces import convex_pieces, corners_of
 from archfem.errors import InvalidInput
 from archfem.masonry.block import Block
+from archfem.masonry.softness import soft_blocks
 from archfem.masonry.structure import TOUCHING, Structure
+
+logger = logging.getLogger("archfem")
 
 CHORD = np.radians(15.0)
 """Angle of a ring [rad] up to which one chord stands for a stone's arc: it leaves the arc by less
@@ -94,6 +99,29 @@ def bodies_of(
     )
 
 
+def check_dry(structure: Structure) -> None:
+    """Refuse joints with cohesion, and say where a block is no rigid body.
+
+    Args:
+        structure: of stones.
+
+    Raises:
+        InvalidInput: a joint has cohesion.
+    """
+    for joint in structure.joints:
+        if joint.contact.cohesion > 0.0:
+            raise InvalidInput(
+                f"joint '{joint.name}' has cohesion {joint.contact.cohesion:.3g} Pa, which is not "
+                "known of blocks that fall: leave cohesion out"
+            )
+    for number in soft_blocks(structure):
+        if not structure.blocks[number].fixed:
+            logger.warning(
+                "block '%s' is soft, and falls here as one rigid body: cut it with jointed_fill",
+                structure.blocks[number].name,
+            )
+
+
 def _mass(structure: Structure, block: Block) -> tuple[float, float]:
     """Mass and moment of inertia, zero for what is fixed."""
     if block.fixed:
@@ -109,7 +137,7 @@ def _pieces(block: Block) -> list[tuple[Array, NDArray[np.bool_]]]:
     return [
         (
             points[list(piece)],
-            np.array([(a + 1) % count == b for a, b in zip(piece, piece[1:] + piece[:1])]),
+            np.array([(a + 1) % count == b for a, b in pairwise((*piece, piece[0]))]),
         )
         for piece in convex_pieces(points)
     ]

@@ -17,14 +17,12 @@ class Carried(NamedTuple):
     """Impulses of the step before.
 
     Attributes:
-        count: how many contacts it had (1,).
-        key: of the two pieces at each (c,).
+        key: of the two pieces at each contact (c,).
         place: of the contact along the tangent, from the first body's centroid (c,) [m].
         impulse: there (c, 2) [N s].
         slots: number of a contact by a hash of its key, -1 where there is none (2^m,).
     """
 
-    count: NDArray[np.int64]
     key: NDArray[np.int64]
     place: Array
     impulse: Array
@@ -39,7 +37,6 @@ def nothing_carried(room: Contacts) -> Carried:
     """
     most = len(room.key)
     return Carried(
-        np.zeros(1, dtype=np.int64),
         np.zeros(most, dtype=np.int64),
         np.zeros(most),
         np.zeros((most, 2)),
@@ -60,7 +57,6 @@ def keep(bodies, q, found, count, carried):  # type: ignore
     """
     slots = carried.slots
     slots[:] = -1
-    carried.count[0] = count
     for k in range(count):
         carried.key[k] = found.key[k]
         carried.place[k] = _place(bodies, q, found, k)

@@ -10,7 +10,7 @@ import numpy as np
 
 from archfem.arguments import instance, real
 from archfem.arrays import Array
-from archfem.dynamics.falling.bodies import Bodies, bodies_of
+from archfem.dynamics.falling.bodies import Bodies, bodies_of, check_dry
 from archfem.dynamics.falling.carried import nothing_carried
 from archfem.dynamics.falling.contact import room_for, world_of
 from archfem.dynamics.falling.impacts import SWEEPS, Laws, Room, step
@@ -26,18 +26,18 @@ SLOW = 0.05
 RISE = 1e-4
 """Energy that a run may gain beyond the ground's work, relative to what was exchanged."""
 
-NOISE = 1e-5
+NOISE = 1e-6
 """The same for a run that exchanges nothing: height, relative to the structure's size, to which
 its weight would be lifted."""
 
-STILL = 1e-3
-"""Speed [m/s] of the fastest point of a block up to which it counts as still."""
+STILL = 5e-4
+"""Distance [m] within which every point of the blocks stays that have come to rest."""
+
+LASTING = 0.5
+"""Time [s] for which they do, on ground that rests."""
 
 THROUGH = 0.2
 """Overlap, relative to the reach of the smallest block, at which blocks pass through each other."""
-
-LASTING = 0.5
-"""Time [s] for which all blocks must be still, on ground that rests, to have come to rest."""
 
 forget_stale(Path(__file__).parent)
 
@@ -51,7 +51,8 @@ class Balance:
         potential: of their weight, zero at the start.
         work: that the motion of the ground has done.
         lost: in impacts and by friction.
-        gained: sum over the steps that ended with more energy than the ground had given.
+        gained: by which, at most, it rose above what it had been at any time before, the work of
+            the ground apart; of a true solution nothing.
     """
 
     kinetic: float
@@ -94,8 +95,8 @@ class Falling:
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
 
     Raises:
-        InvalidInput: a number is out of range, no coefficient of friction is known, or the ground
-            lies above the foot of a free block.
+        InvalidInput: a number is out of range, no coefficient of friction is known, a joint has
+            cohesion, or the ground lies above the foot of a free block.
     """
 
     structure: Structure
@@ -111,6 +112,7 @@ class Falling:
             raise InvalidInput(f"dt {self.dt:g} s is not between 1e-6 and 0.01 s: give 5e-4")
         if not 0.0 <= real(self.restitution, "restitution") <= 1.0:
             raise InvalidInput(f"restitution {self.restitution:g} is not between 0 and 1")
+        check_dry(self.structure)
         bodies = bodies_of(self.structure, self.friction, self.level)
         object.__setattr__(self, "bodies", bodies)
 
@@ -137,17 +139,17 @@ class Falling:
         yield run.frame(start.time, False)
         stride = max(1, round(spacing / self.dt))
         steps = int(np.ceil((end - start.time) / self.dt - 1e-6))
-        still = 0.0
+        anchor, since = start.poses, start.time
         for first, last in pairwise([*range(0, steps, stride), steps]):
-            times = start.time + self.dt * (np.arange(first, last) + 0.5)
-            fastest = run.advance(
-                np.zeros((last - first, 2)) if motion is None else motion.at(times)
-            )
+            middles = start.time + self.dt * (np.arange(first, last) + 0.5)
+            run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(middles))
             time = start.time + self.dt * last
             shaken = motion is not None and time <= motion.duration
-            still = 0.0 if shaken or fastest > STILL else still + self.dt * (last - first)
-            yield run.frame(time, still >= LASTING)
-            if still >= LASTING:
+            if shaken or run.moved(anchor) > STILL:
+                anchor, since = run.poses, time
+            resting = time - since >= LASTING
+            yield run.frame(time, resting)
+            if resting:
                 return
 
     def last(self, start: Loose, end: float, motion: Motion | None = None) -> Frame:
@@ -203,20 +205,29 @@ class _Run:
             np.empty((len(contacts.key), 9)),
             np.zeros((len(self._q) + 1, 3)),
         )
-        self._energy = np.array([_kinetic(bodies, self._v), 0.0, 0.0, 0.0, 0.0])
-        self._first = float(self._energy[0])
-        self._exchanged = self._first
+        self._energy = np.array([_kinetic(bodies, self._v), 0.0, 0.0, 0.0, 0.0, 0.0])
+        self._exchanged = float(self._energy[0])
         self._overlap, self._unsettled, self._time = 0.0, 0, start.time
 
-    def advance(self, ground: Array) -> float:
-        """Take steps, and return the speed of the fastest point (m/s)."""
+    @property
+    def poses(self) -> Array:
+        """Where the blocks are (n_blocks, 3) [m, m, rad]."""
+        return self._q.copy()
+
+    def moved(self, before: Array) -> float:
+        """Return by how much the farthest point has moved since the blocks had these poses (m)."""
+        x, y, turn = (self._q - before).T
+        return float(np.max(np.hypot(x, y) + self._falling.bodies.reach * np.abs(turn)))
+
+    def advance(self, ground: Array) -> None:
+        """Take steps."""
         told = advance(
             self._falling.bodies,
             self._laws,
             self._room,
             (self._q, self._v, np.ascontiguousarray(ground), self._energy),
         )
-        overlap, unsettled, fastest, exchanged = told
+        overlap, unsettled, exchanged = told
         if unsettled < 0:
             raise DidNotConverge(
                 f"{len(self._falling.bodies.owner)} pieces touch at more points than pieces in the "
@@ -226,13 +237,12 @@ class _Run:
         self._overlap = max(self._overlap, overlap)
         self._unsettled += unsettled
         self._exchanged = max(self._exchanged, exchanged)
-        return float(fastest)
 
     def frame(self, time: float, resting: bool) -> Frame:
         """Return the blocks as they are, once the energy is found to be right."""
         self._time = time
         self._check(time)
-        balance = Balance(*self._energy.tolist())
+        balance = Balance(*self._energy[:5].tolist())
         told = balance, self._overlap, self._unsettled, resting
         return Frame(time, self._q.copy(), self._v.copy(), *told)
 
@@ -263,20 +273,21 @@ def advance(bodies, laws, room, state):  # type: ignore
         laws: that hold.
         room: to work with.
         state: poses and velocities, moved on (b, 3); mean acceleration of the ground over each step
-            (steps, 2) [m/s²]; energies as in `Balance`, brought up to date (5,) [J].
+            (steps, 2) [m/s²]; energies as in `Balance`, and the most that was lost at any time, all
+            brought up to date (6,) [J].
 
     Returns:
         Deepest overlap [m]; steps whose impulses did not settle, -1 where there was no room for
-        contacts; speed of the fastest point [m/s]; and the most energy that was exchanged [J].
+        contacts; and the most energy that was exchanged [J].
     """
     q, v, ground, energy = state
-    overlap, unsettled, fastest, exchanged = 0.0, 0, 0.0, 0.0
+    overlap, unsettled, exchanged = 0.0, 0, 0.0
     before = q.copy()
     for k in range(len(ground)):
         before[:] = q
         sweeps, deep = step(bodies, laws, room, q, v, ground[k])
         if sweeps < 0:
-            return overlap, -1, fastest, exchanged
+            return overlap, -1, exchanged
         overlap = max(overlap, deep)
         unsettled += sweeps > SWEEPS
         work, rise = 0.0, 0.0
@@ -286,16 +297,14 @@ def advance(bodies, laws, room, state):  # type: ignore
             work -= mass * (ground[k, 0] * moved[0] + ground[k, 1] * moved[1])
             rise += mass * laws.gravity * moved[1]
         kinetic = _kinetic(bodies, v)
-        loss = work - rise - (kinetic - energy[0])
+        energy[3] += work - rise - (kinetic - energy[0])
         energy[0] = kinetic
         energy[1] += rise
         energy[2] += work
-        energy[3] += max(loss, 0.0)
-        energy[4] += max(-loss, 0.0)
+        energy[5] = max(energy[5], energy[3])
+        energy[4] = max(energy[4], energy[5] - energy[3])
         exchanged = max(exchanged, kinetic + energy[3])
-    for b in range(len(q)):
-        fastest = max(fastest, np.hypot(v[b, 0], v[b, 1]) + bodies.reach[b] * abs(v[b, 2]))
-    return overlap, unsettled, fastest, exchanged
+    return overlap, unsettled, exchanged
 
 
 @numba.njit(cache=True)

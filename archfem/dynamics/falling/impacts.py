@@ -13,7 +13,6 @@ Gauss and Seidel, contact by contact, from the impulses of the step before.
 from typing import NamedTuple
 
 import numba
-import numpy as np
 
 from archfem.arrays import Array
 from archfem.dynamics.falling.carried import Carried, keep, recall
@@ -50,8 +49,8 @@ class Room(NamedTuple):
         found: contacts.
         carried: impulses of the step before.
         middle: poses at half of the step (b, 3).
-        rows: of each contact, the arms' cross products with normal and tangent, first and second
-            body, 1/(H M⁻¹ Hᵀ) of normal and tangent, wanted u_N and u_T, and μ (c, 9).
+        rows: of each contact, the arms' cross products with the normal, first and second body, and
+            with the tangent, 1/(H M⁻¹ Hᵀ) of normal and tangent, wanted u_N and u_T, and μ (c, 9).
         moving: velocities, the ground's last (b + 1, 3).
     """
 
@@ -79,56 +78,57 @@ def step(bodies, laws, room, q, v, ground):  # type: ignore
         Sweeps that were needed, -1 where there is no room for the contacts; and the deepest
         overlap [m].
     """
+    found, carried, middle, moving = room.found, room.carried, room.middle, room.moving
     half, count = 0.5 * laws.dt, len(q)
-    for b in range(count):
-        for axis in range(3):
-            room.middle[b, axis] = q[b, axis] + half * v[b, axis]
-    place(bodies, room.middle, room.world)
-    touching = find(bodies, room.world, room.found)
+    middle[:] = q + half * v
+    place(bodies, middle, room.world)
+    touching = find(bodies, room.world, found)
     if touching < 0:
         return -1, 0.0
-    recall(bodies, room.middle, room.found, touching, room.carried)
-    room.moving[:count] = v
-    room.moving[count] = 0.0
+    recall(bodies, middle, found, touching, carried)
+    moving[:count] = v
+    moving[count] = 0.0
     _rows(bodies, laws, room, touching)
     for b in range(count):
         if bodies.inverse[b, 0] > 0.0:
-            room.moving[b, 0] -= laws.dt * ground[0]
-            room.moving[b, 1] -= laws.dt * (laws.gravity + ground[1])
+            moving[b, 0] -= laws.dt * ground[0]
+            moving[b, 1] -= laws.dt * (laws.gravity + ground[1])
     sweeps = _impulses(bodies, room, touching)
-    keep(bodies, room.middle, room.found, touching, room.carried)
-    for b in range(count):
-        for axis in range(3):
-            q[b, axis] += half * (v[b, axis] + room.moving[b, axis])
-            v[b, axis] = room.moving[b, axis]
+    keep(bodies, middle, found, touching, carried)
+    q += half * (v + moving[:count])
+    v[:] = moving[:count]
     overlap = 0.0
     for k in range(touching):
-        overlap = max(overlap, -room.found.gap[k])
+        overlap = max(overlap, -found.gap[k])
     return sweeps, overlap
 
 
 @numba.njit(cache=True)
 def _rows(bodies, laws, room, touching):  # type: ignore
-    """What the sweeps need of each contact, with the velocities before the step."""
-    found, rows = room.found, room.rows
+    """What the sweeps need of each contact, with the velocities before the step.
+
+    Where bodies spin, the relative velocity of the two points at contact changes in half a step by
+    ½ Δt of that of ω² r: what is wanted of u is wanted at the end of the step. With it a block that
+    turns about its corner keeps its energy to O(Δt²).
+    """
+    found, rows, moving, middle = room.found, room.rows, room.moving, room.middle
     for k in range(touching):
         a, b = found.bodies[k]
         nx, ny = found.normal[k]
         (ma, ia), (mb, ib) = bodies.inverse[a], bodies.inverse[b]
-        xa, ya = _arm(bodies, room.middle, found.point[k], a)
-        xb, yb = _arm(bodies, room.middle, found.point[k], b)
+        xa, ya = _arm(bodies, middle, found.point[k], a)
+        xb, yb = _arm(bodies, middle, found.point[k], b)
         na, ta = xa * ny - ya * nx, xa * nx + ya * ny
         nb, tb = xb * ny - yb * nx, xb * nx + yb * ny
-        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, ta, nb, tb
+        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = na, nb, ta, tb
         rows[k, 4] = 1.0 / (ma + mb + ia * na * na + ib * nb * nb)
         rows[k, 5] = 1.0 / (ma + mb + ia * ta * ta + ib * tb * tb)
-        before = _speed(room.moving[a], room.moving[b], nx, ny, na, nb)
-        rows[k, 6] = -laws.restitution * before if before < -laws.slow else 0.0
-        rows[k, 7] = 0.0
-        turn_a, turn_b = room.moving[a, 2] ** 2, room.moving[b, 2] ** 2
-        pull_x, pull_y = turn_a * xa - turn_b * xb, turn_a * ya - turn_b * yb
-        rows[k, 6] -= 0.5 * laws.dt * (pull_x * nx + pull_y * ny)
-        rows[k, 7] -= 0.5 * laws.dt * (pull_y * nx - pull_x * ny)
+        before = _speed(moving, (a, b), (nx, ny), (na, nb))
+        bounce = -laws.restitution * before if before < -laws.slow else 0.0
+        spin_a, spin_b = moving[a, 2] ** 2, moving[b, 2] ** 2
+        pull_x, pull_y = spin_a * xa - spin_b * xb, spin_a * ya - spin_b * yb
+        rows[k, 6] = bounce - 0.5 * laws.dt * (pull_x * nx + pull_y * ny)
+        rows[k, 7] = -0.5 * laws.dt * (pull_y * nx - pull_x * ny)
         rows[k, 8] = bodies.friction[a, b]
 
 
@@ -142,47 +142,50 @@ def _arm(bodies, q, point, body):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _speed(va, vb, nx, ny, ra, rb):  # type: ignore
-    """Relative velocity along a direction."""
-    return (vb[0] - va[0]) * nx + (vb[1] - va[1]) * ny + rb * vb[2] - ra * va[2]
+def _speed(moving, pair, way, arms):  # type: ignore
+    """Velocity of the second of two bodies relative to the first, along a direction."""
+    one, two = moving[pair[0]], moving[pair[1]]
+    straight = (two[0] - one[0]) * way[0] + (two[1] - one[1]) * way[1]
+    return straight + arms[1] * two[2] - arms[0] * one[2]
 
 
 @numba.njit(cache=True)
-def _push(bodies, a, b, moving, nx, ny, ra, rb, impulse):  # type: ignore
-    """Give two bodies an impulse along a direction."""
-    (ma, ia), (mb, ib) = bodies.inverse[a], bodies.inverse[b]
-    moving[a, 0] -= ma * nx * impulse
-    moving[a, 1] -= ma * ny * impulse
-    moving[a, 2] -= ia * ra * impulse
-    moving[b, 0] += mb * nx * impulse
-    moving[b, 1] += mb * ny * impulse
-    moving[b, 2] += ib * rb * impulse
+def _push(bodies, moving, pair, way, arms, impulse):  # type: ignore
+    """Give the second of two bodies an impulse along a direction, and the first the opposite."""
+    for side in range(2):
+        m, inertia = bodies.inverse[pair[side]]
+        body, signed = moving[pair[side]], impulse if side else -impulse
+        body[0] += m * way[0] * signed
+        body[1] += m * way[1] * signed
+        body[2] += inertia * arms[side] * signed
 
 
 @numba.njit(cache=True)
 def _impulses(bodies, room, touching):  # type: ignore
     """Sweep over the contacts until impulses hardly change; the number of sweeps."""
-    found, rows, moving = room.found, room.rows, room.moving
+    found, moving = room.found, room.moving
     for k in range(touching):
         a, b = found.bodies[k]
         nx, ny = found.normal[k]
-        _push(bodies, a, b, moving, nx, ny, rows[k, 0], rows[k, 2], found.impulse[k, 0])
-        _push(bodies, a, b, moving, -ny, nx, rows[k, 1], rows[k, 3], found.impulse[k, 1])
+        na, nb, ta, tb = room.rows[k, :4]
+        _push(bodies, moving, (a, b), (nx, ny), (na, nb), found.impulse[k, 0])
+        _push(bodies, moving, (a, b), (-ny, nx), (ta, tb), found.impulse[k, 1])
     for sweep in range(1, SWEEPS + 1):
         change, largest = 0.0, 0.0
         for k in range(touching):
             a, b = found.bodies[k]
             nx, ny = found.normal[k]
-            na, ta, nb, tb, kn, kt, wanted, slip, friction = rows[k]
+            na, nb, ta, tb, kn, kt, wanted, slip, friction = room.rows[k]
             old = found.impulse[k, 0]
-            new = max(old - kn * (_speed(moving[a], moving[b], nx, ny, na, nb) - wanted), 0.0)
-            _push(bodies, a, b, moving, nx, ny, na, nb, new - old)
+            speed = _speed(moving, (a, b), (nx, ny), (na, nb))
+            new = max(old - kn * (speed - wanted), 0.0)
+            _push(bodies, moving, (a, b), (nx, ny), (na, nb), new - old)
             found.impulse[k, 0] = new
             change, largest = max(change, abs(new - old)), max(largest, new)
             old, most = found.impulse[k, 1], friction * new
-            new = old - kt * (_speed(moving[a], moving[b], -ny, nx, ta, tb) - slip)
-            new = min(max(new, -most), most)
-            _push(bodies, a, b, moving, -ny, nx, ta, tb, new - old)
+            speed = _speed(moving, (a, b), (-ny, nx), (ta, tb))
+            new = min(max(old - kt * (speed - slip), -most), most)
+            _push(bodies, moving, (a, b), (-ny, nx), (ta, tb), new - old)
             found.impulse[k, 1] = new
             change = max(change, abs(new - old))
         if change <= SETTLED * largest:

@@ -62,7 +62,8 @@ def _convex(points: Array, piece: Piece) -> bool:
 
 def _triangles(points: Array) -> list[Piece]:
     """Cut off one ear after another."""
-    left, found = list(range(len(points))), []
+    left = list(range(len(points)))
+    found: list[Piece] = []
     while len(left) > 2:
         ear = next((k for k in range(len(left)) if _is_ear(points, left, k)), None)
         if ear is None:

@@ -7,7 +7,7 @@ import pytest
 from loose_blocks import G, floor
 
 import archfem as af
-from archfem.dynamics.falling.bodies import bodies_of
+from archfem.dynamics.falling.bodies import bodies_of, check_dry
 
 
 def test_mass_and_moment_of_a_box():
@@ -60,3 +60,23 @@ def test_a_sector_of_a_wide_angle_has_chords():
     assert np.bincount(bodies.owner).tolist() == [1, 4, 4, 4, 1]  # 50° in chords of 12.5°
     cuts = ~bodies.outer
     assert np.bincount(bodies.owner.repeat(np.diff(bodies.start)), cuts).tolist() == [0, 6, 6, 6, 0]
+
+
+def test_joints_with_cohesion_are_refused():
+    ring = af.circular_arch(
+        radius=3.0,
+        thickness=0.5,
+        embrace=150.0,
+        voussoirs=3,
+        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4),
+    )
+    with pytest.raises(af.errors.InvalidInput, match=r"cohesion 1e\+04 Pa"):
+        check_dry(ring)
+
+
+def test_a_soft_body_is_doubted(caplog):
+    soil = af.Material(6.25e6, 0.2, 18e3, name="soil")
+    structure = floor((0.0, 0.0, 2.0, 2.0))
+    blocks = (structure.blocks[0], replace(structure.blocks[1], material=soil))
+    check_dry(replace(structure, blocks=blocks))
+    assert "'block 1' is soft" in caplog.text

@@ -67,7 +67,7 @@ def test_a_cut_between_pieces_is_no_face():
         move = cut - depth * outward + along - stone[corner]
         poses = np.zeros((4, 3))
         poses[2, :2] = move
-        bodies, points, normals, gaps = touching(ring, poses, level=-10.0)
+        bodies, _, normals, gaps = touching(ring, poses, level=-10.0)
         mine = [k for k, pair in enumerate(bodies.tolist()) if pair == [1, 2]]
         deepest = min(mine, key=lambda k: gaps[k])
         assert abs(normals[deepest] @ outward) > 0.97  # chords lie 7.5° off the circle at most
@@ -84,7 +84,7 @@ def test_heaps_of_boxes_touch_where_their_shapes_meet():
         for number in range(1, 26):
             wanted = rng.uniform(0.0, [12.0, 8.0])
             poses[number, :2] = wanted - structure.blocks[number].centroid
-        bodies, points, _, _ = touching(structure, poses, level=-50.0)
+        bodies, *_ = touching(structure, poses, level=-50.0)
         shapes = [moved(block, pose) for block, pose in zip(structure.blocks, poses, strict=True)]
         pairs = shapely.STRtree(shapes).query(shapes, predicate="intersects").T.tolist()
         assert {tuple(pair) for pair in bodies.tolist()} <= {tuple(p) for p in pairs if p[0] < p[1]}

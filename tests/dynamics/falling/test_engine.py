@@ -197,3 +197,41 @@ def test_energy_from_nowhere_is_refused(monkeypatch, chords):
     monkeypatch.setattr("archfem.dynamics.falling.engine.NOISE", 0.0)
     with pytest.raises(af.errors.DidNotConverge, match="from nowhere"):
         Falling(chords, dt=5e-3).last(Loose.built(chords), 15.0, pulse(0.7, 0.5))
+
+
+def test_rest_is_told_only_once_the_ground_rests(chords):
+    ground = af.Motion(1e-9 * np.ones(101), 0.01)
+    end = Falling(chords, dt=1e-3).last(Loose.built(chords), 5.0, ground)
+    assert end.resting
+    assert end.time == pytest.approx(1.5, abs=0.05)  # half a second after the motion
+
+
+def test_what_swings_slowly_does_not_rest():
+    """A tenth of a degree beyond balance a column takes over a second to be seen to move."""
+    structure = floor((-0.3, 0.0, 0.3, 2.4), friction=5.0)
+    start = tilted(structure, np.arctan(0.25) + 0.002)
+    end = Falling(structure, dt=1e-3).last(start, 10.0)
+    assert end.resting
+    assert end.poses[1, 2] == pytest.approx(-np.pi / 2.0, abs=5e-3)  # a step of 5 m/s deep
+
+
+@pytest.mark.parametrize(("duration", "least"), [(0.2, 1.070), (1.5, 0.3827)])
+def test_an_arch_falls_under_a_pulse_as_by_joints_of_springs(duration, least):
+    """Oppenheim's arch, against stiff joints and conserved energy: within 1 % of their pulse [g].
+
+    Four links that turn about fixed hinges take 1.129 and 0.387 g: no stone slides, and hinges that
+    may move can only lower that.
+    """
+    arch = af.circular_arch(
+        radius=10.0,
+        thickness=1.5,
+        embrace=157.5,
+        voussoirs=7,
+        contact=af.Contact(1e9, 1e9, 5.0),
+    )
+    for factor, wanted in ((0.99, False), (1.01, True)):
+        samples = np.full(round(duration / 1e-3) + 1, factor * least * G)
+        motion = af.Motion(samples, 1e-3)
+        frames = Falling(arch, dt=1e-3).frames(Loose.built(arch), 8.0, motion, spacing=0.1)
+        moved = [np.abs(frame.poses[:, :2]).max() for frame in frames]
+        assert bool(moved[-1] > 2.0) is wanted

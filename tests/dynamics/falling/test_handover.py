@@ -43,7 +43,7 @@ def test_faces_of_joints_are_where_the_model_has_them(ring, state):
         q[first : first + 3] = state.q[3 * k : 3 * k + 3]
         velocity[first : first + 3] = state.velocity[3 * k : 3 * k + 3]
     found = released(model, State(0.0, q, velocity, np.zeros_like(q)))
-    opening, slip, turn = model.measures(q).T
+    opening = model.measures(q)[:, 0]
     poses = found.start.poses
     for joint, (lower, higher) in enumerate(ring.pairs):
         ends = []
@@ -57,7 +57,7 @@ def test_faces_of_joints_are_where_the_model_has_them(ring, state):
         c, s = np.cos(mean), np.sin(mean)
         normal = np.array([[c, -s], [s, c]]) @ ring.normals[joint]
         assert jump @ normal == pytest.approx(opening[joint], abs=1e-10)
-    assert found.after == pytest.approx(found.before, rel=1e-3)  # the mesh's outline has chords
+    assert found.after == pytest.approx(found.before, rel=3e-3)  # chords of the mesh
 
 
 def test_supports_stay_where_they_have_moved(ring, model, state):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from loose_blocks import G, KEPT, PULSE, TILT, floor, rocking_block, tilted, toppling_time
+from loose_blocks import KEPT, PULSE, TILT, G, floor, rocking_block, tilted, toppling_time
 
 import archfem as af
 from archfem.dynamics.falling.engine import Falling
