@@ -1,8 +1,8 @@
-"""Files written in one stroke."""
+"""Files written in one stroke, and compiled code that is out of date."""
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -27,3 +27,21 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
         os.replace(draft, path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def forget_stale(folder: Path, *others: Path) -> None:
+    """Delete compiled code of a folder that is older than any of its sources.
+
+    Numba looks at the source of each function alone, not at that of what it calls: without this a
+    compiled function would go on calling others as they were when it was compiled.
+
+    Args:
+        folder: of modules, whose `__pycache__` holds what numba compiled.
+        others: folders of modules that those of this one call.
+    """
+    sources = [path for each in (folder, *others) for path in each.glob("*.py")]
+    newest = max(path.stat().st_mtime for path in sources)
+    for path in (folder / "__pycache__").glob("*.nb[ic]"):
+        with suppress(OSError):  # another process was first, or may not
+            if path.stat().st_mtime < newest:
+                path.unlink()

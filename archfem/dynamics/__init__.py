@@ -7,6 +7,7 @@
     steps         what passes between stepper and run: states, steps, batches
     stepping      the one stepper and its strategies
     falling       loose rigid blocks: impacts, and the way to the ground
+    collapse      from a structure that parts to what lies on the ground
     energy        the energy balance of a run
     guard         doubts about a run while it goes on
     glance        a quick look at joints at every step
@@ -16,6 +17,7 @@
     history       the record of a run, and its file
     verdicts      when a run first meets a mechanism, by each definition
     scales        by what factor a motion must be multiplied for a mechanism
+    collapse_scale  by what factor until the structure falls
     ladder        which rung, mesh and step a scene needs
     candidates    models that may be chosen, and finer ones to compare them with
     yardstick     what a model and its steps err by

@@ -2,11 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from archfem.arguments import instance
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.history import history_of
-from archfem.dynamics.scales import Bracket, MechanismScales, ScaledRun, largest_scale, search
+from archfem.dynamics.scales import (
+    COLLAPSE,
+    Bracket,
+    MechanismScales,
+    ScaledRun,
+    largest_scale,
+    search,
+)
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge, InvalidInput
@@ -19,8 +27,6 @@ from archfem.tables import aligned
 STEPS = (0.005, 0.0025)
 """Time steps by which collapse is looked for: a fall under a record is sensitive to everything, and
 what two steps do not agree on is not known [s]."""
-
-COLLAPSE = "collapse"
 
 
 @dataclass(frozen=True)
@@ -106,6 +112,9 @@ def collapse_scale(
         precision: relative width of the last brackets [-].
         between: least and largest scale tried [-]; no ground motion may exceed 5 g.
 
+    Returns:
+        All runs, with the scales between which it falls by each step.
+
     Raises:
         InvalidInput: displacements are small, precision, steps or scales cannot be meant.
         DidNotConverge: the structure does not stand under dead load.
@@ -119,22 +128,14 @@ def collapse_scale(
     begin = start or dead_load(model)
     least, largest = between
 
-    def shaken(scale: float, step: float) -> ScaledRun:
+    def shaken(step: float, scale: float) -> ScaledRun:
         try:
             run = time_history(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         except DidNotConverge as error:
             run = history_of(error)
-        fell = run.fall is not None and run.fall.kind in ("partly fallen", "fallen")
-        return ScaledRun(
-            scale, {COLLAPSE: run.fall if fell else None}, run.ended, run.outcome, run.fall
-        )
+        return ScaledRun(scale, {}, run.ended, run.outcome, run.fall)
 
     limits = (least, max(least, min(largest, largest_scale(motion))))
     return CollapseScale(
-        {
-            step: search(
-                lambda scale, step=step: shaken(scale, step), (COLLAPSE,), precision, limits
-            )
-            for step in dt
-        }
+        {step: search(partial(shaken, step), (COLLAPSE,), precision, limits) for step in dt}
     )

@@ -111,8 +111,8 @@ class Guard:
                 "displacement",
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
-                "displacements that this model assumes; read it as collapse, or follow it on a model "
-                "whose displacements may be large",
+                "displacements that this model assumes; read it as collapse, or follow it with "
+                "build(…, displacements='large')",
             )
 
     def _tell(self, kind: str, words: str) -> None:

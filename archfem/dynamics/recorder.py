@@ -14,7 +14,7 @@ from archfem.dynamics.history import SIGNS, Ending, History
 from archfem.dynamics.steps import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
-from archfem.models.gauges import Gauges
+from archfem.models.gauges import Gauges, Readings
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 
@@ -66,7 +66,7 @@ class Reach:
         gauges: of the model that moves.
     """
 
-    def __init__(self, gauges: Gauges) -> None:
+    def __init__(self, gauges: Readings) -> None:
         self._gauges = gauges
         self._start: Array | None = None
 

@@ -32,6 +32,10 @@ RUNS = 40
 """Most runs of one search; four definitions to five per cent take about fifteen."""
 
 
+COLLAPSE = "collapse"
+"""What is looked for where displacements may be large: that the structure falls."""
+
+
 @dataclass(frozen=True)
 class ScaledRun:
     """One run of a search.
@@ -45,7 +49,7 @@ class ScaledRun:
     """
 
     scale: float
-    found: dict[str, Mechanism | Fall | None]
+    found: dict[str, Mechanism | None]
     ended: Ending
     outcome: str
     fall: Fall | None = None
@@ -60,13 +64,19 @@ class ScaledRun:
         """Whether a step had no equilibrium, which counts as failed."""
         return self.ended is Ending.FAILED
 
+    @property
+    def fell(self) -> bool:
+        """Whether the structure, or a part of it, has fallen."""
+        return self.fall is not None and self.fall.kind in ("partly fallen", "fallen")
+
     def fails(self, definition: str) -> bool:
         """Return whether a mechanism was met, or the run broke off.
 
         Args:
-            definition: of a mechanism, one of `DEFINITIONS`.
+            definition: of a mechanism, one of `DEFINITIONS`, or `COLLAPSE`.
         """
-        return self.found[definition] is not None or self.broken
+        met = self.fell if definition == COLLAPSE else self.found[definition] is not None
+        return met or self.broken
 
     def survives(self, definition: str) -> bool:
         """Return whether the whole motion passed without a mechanism.

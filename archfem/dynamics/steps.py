@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archfem.arrays import Array
-from archfem.models.gauges import Gauges
+from archfem.models.gauges import Readings
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Batch:
     fallback: bool = False
     readings: Array | None = None
 
-    def read(self, gauges: Gauges) -> Array:
+    def read(self, gauges: Readings) -> Array:
         """Return the readings of gauges at the ends of the steps (steps, r).
 
         Args:

@@ -1,8 +1,13 @@
 """Means over a step of what a joint's places carry while gaps go straight, compiled."""
 
+from pathlib import Path
+
 import numba
 
+from archfem.files import forget_stale
 from archfem.joints.facets import PLACES, SHARES
+
+forget_stale(Path(__file__).parent)
 
 
 @numba.njit(cache=True)

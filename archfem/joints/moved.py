@@ -153,7 +153,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         gradient(poses[1], angle, now)
         lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
         shear, rubbing = rub_faces(
-            joints.faces, joint, ends, late, normals, slid, force, rate, found.slid
+            joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
         )
         found.resultants[joint, 0], found.resultants[joint, 1] = -force[0], shear
         found.resultants[joint, 2] = force[2]

@@ -185,6 +185,10 @@ def _carried(ends, first, second, facet):  # type: ignore
         first: change of the start with a parameter [-].
         second: change of the end with it [-].
         facet: whether it is one.
+
+    Returns:
+        At both ends, and derivatives of the first by the first and by the second gap, and of the
+        second by the second.
     """
     a, c, b, d = ends
     half = 0.5 * (first + second)
@@ -247,7 +251,7 @@ def rub(first, change, late, limit, found):  # type: ignore
 
 
 @numba.njit(cache=True)
-def rub_faces(faces, joint, ends, late, normals, slid, force, rate, after):  # type: ignore
+def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
     """Add the shear of a joint over a step, and what its points remember at the end.
 
     Args:
@@ -257,27 +261,26 @@ def rub_faces(faces, joint, ends, late, normals, slid, force, rate, after):  # t
         late: lag of damping over the length of the step [-].
         normals: as `press_faces` fills them (p, 4) [N].
         slid: how far each point has slid for good before (p,) [m].
-        force: on opening, slip and turn, added to (3,) [N, N, N m].
-        rate: its derivative by the measures at the end, added to (3, 3).
-        after: `slid` at the end, filled for those of this joint (p,) [m].
+        found: force on opening, slip and turn (3,) [N, N, N m], and its derivative by the measures
+            at the end (3, 3), both added to; `slid` at the end, filled for this joint (p,) [m].
 
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    friction, found = faces.friction[joint], np.empty(5)
+    (force, rate, after), friction, own = found, faces.friction[joint], np.empty(5)
     total = lost = 0.0
     for point in range(faces.first[joint], faces.first[joint + 1]):
         stiff = faces.shear[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
-        rub(first, change, late, limit, found)
-        total += found[0]
-        lost += found[4] / stiff
-        rate[1, 1] += stiff * found[2]
-        after[point] = slid[point] + found[1] / stiff
-        if found[3] != 0.0:
+        rub(first, change, late, limit, own)
+        total += own[0]
+        lost += own[4] / stiff
+        rate[1, 1] += stiff * own[2]
+        after[point] = slid[point] + own[1] / stiff
+        if own[3] != 0.0:
             for k in range(3):
-                rate[1, k] += found[3] * friction * normals[point, 1 + k]
+                rate[1, k] += own[3] * friction * normals[point, 1 + k]
     force[1] += total
     return total, lost

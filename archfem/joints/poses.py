@@ -1,7 +1,7 @@
 """Where the faces of blocks are that turn as far as they like, compiled.
 
-A block has the displacement (x, y) of its centroid, its angle θ, and where it is elastic shapes ξ in
-the frame that turns with it. A face with its middle at r from the centroid then has the pose
+A block has the displacement (x, y) of its centroid, its angle θ, and where it is elastic shapes ξ
+in the frame that turns with it. A face with its middle at r from the centroid then has the pose
 
     p = (x, y) + R(θ)(r + U ξ) - r,   θ + Θ ξ.
 

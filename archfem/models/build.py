@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from archfem.errors import InvalidInput
 from archfem.masonry.softness import soft_blocks, softness
@@ -41,7 +40,7 @@ def build(structure: Structure, asked: Discretisation) -> Model:
     return _small(structure, asked)
 
 
-def _small(structure: Structure, asked: Discretisation) -> Any:
+def _small(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of small displacements."""
     rungs = _rungs(structure, asked.fidelity)
     _doubt(structure, rungs)

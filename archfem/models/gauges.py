@@ -28,46 +28,12 @@ class Assembled(Protocol):
         """From coordinates to openings and slips; its forces are of no concern."""
 
 
-@dataclass(frozen=True, eq=False)
-class Gauges:
-    """Readings of a model.
+class Readings(Protocol):
+    """Readings of a model, whatever its displacements may be."""
 
-    Attributes:
-        matrix: D, from coordinates to readings, of the joints first, then of the blocks (r, n).
-        offset: d, readings at q = 0, which supports cause that have moved (r,).
-        joints: number of joints.
-    """
-
-    matrix: sparse.csr_matrix
-    offset: Array
-    joints: int
-
-    @classmethod
-    def on(cls, model: Model) -> "Gauges | MovedGauges":
-        """Return the gauges of a model, made once.
-
-        Args:
-            model: any rung.
-        """
-        if isinstance(model, Moving):
-            return MovedGauges(model)
-        if model not in _made:
-            _made[model] = cls._made_for(model)
-        return _made[model]
-
-    @classmethod
-    def _made_for(cls, model: Model) -> "Gauges":
-        """Put gauges on a model."""
-        operator = model.operator or cast(Assembled, model).kinematics
-        faces, moved = face_matrix(operator)
-        cells = model.cells
-        blocks = len(model.structure.blocks)
-        share = 1.0 / np.bincount(cells.block)[cells.block]
-        places = np.arange(len(share))
-        mean = sparse.csr_matrix((share, (cells.block, places)), (blocks, len(share)))
-        middles = sparse.kron(mean, sparse.identity(2)) @ cells.lift
-        offset = np.concatenate([moved, np.zeros(2 * blocks)])
-        return cls(sparse.vstack([faces, middles], "csr"), offset, len(model.structure.joints))
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
 
     def read(self, q: Array) -> Array:
         """Return all readings (r,).
@@ -75,7 +41,6 @@ class Gauges:
         Args:
             q: coordinates (n,).
         """
-        return np.asarray(self.matrix @ q + self.offset)
 
     def faces(self, readings: Array) -> Array:
         """Return gaps at mid-depth, rotations and slips of the joints (…, 3, n_joints).
@@ -96,7 +61,69 @@ class Gauges:
 
 
 @dataclass(frozen=True, eq=False)
-class MovedGauges:
+class Gauges(Readings):
+    """Readings of a model.
+
+    Attributes:
+        matrix: D, from coordinates to readings, of the joints first, then of the blocks (r, n).
+        offset: d, readings at q = 0, which supports cause that have moved (r,).
+        count: number of joints.
+    """
+
+    matrix: sparse.csr_matrix
+    offset: Array
+    count: int
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return self.count
+
+    @classmethod
+    def on(cls, model: Model) -> "Gauges | MovedGauges":
+        """Return the gauges of a model, made once.
+
+        Args:
+            model: any rung.
+        """
+        if isinstance(model, Moving):
+            return MovedGauges(model)
+        if model not in _made:
+            _made[model] = cls.made_for(model)
+        return _made[model]
+
+    @classmethod
+    def made_for(cls, model: Model) -> "Gauges":
+        """Put gauges on a model of small displacements.
+
+        Args:
+            model: any rung.
+
+        Returns:
+            The gauges, made anew.
+        """
+        operator = model.operator or cast(Assembled, model).kinematics
+        faces, moved = face_matrix(operator)
+        cells = model.cells
+        blocks = len(model.structure.blocks)
+        share = 1.0 / np.bincount(cells.block)[cells.block]
+        places = np.arange(len(share))
+        mean = sparse.csr_matrix((share, (cells.block, places)), (blocks, len(share)))
+        middles = sparse.kron(mean, sparse.identity(2)) @ cells.lift
+        offset = np.concatenate([moved, np.zeros(2 * blocks)])
+        return cls(sparse.vstack([faces, middles], "csr"), offset, len(model.structure.joints))
+
+    def read(self, q: Array) -> Array:
+        """Return all readings (r,).
+
+        Args:
+            q: coordinates (n,).
+        """
+        return np.asarray(self.matrix @ q + self.offset)
+
+
+@dataclass(frozen=True, eq=False)
+class MovedGauges(Readings):
     """Readings of a model whose blocks move as far as they like, in the same order.
 
     Attributes:
@@ -132,6 +159,3 @@ class MovedGauges:
             states: coordinates (steps, n).
         """
         return np.array([self.read(q) for q in states])
-
-    faces = Gauges.faces
-    middles = Gauges.middles

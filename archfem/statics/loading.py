@@ -55,7 +55,8 @@ class Load:
         """
         if not isinstance(self.model, Moving):
             return self.first
-        return np.sum([self.model.load(action, q) for action in self.actions], axis=0)
+        forces: Array = np.sum([self.model.load(action, q) for action in self.actions], axis=0)
+        return forces
 
     def rate(self, q: Array) -> sparse.csr_matrix | float:
         """Return the derivative of `forces` (n, n); 0 where it does not depend on q.

@@ -11,7 +11,7 @@ from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement
-from archfem.models.gauges import Gauges
+from archfem.models.gauges import Gauges, MovedGauges
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.lasting import ROUNDS, lasts, upset
@@ -280,9 +280,14 @@ class SupportPath:
 
         Those that the motion alone would cause grow with it.
         """
-        parts, still = np.array(self.parts)[:, None], Gauges.on(self._moved(0.0))
-        far = Gauges.on(self._moved(1.0)).offset - still.offset
-        return still.faces(np.array([still.read(q) for q in self.states]) + parts * far)
+        still = Gauges.on(self._moved(0.0))
+        if isinstance(still, MovedGauges):
+            placed = [Gauges.on(self._moved(part)) for part in self.parts]
+            readings = [gauges.read(q) for gauges, q in zip(placed, self.states, strict=True)]
+            return still.faces(np.array(readings))
+        parts, whole = np.array(self.parts)[:, None], Gauges.made_for(self._moved(1.0))
+        own = np.array([still.read(q) for q in self.states])
+        return still.faces(own + parts * (whole.offset - still.offset))
 
     @property
     def factors(self) -> Array:

@@ -9,8 +9,9 @@ import pytest
 from numba.extending import overload
 
 import archfem as af
-from archfem.dynamics.stepping.loop import advance, begin, forget_stale, measure, settle
+from archfem.dynamics.stepping.loop import advance, begin, measure, settle
 from archfem.dynamics.stepping.stepper import BATCH
+from archfem.files import forget_stale
 
 GRAVITY = 9.81
 FRICTION = 0.5

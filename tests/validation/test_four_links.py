@@ -6,6 +6,7 @@ from the geometry of three links alone, whatever the rotation: by virtual work h
 """
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ class Links:
             ]
         )
         blocks = [structure.blocks[number] for number in structure.free]
-        self.links = [blocks[a:b] for a, b in zip(numbers, numbers[1:], strict=False)]
+        self.links = [blocks[a:b] for a, b in pairwise(numbers)]
 
     def turns(self, first):
         """Rotations of the three links, of which the first is given."""

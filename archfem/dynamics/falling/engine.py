@@ -15,8 +15,8 @@ from archfem.dynamics.falling.carried import nothing_carried
 from archfem.dynamics.falling.contact import room_for, world_of
 from archfem.dynamics.falling.impacts import SWEEPS, Laws, Room, step
 from archfem.dynamics.falling.state import Loose
-from archfem.dynamics.stepping.loop import forget_stale
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.files import forget_stale
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 

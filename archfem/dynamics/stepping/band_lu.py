@@ -21,21 +21,9 @@ def eliminate(band, vector):  # type: ignore
     """
     size, half = len(vector), (band.shape[1] - 1) // 3
     for k in range(size):
-        below = min(k + half, size - 1)
-        pivot, largest = k, abs(band[k, half])
-        for i in range(k + 1, below + 1):
-            if abs(band[i, half + k - i]) > largest:
-                pivot, largest = i, abs(band[i, half + k - i])
-        if largest == 0.0:
+        below, last = min(k + half, size - 1), min(k + 2 * half, size - 1)
+        if not _exchange(band, vector, k, half):
             return False
-        last = min(k + 2 * half, size - 1)
-        if pivot != k:
-            shift = k - pivot
-            for j in range(k, last + 1):
-                upper = band[k, half + j - k]
-                band[k, half + j - k] = band[pivot, half + j - k + shift]
-                band[pivot, half + j - k + shift] = upper
-            vector[k], vector[pivot] = vector[pivot], vector[k]
         for i in range(k + 1, below + 1):
             factor = band[i, half + k - i] / band[k, half]
             if factor != 0.0:
@@ -49,6 +37,23 @@ def eliminate(band, vector):  # type: ignore
             total -= band[k, half + j - k] * vector[j]
         vector[k] = total / band[k, half]
     return True
+
+
+@numba.njit(cache=True)
+def _exchange(band, vector, k, half):  # type: ignore
+    """Bring the largest entry of a column into row k; returns whether there is one."""
+    size, pivot, largest = len(vector), k, abs(band[k, half])
+    for i in range(k + 1, min(k + half, size - 1) + 1):
+        if abs(band[i, half + k - i]) > largest:
+            pivot, largest = i, abs(band[i, half + k - i])
+    if pivot != k:
+        shift = k - pivot
+        for j in range(k, min(k + 2 * half, size - 1) + 1):
+            upper = band[k, half + j - k]
+            band[k, half + j - k] = band[pivot, half + j - k + shift]
+            band[pivot, half + j - k + shift] = upper
+        vector[k], vector[pivot] = vector[pivot], vector[k]
+    return largest > 0.0
 
 
 def half_width(matrix) -> int:  # type: ignore

@@ -5,11 +5,13 @@ A system is a NamedTuple. For its type `begin`, `settle` and `measure` are given
 neither matrices nor joints: how gaps, resultants and energies come about is the system's own.
 """
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
+
+from archfem import joints
+from archfem.files import forget_stale
 
 ITERATIONS = 40
 """Passes over the joints in a step before it is given up."""
@@ -60,23 +62,7 @@ def measure(
     raise NotImplementedError
 
 
-def forget_stale(folder: Path) -> None:
-    """Delete compiled code of a folder that is older than any of its sources.
-
-    Numba looks at the source of each function alone, not at that of what it calls: without this,
-    `advance` would go on with strategies as they were when it was compiled.
-
-    Args:
-        folder: of modules, whose `__pycache__` holds what numba compiled.
-    """
-    newest = max(path.stat().st_mtime for path in folder.glob("*.py"))
-    for path in (folder / "__pycache__").glob("*.nb[ic]"):
-        with suppress(OSError):  # another process was first, or may not
-            if path.stat().st_mtime < newest:
-                path.unlink()
-
-
-forget_stale(Path(__file__).parent)
+forget_stale(Path(__file__).parent, Path(joints.__file__).parent)
 
 
 @numba.njit(cache=True)

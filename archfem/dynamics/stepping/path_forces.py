@@ -7,7 +7,7 @@ gaps, as in `facets.Facets`; where it stays closed or open all the way, what it 
 import numba
 import numpy as np
 
-from archfem.joints.facets import PLACES, SHARES
+from archfem.joints.means import facet_means, point_means
 
 
 @numba.njit(cache=True)
@@ -77,67 +77,6 @@ def between(ends, share):  # type: ignore
         share: of the far one [-].
     """
     return (1.0 - share) * ends[0] + share * ends[1]
-
-
-@numba.njit(cache=True)
-def point_means(a, b, first, second):  # type: ignore
-    """Return means over a step of closing and of opening at a place, rate of the latter, and time.
-
-    Args:
-        a: gap at the start of its path [m].
-        b: gap at the end [m].
-        first: change of the start with a parameter [-].
-        second: change of the end with it [-].
-    """
-    if a <= 0.0 and b <= 0.0:
-        return 0.5 * (a + b), 0.0, 0.0, 1.0
-    if a > 0.0 and b > 0.0:
-        return 0.0, 0.5 * (a + b), 0.5 * (first + second), 0.0
-    whole = abs(a) + abs(b)
-    opened, closed = max(a, b) / whole, -min(a, b) / whole
-    square = 0.5 * opened**2
-    rate = first * (opened - square if a > 0.0 else square)
-    rate += second * (opened - square if b > 0.0 else square)
-    return 0.5 * min(a, b) * closed, 0.5 * max(a, b) * opened, rate, closed
-
-
-@numba.njit(cache=True)
-def facet_means(ends, first, second):  # type: ignore
-    """Return the same integrated with the linear functions of a facet of unit length.
-
-    Args:
-        ends: gaps of both ends at the start, and of both at the end, of their paths [m].
-        first: change of the start with a parameter [-].
-        second: change of the end with it [-].
-    """
-    a, c, b, d = ends
-    if max(ends) <= 0.0 or min(ends) > 0.0:
-        return _whole_means(ends, 0.5 * (first + second))
-    low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
-    high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
-    breaks = (0.0, min(low, high), max(low, high), 1.0)
-    n0 = n1 = t0 = t1 = r00 = r01 = r11 = s0 = s1 = 0.0
-    for piece in range(3):
-        length = breaks[piece + 1] - breaks[piece]
-        if length <= 0.0:
-            continue
-        for k in range(3):
-            place = breaks[piece] + PLACES[k] * length
-            near, far = 1.0 - place, place
-            normal, taken, rate, time = point_means(
-                near * a + far * c, near * b + far * d, first, second
-            )
-            weight = SHARES[k] * length
-            n0 += weight * near * normal
-            n1 += weight * far * normal
-            t0 += weight * near * taken
-            t1 += weight * far * taken
-            r00 += weight * near * near * rate
-            r01 += weight * near * far * rate
-            r11 += weight * far * far * rate
-            s0 += weight * near * time
-            s1 += weight * far * time
-    return (n0, n1), (t0, t1), (r00, r01, r11), (s0, s1)
 
 
 @numba.njit(cache=True)

@@ -82,8 +82,9 @@ class Turning(Reordered):
     def __init__(self, equation: Equation) -> None:
         model = equation.model
         assert isinstance(model, Moving)
-        self._equation, self._model = equation, model
-        self._blocks = _narrow(model)
+        self._equation: Equation = equation
+        self._model: Moving = model
+        self._blocks: Any = _narrow(model)
         pieces = [np.arange(*model.starts[k : k + 2]) for k in self._blocks]
         super().__init__(np.concatenate(pieces))
 
@@ -285,7 +286,7 @@ def _assemble(system, kept):  # type: ignore
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
     """Mean resultants and energies of a step, and what joints remember at its end."""
     (resultants, energy), room, image = results, system.room, kept.image
-    old, new, move = states[0], states[1], kept.move
+    new, move = states[1], kept.move
     dt, late = system.step
     resultants[:] = room.resultants
     times(system.mass, new[1], image)

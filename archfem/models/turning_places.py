@@ -1,0 +1,116 @@
+"""How points of blocks move that turn as far as they like: for loads and pictures."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from archfem.arrays import Array
+from archfem.models.cells import Cells
+
+
+@dataclass(frozen=True, eq=False)
+class TurningCells(Cells):
+    """Cells of blocks that turn.
+
+    Attributes:
+        turns: coordinate of the turn of the block that each point belongs to (m,).
+    """
+
+    turns: Any = ()
+
+    @classmethod
+    def of(cls, cells: Cells, starts: dict[int, int]) -> "TurningCells":
+        """Return the same cells on blocks that turn.
+
+        Args:
+            cells: whose `lift` holds for small displacements.
+            starts: first coordinate of each block that moves.
+        """
+        turns = np.array([starts[int(block)] + 2 for block in cells.block])
+        return cls(cells.places, cells.block, cells.polygons, cells.lift, cells.stress, turns)
+
+    @cached_property
+    def _about(self) -> tuple[Array, sparse.csr_matrix]:
+        """Arms of the points from the centroids (m, 2), and their elastic displacements."""
+        columns = self.lift.tocsc()
+        turn = np.unique(self.turns)
+        arms = np.zeros_like(self.places)
+        for column in turn:
+            motion = columns[:, column].toarray().reshape(-1, 2)
+            own = self.turns == column
+            arms[own] = np.column_stack([motion[own, 1], -motion[own, 0]])
+        rigid = np.zeros(self.lift.shape[1], bool)
+        rigid[np.concatenate([turn, turn - 1, turn - 2])] = True
+        return arms, self.lift @ sparse.diags((~rigid).astype(float))
+
+    def displacement(self, q: Array) -> Array:
+        """Return the displacement of every point (m, 2) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        arms, elastic = self._about
+        turn = q[self.turns]
+        strained = (elastic @ q).reshape(-1, 2)
+        c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
+        return np.column_stack(
+            [
+                q[self.turns - 2]
+                + less * arms[:, 0]
+                - s * arms[:, 1]
+                + c * strained[:, 0]
+                - s * strained[:, 1],
+                q[self.turns - 1]
+                + s * arms[:, 0]
+                + less * arms[:, 1]
+                + s * strained[:, 0]
+                + c * strained[:, 1],
+            ]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class TurningPoint:
+    """A point of a block that turns.
+
+    Attributes:
+        first: first coordinate of the block.
+        arm: from its centroid (2,) [m].
+        shapes: displacements there of its modes (2, s).
+    """
+
+    first: int
+    arm: Array
+    shapes: Array
+
+    def _turned(self, q: Array) -> tuple[Array, Array, Array]:
+        """Where it is in the block, the block's rotation, and the derivative of that."""
+        c, s = np.cos(q[self.first + 2]), np.sin(q[self.first + 2])
+        strained = self.shapes @ q[self.first + 3 : self.first + 3 + self.shapes.shape[1]]
+        return self.arm + strained, np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
+
+    def displacement(self, q: Array) -> Array:
+        """Displacement from coordinates (2,) [m]."""
+        place, turn, _ = self._turned(q)
+        return q[self.first : self.first + 2] + turn @ place - self.arm
+
+    def gradient(self, q: Array, size: int) -> sparse.csr_matrix:
+        """Its derivative (2, n)."""
+        place, turn, rate = self._turned(q)
+        local = np.column_stack([np.eye(2), rate @ place, turn @ self.shapes])
+        columns = self.first + np.arange(local.shape[1])
+        found = sparse.lil_matrix((2, size))
+        found[:, columns] = local
+        return found.tocsr()
+
+    def bend(self, q: Array, force: Array, size: int) -> sparse.csr_matrix:
+        """Derivative of the generalised forces of a force (n, n)."""
+        place, turn, rate = self._turned(q)
+        theta, modes = self.first + 2, self.first + 3 + np.arange(self.shapes.shape[1])
+        found = sparse.lil_matrix((size, size))
+        found[theta, theta] = -force @ (turn @ place)
+        found[theta, modes] = found[modes, theta] = force @ (rate @ self.shapes)
+        return found.tocsr()
