@@ -26,7 +26,7 @@ ONLY_IN = {
     "basix": "models.fem",
     "petsc4py": "_petsc",
     "slepc4py": "_petsc",
-    "numba": ("dynamics.stepping", "dynamics.falling"),
+    "numba": ("dynamics.stepping", "dynamics.falling", "joints.moving"),
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",

@@ -10,11 +10,7 @@
     kinematics  the joint operator G, from coordinates to openings and slips, and back
     operator    the same with forces from openings and slips, and memory
     passage     a step of the joints: means of their forces, and what they remember
-    frames      opening, slip and turn of faces that have moved far, compiled
-    poses       where the faces of blocks are that turn as far as they like, compiled
-    means       means over a step of what gaps carry that go straight, compiled
-    overlap     the law over the overlap of faces that have slid far, compiled
-    moved       a step of the joints between blocks that move far, compiled
+    moving      joints between blocks that move as far as they like, compiled
     faces       opening, rotation and slip of whole joints
     given_limits  joints whose limits of friction stay as they are
     rigid       G of rigid blocks

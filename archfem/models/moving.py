@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.moved import (
+from archfem.joints.moving.moved import (
     Answer,
     all_measures,
     answer,

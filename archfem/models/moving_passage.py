@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.moved import Answer
+from archfem.joints.moving.moved import Answer
 
 
 class Turning(Protocol):

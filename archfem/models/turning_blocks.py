@@ -15,9 +15,9 @@ from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints.faces import face_matrix
 from archfem.joints.facets import Facets
-from archfem.joints.moved import Moved
-from archfem.joints.overlap import Faces
-from archfem.joints.poses import Sides
+from archfem.joints.moving.moved import Moved
+from archfem.joints.moving.overlap import Faces
+from archfem.joints.moving.poses import Sides
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
 from archfem.models.jointed import Jointed

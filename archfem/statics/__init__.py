@@ -6,7 +6,8 @@
     relaxation   a structure creeps to rest where Newton's method fails
     search       the next equilibrium, from the last one
     equilibrium  dead load and other loads that stay
-    path         paths of equilibrium, step by step
+    path         paths of equilibrium under a load that grows
+    support_path the same under the dead load, over a support that moves
     pushover     a load grows until hardly anything resists
     eigen        the lowest vibrations of sparse matrices, by SLEPc
     modes        vibrations about a state

@@ -14,7 +14,10 @@ from archfem.joints.resultants import joint_dataset
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.statics.path import LoadPath, Path, SupportPath
+from archfem.statics.path import LoadPath
+from archfem.statics.support_path import SupportPath
+
+Path = LoadPath | SupportPath
 
 CONTROLS = ("displacement", "arc length", "path", "force")
 

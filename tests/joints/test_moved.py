@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from archfem.joints import frames
-from archfem.joints.moved import Moved, answer, joint_energy, pass_joints
-from archfem.joints.overlap import Faces
-from archfem.joints.poses import Sides, pose, pose_gradient
+from archfem.joints.moving import frames
+from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
+from archfem.joints.moving.overlap import Faces
+from archfem.joints.moving.poses import Sides, pose, pose_gradient
 
 SEEDS = range(12)
 

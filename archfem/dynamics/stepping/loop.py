@@ -10,7 +10,6 @@ from typing import Any
 
 import numba
 
-from archfem import joints
 from archfem.files import forget_stale
 
 ITERATIONS = 40
@@ -62,7 +61,7 @@ def measure(
     raise NotImplementedError
 
 
-forget_stale(Path(__file__).parent, Path(joints.__file__).parent)
+forget_stale(Path(__file__).parent, Path(__file__).parents[2] / "joints" / "moving")
 
 
 @numba.njit(cache=True)

@@ -16,10 +16,11 @@ from archfem.dynamics.stepping import sliding_points  # noqa: F401  (solves the 
 from archfem.dynamics.stepping.joint_law import pulls
 from archfem.dynamics.stepping.linear import closed_energies, images_of, law_type
 from archfem.dynamics.stepping.loop import begin, measure
-from archfem.dynamics.stepping.path_forces import between, facet_means, point_means
+from archfem.dynamics.stepping.path_forces import between
 from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import is_of
 from archfem.dynamics.stepping.sparse_rows import stored, times
+from archfem.joints.moving.means import facet_means, point_means
 
 
 class Passed(NamedTuple):

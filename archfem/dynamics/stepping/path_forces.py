@@ -7,7 +7,7 @@ gaps, as in `facets.Facets`; where it stays closed or open all the way, what it 
 import numba
 import numpy as np
 
-from archfem.joints.means import facet_means, point_means
+from archfem.joints.moving.means import facet_means, point_means
 
 
 @numba.njit(cache=True)

@@ -5,7 +5,7 @@ that makes the tangent a narrow band,
 
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g,
 
-f̄ the mean force of the joints, by `joints.moved`. Passes that go round in a circle, of points that
+f̄ the mean force of the joints, by `joints.moving`. Passes that go round in a circle, of points that
 hold and slide in turn, are halved.
 """
 
@@ -23,8 +23,8 @@ from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import ITERATIONS, begin, measure, settle
 from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
 from archfem.dynamics.stepping.strategy import Reordered
-from archfem.joints.moved import Answer, Moved, answer, joint_energy, pass_joints
-from archfem.joints.poses import Sides
+from archfem.joints.moving.moved import Answer, Moved, answer, joint_energy, pass_joints
+from archfem.joints.moving.poses import Sides
 from archfem.models.moving import Moving
 
 ENOUGH = 1e-10

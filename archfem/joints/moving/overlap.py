@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.means import facet_means, point_means
+from archfem.joints.moving.means import facet_means, point_means
 
 
 class Faces(NamedTuple):

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.frames import sinc, sinc_rate
+from archfem.joints.moving.frames import sinc, sinc_rate
 
 
 class Sides(NamedTuple):

@@ -11,15 +11,15 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.frames import bend, discrete, gradient, measures
-from archfem.joints.overlap import (
+from archfem.joints.moving.frames import bend, discrete, gradient, measures
+from archfem.joints.moving.overlap import (
     Faces,
     overlap,
     press_faces,
     rub_faces,
     stored,
 )
-from archfem.joints.poses import Sides, pose, pose_bend, pose_gradient
+from archfem.joints.moving.poses import Sides, pose, pose_bend, pose_gradient
 
 
 class Moved(NamedTuple):

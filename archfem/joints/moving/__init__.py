@@ -1,0 +1,10 @@
+"""Joints between blocks that move as far as they like, compiled.
+
+    means    means over a step of what gaps carry that go straight
+    frames   opening, slip and turn of faces that have moved far
+    poses    where the faces of blocks are that turn as far as they like
+    overlap  the law over the overlap of faces that have slid far
+    moved    a step of the joints: forces, memory, and their derivatives
+
+Start reading at `moved`.
+"""
