@@ -1,0 +1,167 @@
+"""Time histories of blocks that move as far as they like, and what they leave."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.collapse_scale import collapse_scale
+from archfem.dynamics.steps import State
+from archfem.errors import InvalidInput
+
+SHAKE = af.Motion.synthetic(duration=1.5, pga=4.0, seed=4)
+
+PULSE = af.Motion(np.concatenate([np.full(51, 6.9), np.zeros(50)]), 0.01)
+"""0.7 g for half a second."""
+
+DAMPED = af.StiffnessDamping(0.05, 8.0)
+
+TIGHT = af.statics.Newton(tolerance=1e-12)
+
+
+@cache
+def ring(friction=0.6, stiff=1.0, stones=9):
+    contact = af.Contact(1.48e9 * stiff, 0.3e9 * stiff, friction)
+    return af.circular_arch(
+        radius=2.95, thickness=0.55, embrace=159.0, voussoirs=stones, contact=contact
+    )
+
+
+@cache
+def model(fidelity="rigid", friction=0.6, displacements="large", quadrature="exact"):
+    return af.build(
+        ring(friction),
+        fidelity=fidelity,
+        cells=(2, 2),
+        quadrature=quadrature,
+        displacements=displacements,
+    )
+
+
+@pytest.mark.parametrize("quadrature", ["exact", "nodal"])
+@pytest.mark.parametrize("friction", [0.4, None])
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_small_motions_are_those_of_small_displacements(fidelity, friction, quadrature):
+    """Forces and tangents at random states of 1 nm: what is left is of second order."""
+    far = model(fidelity, friction, quadrature=quadrature)
+    near = far.at_rest
+    q = 1e-9 * np.random.default_rng(0).normal(size=far.size)
+    assert far.force(q) == pytest.approx(near.force(q), abs=1e-7 * np.abs(near.force(q)).max())
+    matrix = near.tangent(q).toarray()
+    assert far.tangent(q).toarray() == pytest.approx(matrix, abs=1e-7 * np.abs(matrix).max())
+    expected = near.resultants(q)
+    assert far.resultants(q) == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+    moved = near.cells.displacement(q)
+    assert far.cells.displacement(q) == pytest.approx(moved, abs=1e-16)
+
+
+@pytest.mark.parametrize("friction", [0.4, None])
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_the_tangent_is_the_derivative_far_from_rest(fidelity, friction):
+    far = model(fidelity, friction)
+    q = 1e-2 * np.random.default_rng(1).normal(size=far.size)
+    steps = 1e-8 * np.eye(far.size)
+    found = np.array([(far.force(q + s) - far.force(q - s)) / 2e-8 for s in steps]).T
+    tangent = far.tangent(q).toarray()
+    assert tangent == pytest.approx(found, abs=1e-6 * np.abs(tangent).max())
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_the_strategy_gives_the_history_of_snes(fidelity):
+    """N to 1e-8 of the largest; slips, openings and rotations to 1e-9 m and rad."""
+    built = model(fidelity)
+    runs = [
+        af.time_history(
+            built, SHAKE, dt=0.005, damping=DAMPED, method=method, newton=TIGHT
+        ).joints
+        for method in ("turning", "snes")
+    ]
+    scale = float(runs[1]["N"].max())
+    assert float(np.abs(runs[0]["N"] - runs[1]["N"]).max()) < 1e-7 * scale
+    for name in ("opening", "rotation", "slip"):
+        assert float(np.abs(runs[0][name] - runs[1][name]).max()) < 1e-8
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.002])
+@pytest.mark.parametrize("friction", [0.3, 0.6, None])
+def test_an_undamped_run_keeps_its_energy(friction, dt):
+    """To 1e-6 of the largest exchanged, at any step, with joints that hinge and slide."""
+    run = af.time_history(model(friction=friction), SHAKE.scaled(1.5), dt=dt)
+    assert run.dataset.attrs["energy_drift"] == pytest.approx(0.0, abs=1e-6)
+    assert float(np.abs(run.joints["rotation"]).max()) > 3e-3
+
+
+def test_a_block_let_go_swings_for_its_period():
+    """Housner's block 0.6 × 2.4 m from half of its angle: 2.1637 s, stiff faces 0.2 to 0.4 % more.
+
+    A quarter of it is the time until it stands; of a rigid block that is an elliptic integral.
+    """
+    contact = af.Contact(1e11, 0.5e11, friction=None)
+    block = af.column(breadth=0.6, heights=[2.4], contact=contact)
+    built = af.build(block, fidelity="rigid", displacements="large")
+    tilt, corner = -0.5 * np.arctan2(0.3, 1.2), np.array([0.3, -1.2])
+    spin = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
+    place = corner - spin @ corner + [0.0, af.dead_load(built).q[1]]
+    start = State(0.0, np.array([*place, tilt]), np.zeros(3), np.zeros(3), None)
+    still = af.Motion(np.zeros(2), 0.7)
+    run = af.time_history(built, still, dt=1e-3, start=start, record=af.Record(fields_every=1))
+    turn, time = run.dataset["q"].values[:, 2], run.time
+    k = int(np.argmax(turn >= 0.0))
+    upright = np.interp(0.0, turn[k - 1 : k + 1], time[k - 1 : k + 1])
+    assert 1.002 < 4.0 * upright / 2.1637 < 1.004
+    assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
+
+
+def test_a_ring_stands_or_falls_and_says_so(tmp_path):
+    """Under a pulse of 0.2 g and of 0.7 g; the file tells it too."""
+    stands = af.time_history(model(), PULSE.scaled(0.3), dt=0.005, damping=DAMPED)
+    assert (stands.fall.kind, stands.fall.time, stands.fall.blocks) == ("stands", None, ())
+    assert stands.verdict.startswith("the structure stands")
+    falls = af.time_history(model(), PULSE, dt=0.005, damping=DAMPED)
+    assert falls.ended == "parted"
+    assert falls.fall.kind == "fallen"
+    assert len(falls.fall.blocks) > 4
+    assert falls.fall.time > falls.dataset.attrs["last_time"]
+    poses = falls.dataset["fall_pose"]
+    assert poses.sizes["block"] == len(ring().blocks)
+    assert float(poses[-1, 5, 1]) < -1.0
+    read = type(falls).read(falls.save(tmp_path / "falls.nc"), ring())
+    assert read.fall == falls.fall
+
+
+def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_falls():
+    found = collapse_scale(
+        model(),
+        PULSE,
+        damping=DAMPED,
+        dt=(0.01, 0.005),
+        precision=0.3,
+        between=(0.3, 1.0),
+    )
+    assert 0.3 <= found.lower < found.upper <= 1.0
+    for dt in (0.01, 0.005):
+        kinds = dict(found.falls(dt))
+        assert kinds[found.bracket(dt).lower].kind in ("stands", "dislocated")
+        assert kinds[found.bracket(dt).upper].kind in ("partly fallen", "fallen")
+    assert "stands" in found.table()
+
+
+def test_what_is_not_known_for_large_displacements_is_refused():
+    with pytest.raises(InvalidInput, match="not known on the rung 'full'"):
+        af.build(ring(), fidelity="full", cells=(1, 1), displacements="large")
+    with pytest.raises(InvalidInput, match="name a rung"):
+        af.build(ring(), fidelity="auto", displacements="large")
+    with pytest.raises(InvalidInput, match="use one of"):
+        af.build(ring(), fidelity="rigid", displacements="huge")
+    glued = af.circular_arch(
+        radius=2.95,
+        thickness=0.55,
+        embrace=159.0,
+        voussoirs=5,
+        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4),
+    )
+    with pytest.raises(InvalidInput, match="cohesion"):
+        af.build(glued, fidelity="rigid", displacements="large")
+    with pytest.raises(InvalidInput, match="displacements='large'"):
+        collapse_scale(model(displacements="small"), SHAKE)
