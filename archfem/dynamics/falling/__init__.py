@@ -4,7 +4,7 @@ Contacts are found anew at every step, so that any block may meet any other; it 
 forces in what stands, which two rigid points of a joint leave open. Start reading at `engine`.
 
     engine    `Falling`: steps in time, frames, the energy balance, rest
-    state     where blocks are and how they move
+    state     where blocks are and how they move; a frame of a run, its energy
     bodies    masses, shapes and friction of a structure's blocks
     pieces    outlines cut into convex pieces
     contact   where pieces touch

@@ -13,8 +13,8 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.bodies import Bodies, bodies_of, check_dry
 from archfem.dynamics.falling.carried import nothing_carried
 from archfem.dynamics.falling.contact import room_for, world_of
-from archfem.dynamics.falling.impacts import SWEEPS, Laws, Room, step
-from archfem.dynamics.falling.state import Loose
+from archfem.dynamics.falling.impacts import Laws, Room, step
+from archfem.dynamics.falling.state import Balance, Frame, Loose
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import forget_stale
 from archfem.masonry.structure import Structure
@@ -22,6 +22,13 @@ from archfem.motion.motion import Motion
 
 SLOW = 0.05
 """Speed of approach [m/s] below which nothing bounces: that of a fall of 0.13 mm."""
+
+SWEEPS, SETTLED = 500, 1e-5
+"""Sweeps over the contacts of a step at most, and the relative change of an impulse that ends
+them; what is left is made good in the steps that follow, which begin with its impulses."""
+
+FIRST_SWEEPS, FIRST_SETTLED = 20000, 1e-8
+"""The same for the first step of a run, which begins with none."""
 
 RISE = 1e-4
 """Energy that a run may gain beyond the ground's work, relative to what was exchanged."""
@@ -40,43 +47,6 @@ THROUGH = 0.2
 """Overlap, relative to the reach of the smallest block, at which blocks pass through each other."""
 
 forget_stale(Path(__file__).parent)
-
-
-@dataclass(frozen=True)
-class Balance:
-    """Energy since the start of a run, relative to the ground [J].
-
-    Attributes:
-        kinetic: of all blocks.
-        potential: of their weight, zero at the start.
-        work: that the motion of the ground has done.
-        lost: in impacts and by friction.
-        gained: by which, at most, it rose above what it had been at any time before, the work of
-            the ground apart; of a true solution nothing.
-    """
-
-    kinetic: float
-    potential: float
-    work: float
-    lost: float
-    gained: float
-
-
-@dataclass(frozen=True, eq=False)
-class Frame(Loose):
-    """The blocks at one time of a run.
-
-    Attributes:
-        balance: energy since the start.
-        overlap: deepest of two blocks, or of one in the ground, since the start [m].
-        unsettled: steps since the start whose impulses were taken before they had settled.
-        resting: whether all blocks have come to rest.
-    """
-
-    balance: Balance
-    overlap: float
-    unsettled: int
-    resting: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +165,10 @@ class _Run:
         self._q = np.array(start.poses, dtype=float)
         self._v = np.array(start.velocities, dtype=float)
         self._v[bodies.inverse[:-1, 0] == 0.0] = 0.0
-        self._laws = Laws(falling.dt, falling.structure.gravity, falling.restitution, SLOW)
+        self._laws = Laws(
+            falling.dt, falling.structure.gravity, falling.restitution, SLOW, SWEEPS, SETTLED
+        )
+        self._cold = True
         contacts = room_for(len(bodies.owner))
         self._room = Room(
             world_of(bodies),
@@ -221,9 +194,16 @@ class _Run:
 
     def advance(self, ground: Array) -> None:
         """Take steps."""
+        if self._cold:
+            self._take(ground[:1], self._laws._replace(sweeps=FIRST_SWEEPS, settled=FIRST_SETTLED))
+            self._cold, ground = False, ground[1:]
+        self._take(ground, self._laws)
+
+    def _take(self, ground: Array, laws: Laws) -> None:
+        """Take steps by these laws."""
         told = advance(
             self._falling.bodies,
-            self._laws,
+            laws,
             self._room,
             (self._q, self._v, np.ascontiguousarray(ground), self._energy),
         )
@@ -289,7 +269,7 @@ def advance(bodies, laws, room, state):  # type: ignore
         if sweeps < 0:
             return overlap, -1, exchanged
         overlap = max(overlap, deep)
-        unsettled += sweeps > SWEEPS
+        unsettled += sweeps > laws.sweeps
         work, rise = 0.0, 0.0
         for b in range(len(q)):
             moved = q[b] - before[b]

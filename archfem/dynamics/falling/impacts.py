@@ -18,12 +18,6 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.carried import Carried, keep, recall
 from archfem.dynamics.falling.contact import Contacts, World, find, place
 
-SWEEPS = 500
-"""Sweeps over the contacts of a step before its impulses are taken as they are."""
-
-SETTLED = 1e-5
-"""Change of an impulse, relative to the largest, below which a sweep is the last."""
-
 
 class Laws(NamedTuple):
     """What holds at every step.
@@ -33,12 +27,16 @@ class Laws(NamedTuple):
         gravity: downward [m/s²].
         restitution: e [-].
         slow: speed of approach below which nothing bounces [m/s].
+        sweeps: over the contacts of a step, before its impulses are taken as they are.
+        settled: change of an impulse, relative to the largest, below which a sweep is the last.
     """
 
     dt: float
     gravity: float
     restitution: float
     slow: float
+    sweeps: int
+    settled: float
 
 
 class Room(NamedTuple):
@@ -75,8 +73,8 @@ def step(bodies, laws, room, q, v, ground):  # type: ignore
         ground: its mean acceleration over the step (2,) [m/s²].
 
     Returns:
-        Sweeps that were needed, -1 where there is no room for the contacts; and the deepest
-        overlap [m].
+        Sweeps that were needed, one too many if impulses did not settle, -1 where there is no room
+        for the contacts; and the deepest overlap [m].
     """
     found, carried, middle, moving = room.found, room.carried, room.middle, room.moving
     half, count = 0.5 * laws.dt, len(q)
@@ -93,7 +91,7 @@ def step(bodies, laws, room, q, v, ground):  # type: ignore
         if bodies.inverse[b, 0] > 0.0:
             moving[b, 0] -= laws.dt * ground[0]
             moving[b, 1] -= laws.dt * (laws.gravity + ground[1])
-    sweeps = _impulses(bodies, room, touching)
+    sweeps = _impulses(bodies, laws, room, touching)
     keep(bodies, middle, found, touching, carried)
     q += half * (v + moving[:count])
     v[:] = moving[:count]
@@ -161,7 +159,7 @@ def _push(bodies, moving, pair, way, arms, impulse):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _impulses(bodies, room, touching):  # type: ignore
+def _impulses(bodies, laws, room, touching):  # type: ignore
     """Sweep over the contacts until impulses hardly change; the number of sweeps."""
     found, moving = room.found, room.moving
     for k in range(touching):
@@ -170,7 +168,7 @@ def _impulses(bodies, room, touching):  # type: ignore
         na, nb, ta, tb = room.rows[k, :4]
         _push(bodies, moving, (a, b), (nx, ny), (na, nb), found.impulse[k, 0])
         _push(bodies, moving, (a, b), (-ny, nx), (ta, tb), found.impulse[k, 1])
-    for sweep in range(1, SWEEPS + 1):
+    for sweep in range(1, laws.sweeps + 1):
         change, largest = 0.0, 0.0
         for k in range(touching):
             a, b = found.bodies[k]
@@ -188,6 +186,6 @@ def _impulses(bodies, room, touching):  # type: ignore
             _push(bodies, moving, (a, b), (-ny, nx), (ta, tb), new - old)
             found.impulse[k, 1] = new
             change = max(change, abs(new - old))
-        if change <= SETTLED * largest:
+        if change <= laws.settled * largest:
             return sweep
-    return SWEEPS + 1
+    return laws.sweeps + 1

@@ -1,4 +1,4 @@
-"""Where blocks are and how they move."""
+"""Where blocks are and how they move, and their energy on the way."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -34,3 +34,40 @@ class Loose:
         """
         count = len(structure.blocks)
         return cls(time, np.zeros((count, 3)), np.zeros((count, 3)))
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Energy since the start of a run, relative to the ground [J].
+
+    Attributes:
+        kinetic: of all blocks.
+        potential: of their weight, zero at the start.
+        work: that the motion of the ground has done.
+        lost: in impacts and by friction.
+        gained: by which, at most, it rose above what it had been at any time before, the work of
+            the ground apart; of a true solution nothing.
+    """
+
+    kinetic: float
+    potential: float
+    work: float
+    lost: float
+    gained: float
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(Loose):
+    """The blocks at one time of a run.
+
+    Attributes:
+        balance: energy since the start.
+        overlap: deepest of two blocks, or of one in the ground, since the start [m].
+        unsettled: steps since the start whose impulses were taken before they had settled.
+        resting: whether all blocks have come to rest.
+    """
+
+    balance: Balance
+    overlap: float
+    unsettled: int
+    resting: bool = False

@@ -110,7 +110,7 @@ def test_a_ring_at_rest_stays(chords):
     breath = af.Motion(1e-9 * np.ones(count), 1e-3)  # keeps the run going
     end = Falling(chords).last(start, 3.0, breath)
     assert end.time == pytest.approx(3.0)
-    assert np.abs(end.poses).max() < 1e-5
+    assert np.abs(end.poses).max() < 1e-6
 
 
 @pytest.mark.parametrize("chords", [None, 2])
