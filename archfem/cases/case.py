@@ -38,6 +38,7 @@ MODEL = {
     "quadrature": str,
     "points": int,
     "tolerance": "1",
+    "displacements": str,
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
@@ -175,7 +176,13 @@ class Case:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        check_scheme(self.analysis, self.structure)
+        displacements = self.discretisation.displacements
+        check_scheme(self.analysis, self.structure, displacements)
+        if displacements == "large" and self.stages is not None:
+            raise InvalidInput(
+                "displacements = 'large' and [dead_load] in stages: blocks that move far cannot be "
+                "built in stages; leave out one of both"
+            )
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
@@ -194,7 +201,16 @@ class Case:
 
     @cached_property
     def discretisation(self) -> Discretisation:
-        """What the structure is modelled by; its mesh alone counts where "auto" is to choose."""
+        """What the structure is modelled by; its mesh alone counts where "auto" is to choose.
+
+        Raises:
+            InvalidInput: "auto" is to choose among models whose displacements are large.
+        """
+        if self.chooses and self.model.get("displacements", "small") != "small":
+            raise InvalidInput(
+                "model.fidelity = 'auto' chooses among models of small displacements: with "
+                "displacements = 'large' name a rung, 'rigid' or 'faces'"
+            )
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
         return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
 
