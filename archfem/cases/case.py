@@ -38,6 +38,7 @@ MODEL = {
     "quadrature": str,
     "points": int,
     "tolerance": "1",
+    "displacements": str,
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
@@ -194,7 +195,16 @@ class Case:
 
     @cached_property
     def discretisation(self) -> Discretisation:
-        """What the structure is modelled by; its mesh alone counts where "auto" is to choose."""
+        """What the structure is modelled by; its mesh alone counts where "auto" is to choose.
+
+        Raises:
+            InvalidInput: "auto" is to choose among models whose displacements are large.
+        """
+        if self.chooses and self.model.get("displacements", "small") != "small":
+            raise InvalidInput(
+                "model.fidelity = 'auto' chooses among models of small displacements: with "
+                "displacements = 'large' name a rung, 'rigid' or 'faces'"
+            )
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
         return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
 

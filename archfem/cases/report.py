@@ -23,6 +23,7 @@ from archfem.statics.strength import use_table
 from archfem.view.accuracy import draw_accuracy
 from archfem.view.collapse import draw_collapse
 from archfem.view.envelopes import draw_envelope
+from archfem.view.falls import draw_fall
 from archfem.view.films.modes import film_modes
 from archfem.view.freebody import draw_free_body
 from archfem.view.joints import draw_joints
@@ -79,7 +80,7 @@ def write_dead(rest: Rest, folder: Path) -> list[Path]:
 
 
 def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
-    """Draw a run: its gravest instant, envelope, two joints over time, and film it where asked.
+    """Draw a run: its gravest instant, envelope, two joints over time, its fall; film it if asked.
 
     Args:
         done: a case, which tells title, which joints, and whether to film, and what happened.
@@ -99,6 +100,8 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
         "joints.png": draw_joints(run, chosen),
     }
+    if "fall_pose" in run.dataset:
+        figures["fall.png"] = draw_fall(run)
     files = write_motion(done.motion, folder) if case.suite is not None else []
     files += [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):

@@ -4,6 +4,7 @@ While joints hold, forces are those of `joints.moved`. Once a joint has turned o
 its blocks are loose, `falling` takes them as they are and as they move, to the ground and to rest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,21 +72,25 @@ def fallen(model: Moving, state: State, motion: Motion) -> tuple[xr.Dataset, Fal
     given = released(model, state)
     end = max(motion.duration, state.time) + SETTLING
     frames = list(Falling(model.structure).frames(given.start, end, motion, spacing=SPACING))
-    fall = fall_of(model.structure, [given.start, *frames])
-    return _as_dataset(model, [given.start, *frames], given), fall
+    return _as_dataset(frames, motion, given), fall_of(model.structure, frames)
 
 
-def _as_dataset(model: Moving, frames: list[Loose], given: Handover) -> xr.Dataset:
+def _as_dataset(frames: Sequence[Loose], motion: Motion, given: Handover) -> xr.Dataset:
     """Frames of a fall."""
+    times = np.array([frame.time for frame in frames])
     poses = np.array([frame.poses for frame in frames])
     about = {
         "long_name": "displacement of a block's centroid, and its turn, from where it was built",
         "units": "m, m, rad",
     }
+    ground = {"units": "m/s2", "long_name": "acceleration of the ground"}
     return xr.Dataset(
-        {"fall_pose": (("fall_frame", "block", "pose"), poses, about)},
         {
-            "fall_time": ("fall_frame", np.array([frame.time for frame in frames]), {"units": "s"}),
+            "fall_pose": (("fall_frame", "block", "pose"), poses, about),
+            "fall_ground": (("fall_frame", "axis"), motion.at(times), ground),
+        },
+        {
+            "fall_time": ("fall_frame", times, {"units": "s"}),
             "pose": ["x", "y", "turn"],
         },
         {

@@ -16,6 +16,7 @@ from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
 from archfem.models.gauges import Gauges, Readings
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
 
 _EFFORT = {
@@ -187,7 +188,10 @@ class Recorder:
         """
         structure, resultants = self.model.structure, self._resultants.values
         times, faces = (rows.values[: len(resultants)] for rows in (self._times, self._faces))
-        dataset = joint_dataset(structure, resultants, times, self.criteria, faces=faces)
+        moved = isinstance(self.model, Moving)
+        dataset = joint_dataset(
+            structure, resultants, times, self.criteria, faces=faces, moved=moved
+        )
         dataset = dataset.assign(self._reach.variables()).assign_coords(
             block=[block.name for block in structure.blocks]
         )

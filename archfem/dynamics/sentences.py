@@ -43,10 +43,15 @@ def extremes(dataset: xr.Dataset) -> str:
     left = float(last["residual_displacement"])
     sentence = (
         f"{rotation}, the largest slip {slip}, the largest displacement "
-        f"{most / mm:.3g} mm ({far['block'].item()}, {when:.3f} s), and at the end no block "
-        f"is farther than {left / mm:.3g} mm ({last['block'].item()}) from where it stood."
+        f"{most / mm:.3g} mm ({far['block'].item()}, {when:.3f} s), and {_end(dataset)} farther "
+        f"than {left / mm:.3g} mm ({last['block'].item()}) from where it stood."
     )
     return sentence[0].upper() + sentence[1:]
+
+
+def _end(dataset: xr.Dataset) -> str:
+    """The beginning of what is said of the last instant at which joints hold."""
+    return "before blocks came loose none was" if "fall_pose" in dataset else "at the end no block is"
 
 
 def _peak(values: xr.DataArray, unit: float, name: str) -> str:

@@ -46,6 +46,7 @@ def joint_dataset(
     criteria: Criteria | None = None,
     *,
     faces: Array | None = None,
+    moved: bool = False,
 ) -> xr.Dataset:
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
@@ -65,6 +66,8 @@ def joint_dataset(
         criteria: by which joints fail; by default the usual ones.
         faces: gaps at mid-depth, rotations and slips, as by `face_matrix`, (3, n_joints) or
             (steps, 3, n_joints) [m, rad, m]; None where displacements are not known.
+        moved: whether the faces may have moved far: eccentricity is then from the middle of what
+            still lies over the other face, as a fraction of its length h - |slip|.
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` where they
@@ -74,7 +77,7 @@ def joint_dataset(
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
-    found = ratios(resultants, depth)
+    found = ratios(resultants, _overlap(depth, faces) if moved else depth)
     values = zip(UNITS.items(), (*np.moveaxis(resultants, -1, 0), *found), strict=True)
     variables = {
         key: (dims, value, {"units": units, "long_name": words})
@@ -103,6 +106,11 @@ def joint_dataset(
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)
+
+
+def _overlap(depth: Array, faces: Array | None) -> Array:
+    """Length over which the faces of joints lie on each other (…, n_joints) [m]."""
+    return depth if faces is None else np.maximum(depth - np.abs(faces[..., 2, :]), 0.0)
 
 
 def check_instant(structure: Structure, joints: xr.Dataset) -> None:

@@ -16,6 +16,9 @@ FIDELITIES = (*RUNGS, "monolithic")
 DISPLACEMENTS = ("small", "large")
 """What displacements may be."""
 
+PLANE = ("rigid", "faces")
+"""Rungs whose faces stay plane, on which displacements may be large."""
+
 SHAPES = ("quadrilateral", "triangle")
 """Of cells."""
 
@@ -67,6 +70,11 @@ class Discretisation:
         if self.displacements not in DISPLACEMENTS:
             raise InvalidInput(
                 f"displacements {self.displacements!r} are not known: use one of {DISPLACEMENTS}"
+            )
+        if self.displacements == "large" and self.fidelity not in PLANE:
+            raise InvalidInput(
+                f"displacements are large, which the rung '{self.name}' does not know: use one of "
+                f"{PLANE} for all blocks, where faces stay plane, or displacements = 'small'"
             )
         if self.degree not in (1, 2):
             raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")

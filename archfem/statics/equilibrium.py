@@ -16,6 +16,7 @@ from archfem.masonry.stages import Stage, placed
 from archfem.models.gauges import Gauges
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
+from archfem.models.moving import Moving
 from archfem.models.unfinished import Unfinished
 from archfem.statics.newton import Newton, Solver
 from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
@@ -64,7 +65,8 @@ class Equilibrium:
         """N, V, M, eccentricity, friction, opening, rotation and slip over joint."""
         gauges = Gauges.on(self.model)
         faces = gauges.faces(gauges.read(self.q))
-        return joint_dataset(self.model.structure, self.model.resultants(self.q), faces=faces)
+        resultants, moved = self.model.resultants(self.q), isinstance(self.model, Moving)
+        return joint_dataset(self.model.structure, resultants, faces=faces, moved=moved)
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint carries.

@@ -13,6 +13,7 @@ from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import joint_dataset
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
+from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
@@ -229,7 +230,8 @@ def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     count, factors = len(path.states), np.array(path.factors)
     steps = np.arange(count, dtype=float)
     structure, faces = path.model.structure, path.faces
-    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces)
+    moved = isinstance(path.model, Moving)
+    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces, moved=moved)
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {

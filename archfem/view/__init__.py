@@ -3,6 +3,7 @@
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
     states     what a state's joints carry
+    moved      where ends of joints and loose blocks are, however far they moved
     structure  a structure at an instant; several side by side
     names      which joint is which
     joints     joints over time
@@ -14,6 +15,7 @@
     pushover   what is resisted over displacement
     motions    accelerograms with their integrals, and spectra
     accuracy   speed against error
+    falls      blocks on their way to the ground
     studies    factors at first mechanism, case by case
     films      films and stills: all that knows pyvista and imageio
 

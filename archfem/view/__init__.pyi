@@ -3,6 +3,7 @@ from .collapse import draw_capacity as draw_capacity
 from .collapse import draw_collapse as draw_collapse
 from .envelopes import draw_eccentricity as draw_eccentricity
 from .envelopes import draw_envelope as draw_envelope
+from .falls import draw_fall as draw_fall
 from .films.modes import film_modes as film_modes
 from .films.scenes import film as film
 from .films.scenes import picture as picture

@@ -54,6 +54,10 @@ class Marks:
     gaps: Array
 
 
+NO_MARKS = Marks(*(np.zeros((0, *rest)) for rest in ((2,), (2, 2), (2,), (7, 2), (2, 2))))
+"""Of joints of which nothing is to be drawn."""
+
+
 def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None = None) -> Marks:
     """Find what to draw at the joints of rings and piers, or at all where there are neither.
 
@@ -74,7 +78,7 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
     side = np.where(shown, joints["hinge"].values, 0)
     failed = np.flatnonzero(side)
     slipping = np.flatnonzero(shown & joints["slide"].values)
-    arrows = [_slip(structure, k, ends[k].mean(axis=0), joints["V"].values[k]) for k in slipping]
+    arrows = [_slip(structure, k, ends[k], joints["V"].values[k]) for k in slipping]
     thrust = np.where(shown[:, None], carried + thrust_line(structure, joints).values, np.nan)
     links = thrust[_neighbours(structure, shown)]
     return Marks(
@@ -96,10 +100,17 @@ def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.in
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
-def _slip(structure: Structure, number: int, middle: Array, shear: float) -> Array:
-    """Two arrows that say how a joint slips (2, 7, 2) [m]."""
-    joint, normal = structure.joints[number], structure.normals[number]
-    sense = np.sign(shear) * joint.tangent
+def _slip(structure: Structure, number: int, ends: Array, shear: float) -> Array:
+    """Two arrows that say how a joint slips, whose ends are there (2, 7, 2) [m]."""
+    joint, normal, middle = structure.joints[number], structure.normals[number], ends.mean(axis=0)
+    along, length = ends[1] - ends[0], float(np.linalg.norm(ends[1] - ends[0]))
+    if length > 0.0:
+        (x, y), (c, s) = normal, along / length
+        turn = np.array([c, s]) @ joint.tangent, s * joint.tangent[0] - c * joint.tangent[1]
+        normal = np.array([turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y])
+    else:
+        c, s = joint.tangent
+    sense = np.sign(shear) * np.array([c, s])
     depth = max(joint.depth, SHORTEST * structure.size)
     outline = ARROW * LENGTH * depth
     arrow = outline[:, :1] * sense + outline[:, 1:] * normal

@@ -8,7 +8,9 @@ from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import check_instant, joint_dataset
+from archfem.models.gauges import Gauges
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium
 
 logger = logging.getLogger("archfem")
@@ -59,4 +61,8 @@ def joints_at(
             "slid before: what is drawn of shear and sliding may be wrong; give the equilibrium "
             "in place of its coordinates, or joints=run.joints.sel(time=…)"
         )
-    return joint_dataset(model.structure, model.resultants(q), criteria=criteria)
+    gauges, moved = Gauges.on(model), isinstance(model, Moving)
+    faces = gauges.faces(gauges.read(q)) if moved else None
+    return joint_dataset(
+        model.structure, model.resultants(q), criteria=criteria, faces=faces, moved=moved
+    )

@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from archfem.arrays import Array
 from archfem.dynamics.history import History
 from archfem.joints.criteria import judged
 from archfem.view.films.colours import Scale
 from archfem.view.films.setup import Setup
+from archfem.view.films.shots import Shot
 from archfem.view.films.writer import Image
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
@@ -54,22 +56,21 @@ class Page:
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
-    def compose(self, photograph: Image, joints: xr.Dataset) -> Image:
+    def compose(self, photograph: Image, shot: Shot) -> Image:
         """Put a photograph on the page, with the time and the count of what has failed.
 
         Args:
             photograph: of the structure, as large as `room`.
-            joints: at that instant.
+            shot: what it shows.
 
         Returns:
             The page (height, width, 3), red, green and blue from 0 to 255.
         """
         self._canvas.restore_region(self._background)
-        self._said.set_text(_sentence(joints))
+        self._said.set_text(_sentence(shot))
         self._figure.draw_artist(self._said)
-        if self._cursor is not None:
-            now = float(joints["time"])
-            self._cursor.set_xdata([now, now])
+        if self._cursor is not None and shot.time is not None:
+            self._cursor.set_xdata([shot.time, shot.time])
             self._figure.draw_artist(self._cursor)
         page = np.array(self._canvas.buffer_rgba())[..., :3]
         page[self._window] = photograph
@@ -111,20 +112,22 @@ class Page:
     def _strip(self, run: History) -> Line2D:
         """Draw the acceleration of the ground, and make the cursor that will move over it."""
         axes = self._axes(0.85, 0.55, self._inches[0] - 1.1, STRIP - 0.75)
-        ground = run.dataset["ground"].values
+        times, ground = _ground(run)
         dress(axes, "time [s]", "ground [m/s²]")
-        axes.plot(run.time, ground[:, 0], color=INK, lw=0.9, label="horizontal", zorder=3)
+        axes.plot(times, ground[:, 0], color=INK, lw=0.9, label="horizontal", zorder=3)
         if ground[:, 1].any():
-            axes.plot(run.time, ground[:, 1], color=LINES[4], lw=0.8, label="vertical")
+            axes.plot(times, ground[:, 1], color=LINES[4], lw=0.8, label="vertical")
             axes.legend(
                 loc="lower right", bbox_to_anchor=(1.0, 0.94), ncols=2, frameon=False, fontsize=TYPE
             )
-        axes.set_xlim(run.time[0], max(run.time[-1], run.time[0] + 1e-9))
+        axes.set_xlim(times[0], max(times[-1], times[0] + 1e-9))
         axes.tick_params(labelsize=TYPE)
         axes.xaxis.label.set_fontsize(TYPE)
         axes.yaxis.label.set_fontsize(TYPE)
+        if len(times) > len(run.time):
+            _flag(axes, run.time[-1], "loose")
         if run.mechanism is not None and run.mechanism.time is not None:
-            _flag(axes, run.mechanism.time)
+            _flag(axes, run.mechanism.time, "mechanism")
         return axes.axvline(run.time[0], color=HINGE, lw=1.8, animated=True)
 
     def _axes(self, *box: float) -> Axes:
@@ -132,8 +135,17 @@ class Page:
         return self._figure.add_axes(tuple(np.array(box) / np.tile(self._inches, 2)))
 
 
-def _flag(axes: Axes, time: float) -> None:
-    """Mark the instant of the first mechanism."""
+def _ground(run: History) -> tuple[Array, Array]:
+    """Times, and the acceleration of the ground then (n, 2) [m/s²], fall included."""
+    data = run.dataset
+    if "fall_ground" not in data:
+        return run.time, data["ground"].values
+    times = np.append(run.time, data["fall_time"].values[1:])
+    return times, np.concatenate([data["ground"].values, data["fall_ground"].values[1:]])
+
+
+def _flag(axes: Axes, time: float, words: str) -> None:
+    """Mark an instant."""
     axes.axvline(time, color=FAINT, lw=1.0, ls="--")
     where: dict[str, Any] = {
         "xytext": (0, 1),
@@ -142,21 +154,26 @@ def _flag(axes: Axes, time: float) -> None:
         "va": "bottom",
     }
     place = ("data", "axes fraction")
-    axes.annotate("mechanism", (time, 1.0), xycoords=place, fontsize=TYPE, color=EDGE, **where)
+    axes.annotate(words, (time, 1.0), xycoords=place, fontsize=TYPE, color=EDGE, **where)
 
 
-def _sentence(joints: xr.Dataset) -> str:
+def _sentence(shot: Shot) -> str:
     """Time, and how many joints that are judged hinge, slide or are open."""
-    joints = judged(joints)
+    words = ["blocks are loose"] if shot.joints is None else _failing(judged(shot.joints))
+    time = shot.time
+    if time is None and shot.joints is not None and "time" in shot.joints.coords:
+        time = float(shot.joints["time"])
+    return "    ".join(words if time is None else [*words, f"t = {time:6.3f} s"])
+
+
+def _failing(joints: xr.Dataset) -> list[str]:
+    """How many joints hinge, slide or are open."""
     counts = {
         "hinging": int((joints["hinge"] != 0).sum()),
         "sliding": int(joints["slide"].sum()),
         "open": int(joints["open"].sum()),
     }
-    words = [f"{count} {name}" for name, count in counts.items() if count]
-    if "time" in joints.coords:
-        words.append(f"t = {float(joints['time']):6.3f} s")
-    return "    ".join(words)
+    return [f"{count} {name}" for name, count in counts.items() if count]
 
 
 def _symbols(film: bool, motion: bool) -> list[Line2D]:

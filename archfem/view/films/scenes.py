@@ -1,11 +1,11 @@
 """Films and stills of a structure that moves: how hinges form."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from archfem.arrays import Array
@@ -18,9 +18,11 @@ from archfem.statics.equilibrium import Equilibrium
 from archfem.view.films.colours import check_colour
 from archfem.view.films.page import Page
 from archfem.view.films.setup import Setup
+from archfem.view.films.shots import falling, moving, still
 from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
-from archfem.view.marks import displaced, joint_ends, joint_marks, support_shift, swung
+from archfem.view.marks import displaced, swung
+from archfem.view.moved import Falls
 from archfem.view.states import drawn, joints_at
 
 SMALLEST = (480, 320)
@@ -48,11 +50,15 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     between the fields that were kept, and marks are those of the nearest record. The film is
     written in one stroke: a killed one leaves the old file or none.
 
+    Where displacements may be large they are shown as they are, thrust line and marks where the
+    faces have gone; once blocks came loose, the film follows them to the ground.
+
     Args:
         model: that made the run.
         run: with fields.
         path: the film, .mp4 or .gif; folders are made.
-        magnification: of displacements [-]; by default a round number that shows them well.
+        magnification: of displacements [-]; by default a round number that shows them well, and 1
+            where they may be large. What falls is always shown as it is.
         colour: "displacement" or, for blocks that are not rigid, "stress".
         fps: frames a second, at most; fewer where the run has fewer fields.
         seconds: how long the film lasts [s]; by default as long as the run.
@@ -69,10 +75,12 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     target = film_path(path)
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
-    times, fps = _times(run.dataset["frame_time"].values, fps, seconds)
-    fields = _fields(run, times)
-    setup = _with(Setup.of(model, fields, colour, magnification), mechanism)
-    return write_film(target, _shots(setup, run, (times, fields), size), fps)
+    falls = Falls.of(model.structure, run)
+    known = _kept(run)[0] if falls is None else np.append(_kept(run)[0], falls.times[1:])
+    times, fps = _times(known, fps, seconds)
+    held = times if falls is None else times[times < falls.times[0]]
+    setup = Setup.of(model, _fields(run, held), colour, magnification).with_falls(falls)
+    return write_film(target, _shots(_with(setup, mechanism), run, times, falls, size), fps)
 
 
 def picture(
@@ -107,11 +115,10 @@ def picture(
     model, q = drawn(model, q)
     joints = joints_at(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    shift = _carrier(setup)(q)
     page = Page(setup, size)
     with Stage(setup, page.room) as stage:
-        marks = joint_marks(model.structure, joints, shift=shift)
-        return page.compose(stage.photograph(q, marks, np.zeros((0, 2))), joints)
+        shot = still(setup, q, joints)
+        return page.compose(stage.photograph(shot), shot)
 
 
 def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
@@ -124,41 +131,19 @@ def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
 
 
 def _shots(
-    setup: Setup, run: History, frames: tuple[Array, Array], size: tuple[int, int]
+    setup: Setup, run: History, times: Array, falls: Falls | None, size: tuple[int, int]
 ) -> Iterator[Image]:
-    """Yield the frames of a film, from their times and coordinates; a bar shows progress."""
-    structure, carried = setup.model.structure, _carrier(setup)
-    times, fields = frames
-    steps = run.joints.indexes["time"].get_indexer(times, method="nearest")
-    been = _been(run.joints)
-    page = Page(setup, size, run)
-    shown = zip(times, steps, fields, strict=True)
+    """Yield the frames of a film, from their times; a bar shows progress."""
+    page, held = Page(setup, size, run), times
+    if falls is not None:
+        held, loose = times[times < falls.times[0]], times[times >= falls.times[0]]
+    shown = moving(setup, run, held, _fields(run, held))
+    if falls is not None:
+        shown = chain(shown, falling(setup, falls, loose))
     bar = tqdm(shown, total=len(times), unit="frame", disable=None, leave=False)
     with Stage(setup, page.room) as stage:
-        for time, step, q in bar:
-            joints = run.joints.isel(time=int(step)).assign_coords(time=time)
-            shift = carried(q)
-            marks = joint_marks(structure, joints, shift=shift)
-            past = (structure.ends + shift)[been[step]]
-            moving = setup.outlines if time >= setup.since else ()
-            yield page.compose(stage.photograph(q, marks, past, moving), joints)
-
-
-def _carrier(setup: Setup) -> Callable[[Array], Array]:
-    """Return what gives the joints' ends displacements, as drawn (n_joints, 2, 2) [m]."""
-    ends, supports = joint_ends(setup.model), support_shift(setup.model)
-
-    def carried(q: Array) -> Array:
-        moved: Array = (ends @ q).reshape(-1, 2, 2) + supports
-        return setup.magnification * moved
-
-    return carried
-
-
-def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
-    """Return whether ends of judged joints have been hinges by each step (steps, n_joints, 2)."""
-    side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
-    return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
+        for shot in bar:
+            yield page.compose(stage.photograph(shot), shot)
 
 
 def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
@@ -171,9 +156,19 @@ def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, floa
     return np.linspace(times[0], times[-1], count), count / lasting
 
 
+def _kept(run: History) -> tuple[Array, Array]:
+    """Times of the fields that were kept, and the fields; where blocks came loose, to the last."""
+    data = run.dataset
+    times, fields = data["frame_time"].values, data["q"].values
+    if "fall_pose" in data and data.attrs["last_time"] > times[-1]:
+        times = np.append(times, data.attrs["last_time"])
+        fields = np.concatenate([fields, data["last_q"].values[None]])
+    return times, fields
+
+
 def _fields(run: History, times: Array) -> Array:
     """Coordinates at some times, straight between those that were kept (frames, n)."""
-    kept, fields = run.dataset["frame_time"].values, run.dataset["q"].values
+    kept, fields = _kept(run)
     if len(kept) == 1:
         return np.repeat(fields, len(times), axis=0)
     after = np.searchsorted(kept, times).clip(1, len(kept) - 1)

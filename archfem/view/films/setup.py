@@ -7,8 +7,10 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 from archfem.view.films.colours import Scale, scale_for
 from archfem.view.marks import SWING, support_outlines
+from archfem.view.moved import Falls
 
 MARGIN = 0.02
 """Room around the structure, relative to its size."""
@@ -26,6 +28,7 @@ class Setup:
         high: upper right corner of what is seen (2,) [m].
         outlines: of blocks as a mechanism moves them, each (k, 2) [m].
         since: when they are first shown [s].
+        level: of the ground that blocks may fall to [m]; None where none fall.
     """
 
     model: Model
@@ -35,6 +38,14 @@ class Setup:
     high: Array
     outlines: tuple[Array, ...] = ()
     since: float = 0.0
+    level: float | None = None
+
+    @property
+    def ground(self) -> Array | None:
+        """Ends of the ground's line (2, 2) [m]; None where it is not drawn."""
+        if self.level is None:
+            return None
+        return np.array([[self.low[0], self.level], [self.high[0], self.level]])
 
     @classmethod
     def of(cls, model: Model, fields: Array, colour: str, magnification: float | None) -> Self:
@@ -51,7 +62,8 @@ class Setup:
         """
         cells, structure = model.cells, model.structure
         moves = np.array([cells.displacement(q) for q in fields])
-        by = magnification or _magnification(float(np.abs(moves).max()) / structure.size)
+        size = float(np.abs(moves).max()) / structure.size
+        by = magnification or (1.0 if isinstance(model, Moving) else _magnification(size))
         still = support_outlines(model, by)
         moved = cells.places + by * moves
         points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
@@ -69,6 +81,26 @@ class Setup:
         points = np.concatenate([[self.low, self.high], *outlines])
         low, high = points.min(axis=0), points.max(axis=0)
         return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
+
+
+    def with_falls(self, falls: Falls | None) -> Self:
+        """Return the same with room for blocks that come loose, and the ground below them.
+
+        Blocks that go farther than the structure is large are not followed.
+
+        Args:
+            falls: where those blocks are; None where none come loose.
+        """
+        if falls is None:
+            return self
+        size, cells = self.model.structure.size, self.model.cells
+        seen = [falls.places(cells.places, cells.block, float(time)) for time in falls.times]
+        points = np.concatenate([*seen, [self.low, self.high]])
+        low = np.maximum(points.min(axis=0), self.low - size)
+        high = np.minimum(points.max(axis=0), self.high + size)
+        low[1] = min(low[1], falls.level - MARGIN * size)
+        scale = replace(self.scale, extend="max") if self.scale.extend == "neither" else self.scale
+        return replace(self, low=low, high=high, scale=scale, level=falls.level)
 
 
 def _magnification(displacement: float) -> float:

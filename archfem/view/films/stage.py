@@ -16,8 +16,9 @@ from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
 from archfem.view.films.colours import shade
 from archfem.view.films.setup import Setup
+from archfem.view.films.shots import Shot
 from archfem.view.films.writer import Image
-from archfem.view.marks import Marks, support_outlines
+from archfem.view.marks import support_outlines
 from archfem.view.style import EDGE, GHOST, HINGE, MOVED, SLIP, SUPPORT, THRUST
 
 Numbers = NDArray[np.intp]
@@ -57,7 +58,7 @@ class Stage:
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
         self._plotter.background_color = pv.Color("white")
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
-        self._paint(np.zeros(setup.model.size))
+        self._paint(shade(cells, np.zeros(setup.model.size), setup.scale.colour))
         self._plotter.add_mesh(
             self._blocks,
             scalars="shade",
@@ -82,33 +83,27 @@ class Stage:
         """Free the plotter."""
         self._plotter.close()
 
-    def photograph(
-        self, q: Array, marks: Marks, past: Array, outlines: Sequence[Array] = ()
-    ) -> Image:
-        """Move the structure and take a picture (height, width, 3).
+    def photograph(self, shot: Shot) -> Image:
+        """Move the structure and take a picture.
 
         Args:
-            q: coordinates (n,).
-            marks: of the joints, as moved.
-            past: where hinges have been, as moved (n, 2) [m].
-            outlines: of blocks as a mechanism moves them, each (k, 2) [m].
+            shot: what it shows.
 
         Returns:
             Red, green and blue from 0 to 255 (height, width, 3).
         """
-        setup, cells = self._setup, self._setup.model.cells
-        places = cells.places + setup.magnification * cells.displacement(q)
-        self._blocks.points = self._flat(places, 0)
-        self._outlines.points = self._flat(places, EDGES)
-        self._paint(q)
+        marks = shot.marks
+        self._blocks.points = self._flat(shot.places, 0)
+        self._outlines.points = self._flat(shot.places, EDGES)
+        self._paint(shot.shades)
         pairs = np.arange(2 * len(marks.links)).reshape(-1, 2)
         for name, layer in (("halo", HALO), ("thrust", LINE)):
             points = self._flat(marks.links.reshape(-1, 2), layer)
             self._meshes[name].dataset = _lines(points, pairs)
         dots = marks.thrust[np.isfinite(marks.thrust[:, 0])]
         self._meshes["dots"].dataset = self._discs(dots, LINE, 0.35)
-        self._meshes["motion"].dataset = self._loops(outlines)
-        self._meshes["past"].dataset = self._discs(past, PAST, 1.0)
+        self._meshes["motion"].dataset = self._loops(shot.outlines)
+        self._meshes["past"].dataset = self._discs(shot.past, PAST, 1.0)
         self._meshes["slips"].dataset = self._polygons(marks.slips, ARROWS)
         self._meshes["rims"].dataset = self._discs(marks.hinges, RIMS, 1.25)
         self._meshes["hinges"].dataset = self._discs(marks.hinges, HINGES, 1.0)
@@ -122,6 +117,8 @@ class Stage:
             around = np.arange(len(outline))
             edges = np.column_stack([around, np.roll(around, -1)])
             self._add(_lines(self._flat(outline, EDGES), edges), EDGE, 1.5)
+        if self._setup.ground is not None:
+            self._add(_lines(self._flat(self._setup.ground, REST), np.array([[0, 1]])), EDGE, 2.0)
         rest = _lines(self._flat(self._setup.model.cells.places, REST), self._edges)
         self._add(rest, GHOST)
         self._add(self._outlines, EDGE, 1.5)
@@ -136,11 +133,9 @@ class Stage:
             "hinges": self._add(pv.PolyData(), HINGE),
         }
 
-    def _paint(self, q: Array) -> None:
+    def _paint(self, shades: Array) -> None:
         """Give the blocks the values by which they are coloured."""
-        scale = self._setup.scale
-        shades = shade(self._setup.model.cells, q, scale.colour)
-        if scale.colour == "stress":
+        if self._setup.scale.colour == "stress":
             self._blocks.cell_data["shade"] = shades[self._blocks.cell_data["cell"]]
         else:
             self._blocks.point_data["shade"] = shades

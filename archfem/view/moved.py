@@ -1,0 +1,136 @@
+"""Where the ends of joints are once blocks have moved, and where blocks that came loose are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from archfem.arrays import Array
+from archfem.dynamics.falling.bodies import bodies_of
+from archfem.dynamics.history import History
+from archfem.joints.poses import pose
+from archfem.masonry.structure import Structure
+from archfem.models.model import Model
+from archfem.models.moving import Moving
+from archfem.view.marks import joint_ends, support_shift
+
+
+def carrier(model: Model) -> Callable[[Array], Array]:
+    """Return what gives displacements of both ends of each joint, from coordinates (n,).
+
+    An end is midway between the two blocks. Where displacements may be large, it is that of what
+    still overlaps of the two faces, seen along their mean direction.
+
+    Args:
+        model: whose joints they are.
+
+    Returns:
+        A function that gives (n_joints, 2, 2) [m]: by joint, end (intrados first) and axis.
+    """
+    if isinstance(model, Moving):
+        return lambda q: _overlaps(model, q)
+    ends, supports = joint_ends(model), support_shift(model)
+
+    def carried(q: Array) -> Array:
+        moved: Array = (ends @ q).reshape(-1, 2, 2) + supports
+        return moved
+
+    return carried
+
+
+def _overlaps(model: Moving, q: Array) -> Array:
+    """Displacements of the ends of what overlaps (n_joints, 2, 2) [m]."""
+    structure, q = model.structure, np.ascontiguousarray(q, float)
+    poses = np.zeros((len(structure.joints), 2, 3))
+    for joint in range(len(poses)):
+        for side in range(2):
+            pose(model.joints.sides, joint, side, q, poses[joint, side])
+    mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
+    along = turned(structure.tangents, mean[:, 2])
+    slip = np.sum(along * apart[:, :2], axis=1)
+    half = 0.5 * np.maximum(structure.depths - np.abs(slip), 0.0) * np.cos(0.5 * apart[:, 2])
+    middles = structure.middles + mean[:, :2]
+    ends = middles[:, None] + np.array([-1.0, 1.0])[:, None] * (half[:, None] * along)[:, None]
+    found: Array = ends - structure.ends
+    return found
+
+
+def turned(points: Array, angle: Array) -> Array:
+    """Return points, turned about the origin (…, 2).
+
+    Args:
+        points: to be turned (…, 2).
+        angle: anticlockwise (…) [rad].
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = np.moveaxis(points, -1, 0)
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Falls:
+    """Where blocks that came loose in a run are, until they rest.
+
+    Attributes:
+        structure: whose blocks.
+        times: of the frames (f,) [s].
+        poses: displacement of each block's centroid from where it was built, and its turn
+            (f, n_blocks, 3) [m, m, rad].
+        level: of the ground [m].
+    """
+
+    structure: Structure
+    times: Array
+    poses: Array
+    level: float
+
+    @classmethod
+    def of(cls, structure: Structure, run: History) -> Self | None:
+        """Return the falling part of a run; None where blocks held together.
+
+        Args:
+            structure: that was shaken.
+            run: of it.
+        """
+        if "fall_pose" not in run.dataset:
+            return None
+        times, poses = run.dataset["fall_time"].values, run.dataset["fall_pose"].values
+        return cls(structure, times, poses, bodies_of(structure, 0.0).level)
+
+    def pose(self, time: float) -> Array:
+        """Return the poses of all blocks, straight between two frames (n_blocks, 3).
+
+        Args:
+            time: from the first frame to the last [s].
+        """
+        if len(self.times) == 1:
+            return self.poses[0]
+        after = int(np.searchsorted(self.times, time).clip(1, len(self.times) - 1))
+        before, last = self.times[after - 1], self.times[after]
+        share = np.clip((time - before) / (last - before), 0.0, 1.0)
+        found: Array = (1.0 - share) * self.poses[after - 1] + share * self.poses[after]
+        return found
+
+    def places(self, points: Array, block: Array, time: float) -> Array:
+        """Return where points of the blocks are (m, 2) [m].
+
+        Args:
+            points: as built (m, 2) [m].
+            block: number of the block that each belongs to (m,).
+            time: from the first frame to the last [s].
+        """
+        poses = self.pose(time)[block]
+        centres = np.array([each.centroid for each in self.structure.blocks])[block]
+        return centres + poses[:, :2] + turned(points - centres, poses[:, 2])
+
+    def outlines(self, time: float) -> list[Array]:
+        """Return the outlines of all blocks, each (k, 2) [m].
+
+        Args:
+            time: from the first frame to the last [s].
+        """
+        drawn = [block.drawn() for block in self.structure.blocks]
+        sizes = [len(each) for each in drawn]
+        block = np.repeat(np.arange(len(drawn)), sizes)
+        return np.split(self.places(np.concatenate(drawn), block, time), np.cumsum(sizes)[:-1])
