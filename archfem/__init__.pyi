@@ -11,6 +11,7 @@ from . import units as units
 from . import view as view
 from .cases.case import Case as Case
 from .cases.study import Study as Study
+from .dynamics.collapse_scale import collapse_scale as collapse_scale
 from .dynamics.events import CountedMechanism as CountedMechanism
 from .dynamics.history import History as History
 from .dynamics.ladder import build as build

@@ -176,7 +176,13 @@ class Case:
         """Refuse what would otherwise be found out only after the dead load."""
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        check_scheme(self.analysis, self.structure)
+        displacements = self.discretisation.displacements
+        check_scheme(self.analysis, self.structure, displacements)
+        if displacements == "large" and self.stages is not None:
+            raise InvalidInput(
+                "displacements = 'large' and [dead_load] in stages: blocks that move far cannot be "
+                "built in stages; leave out one of both"
+            )
         step = self.analysis.get("dt", 0.005)
         if not 0.0 < step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")

@@ -11,6 +11,7 @@ from archfem.dynamics.schemes import (
     StiffnessDamping,
     Viscous,
     check_sliding,
+    check_turning,
 )
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
@@ -64,16 +65,20 @@ def scheme_asked(analysis: Table) -> Scheme:
     return known[name]() if alpha is None else HHT(alpha)
 
 
-def check_scheme(analysis: Table, structure: Structure) -> None:
+def check_scheme(analysis: Table, structure: Structure, displacements: str = "small") -> None:
     """Refuse a scheme that cannot follow what the contacts say, in the words of the file.
 
     Args:
         analysis: the table of that name.
         structure: whose joints they are.
+        displacements: "small" or "large".
 
     Raises:
-        InvalidInput: joints slide or break, and the scheme has no memory.
+        InvalidInput: joints slide or break, and the scheme has no memory; or blocks turn far, and
+            it does not keep their energy.
     """
+    if displacements == "large":
+        check_turning(scheme_asked(analysis))
     try:
         check_sliding(scheme_asked(analysis), structure)
     except InvalidInput as error:

@@ -1,3 +1,4 @@
+from .collapse_scale import CollapseScale as CollapseScale
 from .damping import effective_damping as effective_damping
 from .events import CountedMechanism as CountedMechanism
 from .events import Event as Event

@@ -210,6 +210,22 @@ class Conserving:
 Scheme = Newmark | HHT | Conserving
 
 
+def check_turning(scheme: Scheme) -> None:
+    """Refuse a scheme that cannot follow blocks which move as far as they like.
+
+    Args:
+        scheme: that is to step.
+
+    Raises:
+        InvalidInput: it writes the equation at an instant, and makes energy of blocks that turn.
+    """
+    if not isinstance(scheme, Conserving):
+        raise InvalidInput(
+            f"{scheme} does not keep the energy of blocks that turn far, and makes some from "
+            "nothing: use Conserving() where displacements are large"
+        )
+
+
 def check_sliding(scheme: Scheme, structure: Structure) -> None:
     """Refuse schemes that write the equation at an instant where joints can slide, or break.
 

@@ -51,7 +51,9 @@ def extremes(dataset: xr.Dataset) -> str:
 
 def _end(dataset: xr.Dataset) -> str:
     """The beginning of what is said of the last instant at which joints hold."""
-    return "before blocks came loose none was" if "fall_pose" in dataset else "at the end no block is"
+    return (
+        "before blocks came loose none was" if "fall_pose" in dataset else "at the end no block is"
+    )
 
 
 def _peak(values: xr.DataArray, unit: float, name: str) -> str:

@@ -22,6 +22,7 @@ from archfem.dynamics.schemes import (
     Scheme,
     StiffnessDamping,
     Viscous,
+    check_turning,
 )
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
@@ -148,6 +149,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     watch = None if until is None else begun(until, model.structure, criteria)
     if isinstance(start, Equilibrium):
         model = start.continued(model)
+    if isinstance(model, Moving) and scheme is not None:
+        check_turning(scheme)
     equation = Equation(model, motion, damping, scheme or Conserving())
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)

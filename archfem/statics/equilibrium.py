@@ -121,6 +121,11 @@ def dead_load(
     check_model(model)
     if stages is None:
         return equilibrium_under(model, self_weight(model), newton)
+    if isinstance(model, Moving):
+        raise InvalidInput(
+            "blocks that move far cannot be built in stages: take displacements='small', or leave "
+            "stages out"
+        )
     if not isinstance(model, Jointed):
         raise InvalidInput(
             f"a model '{model.fidelity}' cannot be built in stages: use 'full', which is the same"

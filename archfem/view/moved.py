@@ -9,7 +9,7 @@ import numpy as np
 from archfem.arrays import Array
 from archfem.dynamics.falling.bodies import bodies_of
 from archfem.dynamics.history import History
-from archfem.joints.poses import pose
+from archfem.joints.moving.poses import pose
 from archfem.masonry.structure import Structure
 from archfem.models.model import Model
 from archfem.models.moving import Moving
@@ -65,7 +65,8 @@ def turned(points: Array, angle: Array) -> Array:
     """
     c, s = np.cos(angle), np.sin(angle)
     x, y = np.moveaxis(points, -1, 0)
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    found: Array = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,8 @@ class Falls:
         """
         poses = self.pose(time)[block]
         centres = np.array([each.centroid for each in self.structure.blocks])[block]
-        return centres + poses[:, :2] + turned(points - centres, poses[:, 2])
+        found: Array = centres + poses[:, :2] + turned(points - centres, poses[:, 2])
+        return found
 
     def outlines(self, time: float) -> list[Array]:
         """Return the outlines of all blocks, each (k, 2) [m].

@@ -82,7 +82,6 @@ class Setup:
         low, high = points.min(axis=0), points.max(axis=0)
         return replace(self, low=low, high=high, outlines=tuple(outlines), since=since)
 
-
     def with_falls(self, falls: Falls | None) -> Self:
         """Return the same with room for blocks that come loose, and the ground below them.
 
