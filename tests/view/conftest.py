@@ -48,3 +48,18 @@ def runs():
         )
         for name, ring in rings.items()
     }
+
+
+@pytest.fixture(scope="session")
+def column():
+    """Three rigid stones on top of one another that may move as far as they like."""
+    stones = af.column(breadth=0.4, heights=[0.8, 0.8, 0.8])
+    return af.build(stones, fidelity="rigid", displacements="large")
+
+
+@pytest.fixture(scope="session")
+def toppled(column):
+    """What a swing of the ground of 8 m/s² in a second does to it."""
+    time = np.linspace(0.0, 1.0, 201)
+    motion = af.Motion(8.0 * np.sin(2.0 * np.pi * time), 0.005, name="swing")
+    return af.time_history(column, motion, dt=0.005, record=af.Record(fields_every=5))

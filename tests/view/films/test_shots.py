@@ -1,0 +1,83 @@
+"""Pictures of what falls: joints while they hold, then blocks alone, at even times to the ground."""
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.films.scenes import _fields, film
+from archfem.view.films.setup import Setup
+from archfem.view.films.shots import falling, moving
+from archfem.view.moved import Falls
+
+
+@pytest.fixture
+def falls(column, toppled):
+    return Falls.of(column.structure, toppled)
+
+
+@pytest.fixture
+def setup(column, toppled, falls):
+    fields = toppled.dataset["q"].values
+    return Setup.of(column, fields, "displacement", None).with_falls(falls)
+
+
+def test_large_displacements_are_shown_as_they_are(column, toppled):
+    q = toppled.dataset["q"].values
+    assert Setup.of(column, 1e-3 * q, "displacement", None).magnification == 1.0
+    assert Setup.of(column, q, "displacement", 3.0).magnification == 3.0
+
+
+def test_a_film_follows_blocks_to_the_ground(column, toppled, falls, tmp_path):
+    path = film(column, toppled, tmp_path / "fall.gif", fps=10, size=(480, 320))
+    lasting = falls.times[-1] - toppled.dataset["frame_time"].values[0]
+    assert len(imageio.mimread(path)) == round(10 * lasting)
+
+
+def test_the_view_has_room_for_what_falls_and_its_ground(setup, column, falls):
+    for time in falls.times[::10]:
+        places = falls.places(column.cells.places, column.cells.block, time)
+        assert (places >= setup.low).all()
+        assert (places <= setup.high).all()
+    assert setup.ground[:, 1] == pytest.approx(falls.level)
+    assert setup.low[1] < falls.level
+
+
+def test_what_flies_far_is_not_followed(setup, falls, column):
+    away = falls.poses + np.array([1e3, 0.0, 0.0])
+    far = setup.with_falls(Falls(falls.structure, falls.times, away, falls.level))
+    assert np.ptp([far.low, far.high], axis=0).max() < 4.0 * column.structure.size + np.ptp(
+        [setup.low, setup.high], axis=0
+    ).max()
+
+
+def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
+    times = np.array([0.1, 0.3, falls.times[0] - 1e-3])
+    held = list(moving(setup, toppled, times, _fields(toppled, times)))
+    assert all(len(shot.marks.links) for shot in held)
+    (loose,) = falling(setup, falls, falls.times[-1:])
+    assert loose.joints is None
+    assert not len(loose.marks.links)
+    assert not len(loose.past)
+
+
+def test_pictures_pass_over_into_the_fall(setup, toppled, falls):
+    """The last state that was kept is that in which blocks came loose."""
+    time = falls.times[:1]
+    (before,) = moving(setup, toppled, time, _fields(toppled, time))
+    (after,) = falling(setup, falls, time)
+    np.testing.assert_allclose(before.places, after.places, atol=1e-9)
+    np.testing.assert_allclose(before.shades, after.shades, atol=1e-6)
+
+
+def test_the_ground_is_known_throughout(toppled):
+    fall, motion = toppled.dataset, 8.0 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 201))
+    known = np.interp(fall["fall_time"], np.linspace(0.0, 1.0, 201), motion, right=0.0)
+    np.testing.assert_allclose(fall["fall_ground"].values[:, 0], known, atol=1e-9)
+
+
+def test_stills_of_large_displacements_are_true_to_scale(column, toppled):
+    q = toppled.dataset["last_q"].values
+    image = af.view.picture(column, q, joints=toppled.joints.isel(time=-1), size=(480, 320))
+    assert image.shape == (320, 480, 3)
+    assert image.std() > 10.0

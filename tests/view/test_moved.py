@@ -1,0 +1,115 @@
+"""Where ends of joints and loose blocks are, against plain geometry of rigid blocks."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.marks import joint_marks
+from archfem.view.moved import Falls, carrier, turned
+
+
+def placed(structure, number, points, pose):
+    """Points of a block that has moved by a pose about its centroid."""
+    centre = structure.blocks[number].centroid
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return centre + pose[:2] + (points - centre) @ np.array([[c, s], [-s, c]])
+
+
+def test_ends_of_a_joint_lie_between_the_faces_wherever_they_are(column):
+    """Two stones turned by the same angle as one, and the second shifted along their joint."""
+    structure, angle, slip = column.structure, 0.7, 0.1
+    joint = structure.joints[1]
+    pivot = np.array(structure.blocks[1].centroid)
+    q = np.zeros(column.size)
+    along = turned(np.array(joint.tangent), angle) * slip
+    for number, shift in ((1, np.zeros(2)), (2, along)):
+        centre = np.array(structure.blocks[number].centroid)
+        q[3 * number - 3 : 3 * number - 1] = pivot + turned(centre - pivot, angle) - centre + shift
+        q[3 * number - 1] = angle
+    ends = structure.ends + carrier(column)(q)
+    lower, higher = (
+        placed(structure, number, structure.ends[1], q[3 * number - 3 : 3 * number])
+        for number in (1, 2)
+    )
+    overlap = np.array([higher[0], lower[1]])  # the higher stone hangs over by the slip
+    np.testing.assert_allclose(ends[1], overlap, atol=1e-12)
+
+
+def test_ends_of_a_hinge_are_those_of_both_faces(column):
+    """A stone turned about a corner: there its two faces touch, and so do the ends."""
+    structure, angle = column.structure, 0.4
+    joint = 2
+    corner = structure.ends[joint, 1]
+    centre = np.array(structure.blocks[3].centroid)
+    q = np.zeros(column.size)
+    q[6:8], q[8] = corner + turned(centre - corner, angle) - centre, angle
+    ends = structure.ends + carrier(column)(q)
+    np.testing.assert_allclose(ends[joint, 1], corner, atol=1e-12)
+    far = placed(structure, 3, structure.ends[joint, 0], q[6:9])
+    np.testing.assert_allclose(ends[joint, 0], 0.5 * (far + structure.ends[joint, 0]), atol=1e-12)
+
+
+def test_small_motions_move_ends_as_of_small_displacements(column):
+    """To the square of the motion, 1e-6 of 1e-3."""
+    small = af.build(column.structure, fidelity="rigid")
+    q = 1e-6 * np.random.default_rng(1).standard_normal(column.size)
+    middle, wanted = (carrier(model)(q).mean(axis=1) for model in (column, small))
+    np.testing.assert_allclose(middle, wanted, atol=1e-11)
+
+
+def test_the_thrust_line_goes_through_the_hinge_of_moved_faces(column, toppled):
+    """At the last instant before stones are loose, e of 0.48 of what overlaps, at the joint's end."""
+    q = toppled.dataset["last_q"].values
+    joints = toppled.joints.isel(time=-1)
+    ends = column.structure.ends + carrier(column)(q)
+    marks = joint_marks(column.structure, joints, shift=ends - column.structure.ends)
+    share = 0.5 + joints["eccentricity"].values[:, None]
+    through = (1.0 - share) * ends[:, 0] + share * ends[:, 1]
+    np.testing.assert_allclose(marks.thrust, through, atol=1e-12)
+    assert len(marks.hinges) >= 1
+
+
+def test_poses_of_a_fall_run_straight_between_frames(column, toppled):
+    falls = Falls.of(column.structure, toppled)
+    times, poses = falls.times, falls.poses
+    assert times[0] == pytest.approx(toppled.time[-1])
+    assert (np.diff(times) > 0.0).all()
+    middle = 0.5 * (times[3] + times[4])
+    np.testing.assert_allclose(falls.pose(middle), 0.5 * (poses[3] + poses[4]), atol=1e-12)
+    for time, pose in ((times[0], poses[0]), (times[-1], poses[-1]), (1e9, poses[-1])):
+        np.testing.assert_allclose(falls.pose(time), pose, atol=1e-12)
+
+
+def test_a_fall_begins_where_the_model_left_off_and_ends_above_ground(column, toppled):
+    falls, cells = Falls.of(column.structure, toppled), column.cells
+    before = cells.places + cells.displacement(toppled.dataset["last_q"].values)
+    np.testing.assert_allclose(falls.places(cells.places, cells.block, falls.times[0]), before)
+    lying = np.concatenate(falls.outlines(falls.times[-1])[1:])
+    reach = 1e-2  # stones overlap the ground by so much at most, in metres
+    assert lying[:, 1].min() == pytest.approx(falls.level, abs=reach)
+
+
+def test_outlines_of_a_fall_keep_their_areas(column, toppled):
+    falls = Falls.of(column.structure, toppled)
+    for block, outline in zip(
+        column.structure.blocks, falls.outlines(falls.times[-1]), strict=True
+    ):
+        x, y = outline.T
+        area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        assert area == pytest.approx(block.area)
+
+
+def test_a_run_that_held_has_no_fall(column):
+    still = af.Motion(np.zeros(51), 0.005)
+    run = af.time_history(column, still, dt=0.005)
+    assert Falls.of(column.structure, run) is None
+    with pytest.raises(af.InvalidInput, match="no fall to draw"):
+        af.view.draw_fall(run)
+
+
+def test_a_fall_is_drawn_at_four_instants(toppled):
+    figure = af.view.draw_fall(toppled)
+    times = [float(axes.get_title().split()[2]) for axes in figure.axes]
+    assert len(times) == 4
+    assert times == sorted(times)
+    assert times[0] == pytest.approx(float(toppled.dataset["fall_time"][0]), abs=0.006)
