@@ -171,8 +171,8 @@ pd.DataFrame({key: row(push) for key, push in (exact | stiff).items()}).T.round(
 # ## Shaken
 #
 # A thinner ring, of 0.40 m, whose joints slide at 0.60, under an earthquake that we make: 8 s, with
-# a peak of 8 m/s² and then of 10. Over each step the forces do the work by which energies change, to
-# rounding (`Conserving`), so that nothing falls by an error of the scheme.
+# a peak of 8 m/s² and then of 10. Over each step the forces do the work by which energies change,
+# to rounding (`Conserving`), so that nothing falls by an error of the scheme.
 
 # %%
 thin = ring_on(af.masonry.STONE_TO_STONE, 0.40)
@@ -221,7 +221,8 @@ f"it stands up to × {scale.lower:.2f} by every step, and falls from × {scale.u
 # %% [markdown]
 # ## Check
 #
-# The published peak under the point load, 53.55 kN, is from a program that shares nothing with ours.
+# The published peak under the point load, 53.55 kN, is from a program that shares nothing with
+# ours.
 
 # %%
 checked = peak(found["five springs", "point load [kN]"])[0] / 53.55

@@ -106,7 +106,8 @@ class Falls:
             time: from the first frame to the last [s].
         """
         if len(self.times) == 1:
-            return self.poses[0]
+            only: Array = self.poses[0]
+            return only
         after = int(np.searchsorted(self.times, time).clip(1, len(self.times) - 1))
         before, last = self.times[after - 1], self.times[after]
         share = np.clip((time - before) / (last - before), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Pictures of what falls: joints while they hold, then blocks alone, at even times to the ground."""
+"""Pictures of what falls: joints while they hold, then blocks alone, to the ground."""
 
 import imageio.v2 as imageio
 import numpy as np
@@ -46,9 +46,10 @@ def test_the_view_has_room_for_what_falls_and_its_ground(setup, column, falls):
 def test_what_flies_far_is_not_followed(setup, falls, column):
     away = falls.poses + np.array([1e3, 0.0, 0.0])
     far = setup.with_falls(Falls(falls.structure, falls.times, away, falls.level))
-    assert np.ptp([far.low, far.high], axis=0).max() < 4.0 * column.structure.size + np.ptp(
-        [setup.low, setup.high], axis=0
-    ).max()
+    assert (
+        np.ptp([far.low, far.high], axis=0).max()
+        < 4.0 * column.structure.size + np.ptp([setup.low, setup.high], axis=0).max()
+    )
 
 
 def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
