@@ -77,6 +77,9 @@ def draw_during(model: Model, run: History, joints: xr.Dataset) -> Figure:
         model: that made the run.
         run: with fields or without.
         joints: of it, at that instant.
+
+    Returns:
+        The page.
     """
     if isinstance(model, Moving) and "q" in run.dataset:
         q = fields_at(run, joints["time"].values[None])[0]

@@ -22,7 +22,7 @@ def test_blocks_are_drawn_where_they_are(column, toppled):
 
 
 def test_the_thrust_line_ends_where_faces_touch(column, toppled):
-    """The lowest joint has opened: its thrust is at one end of it, which moves less than the other."""
+    """The lowest joint has turned by 0.3 rad: its thrust is where the stone still stands."""
     q = toppled.dataset["last_q"].values
     figure = af.view.draw_displaced(column, q, joints=toppled.joints.isel(time=-1))
     thrust = np.column_stack(labelled(figure, "thrust").get_data())
