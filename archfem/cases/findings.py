@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
+from archfem.dynamics.falling.verdict import LOST
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdicts import DEFINITIONS, PUBLISHED, first_mechanisms
 from archfem.files import in_one_stroke
@@ -73,8 +74,8 @@ def of_run(run: History) -> dict[str, Any]:
         run: what happened.
 
     Returns:
-        The largest |e| and V / N of each part [-], the first mechanism by each definition, and how
-        the run ended, ready to be written as JSON.
+        The largest |e| and V / N of each part [-], the first mechanism by each definition, how the
+        run ended, and what it left where displacements may be large, ready to be written as JSON.
     """
     joints = judged(run.joints)
     return {
@@ -84,6 +85,7 @@ def of_run(run: History) -> dict[str, Any]:
             definition: None if found is None else {"kind": found.kind, "time": found.time}
             for definition, found in first_mechanisms(run).items()
         },
+        "fall": None if run.fall is None else run.fall.kind,
         "ended": run.ended,
         "outcome": run.outcome,
     }
@@ -140,7 +142,8 @@ def study_table(findings: Mapping[str, Finding]) -> str:
 
     The first tells of the motions as each case applies them: the first mode, the gravest joint of
     rings and piers (its median over the pairs), in how many pairs each definition of a mechanism
-    is met, and in how many a mechanism of which class by the words of Demirel and Aldemir; a run
+    is met, in how many a mechanism of which class by the words of Demirel and Aldemir, and, where
+    displacements may be large, in how many blocks fall; a run
     that broke off tells only of the time before, and is counted below. The second, where they were
     looked for, tells by what factor on the whole motions they begin: the median over the pairs, and
     their range.
@@ -150,6 +153,8 @@ def study_table(findings: Mapping[str, Finding]) -> str:
     """
     head = ["case", "mode 1", "mass x", "|e| dead", "|e| rings", "|e| piers", *DEFINITIONS]
     head.append(PUBLISHED)
+    falling = any(_falls(found) for found in findings.values())
+    head += ["blocks fall"] if falling else []
     rows = []
     for name, found in findings.items():
         cells = [name, f"{found.frequency:.2f} Hz", f"{found.mass:.0%}"]
@@ -158,7 +163,7 @@ def study_table(findings: Mapping[str, Finding]) -> str:
         for definition in DEFINITIONS:
             met = [run["mechanisms"][definition] is not None for run in found.runs.values()]
             cells.append(f"{sum(met)} of {len(met)}")
-        rows.append([*cells, _classes(found)])
+        rows.append([*cells, _classes(found), *([_falls(found) or "-"] if falling else [])])
     tables = [aligned(head, rows), *_broken(findings)]
     if any(found.scales for found in findings.values()):
         rows = [
@@ -175,6 +180,12 @@ def _classes(finding: Finding) -> str:
         found["kind"] for run in finding.runs.values() if (found := run["mechanisms"][PUBLISHED])
     ]
     return ", ".join(f"{met.count(kind)} {kind}" for kind in KINDS if kind in met) or "none"
+
+
+def _falls(finding: Finding) -> str:
+    """In how many pairs blocks fall; empty where displacements were taken as small."""
+    known = [kind for run in finding.runs.values() if (kind := run.get("fall")) is not None]
+    return f"{sum(kind in LOST for kind in known)} of {len(known)}" if known else ""
 
 
 def _broken(findings: Mapping[str, Finding]) -> list[str]:

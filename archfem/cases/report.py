@@ -22,6 +22,7 @@ from archfem.statics.modes import Modes
 from archfem.statics.strength import use_table
 from archfem.view.accuracy import draw_accuracy
 from archfem.view.collapse import draw_collapse
+from archfem.view.displaced import draw_during
 from archfem.view.envelopes import draw_envelope
 from archfem.view.falls import draw_fall
 from archfem.view.films.modes import film_modes
@@ -96,7 +97,7 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     worst = tilt.max("time").fillna(0.5)
     chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
     figures = {
-        "gravest.png": draw_structure(case.structure, _gravest(run, tilt)),
+        "gravest.png": draw_during(dead.model, run, _gravest(run, tilt)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
         "joints.png": draw_joints(run, chosen),
     }

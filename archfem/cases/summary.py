@@ -94,10 +94,16 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 listed_joints(found.names) if found else "-",
                 *_told(run.demirel_aldemir, run)[:2],
                 *moving,
-                f"{ENDS.get(run.ended, run.ended)} {run.time[-1]:.2f} s",
+                _end(run),
             ]
         )
     return aligned(head, rows)
+
+
+def _end(run: History) -> str:
+    """How a run ended, and when; what it left where displacements may be large."""
+    words = f"{ENDS.get(run.ended, run.ended)} {run.time[-1]:.2f} s"
+    return words if run.fall is None else f"{words}, {run.fall.kind}"
 
 
 def collapse_words(structure: Structure, found: Collapse) -> str:

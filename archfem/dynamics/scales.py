@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from archfem.dynamics.events import EveryMechanism, possible_counts
-from archfem.dynamics.falling.verdict import Fall
+from archfem.dynamics.falling.verdict import LOST, Fall
 from archfem.dynamics.history import Ending, history_of
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
@@ -67,7 +67,7 @@ class ScaledRun:
     @property
     def fell(self) -> bool:
         """Whether the structure, or a part of it, has fallen."""
-        return self.fall is not None and self.fall.kind in ("partly fallen", "fallen")
+        return self.fall is not None and self.fall.kind in LOST
 
     def fails(self, definition: str) -> bool:
         """Return whether a mechanism was met, or the run broke off.

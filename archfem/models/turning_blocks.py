@@ -74,7 +74,7 @@ class OwnCoordinates:
         """
         normals = model.structure.normals
         angle = np.arctan2(normals[:, 1], normals[:, 0])
-        return Moved(self._sides(model), _faces(model), angle)
+        return Moved(self._sides(model), _faces(model), angle, _hands(model.structure))
 
     def _sides(self, model: Jointed) -> Sides:
         """The faces of the blocks on both sides of the joints."""
@@ -83,7 +83,7 @@ class OwnCoordinates:
         sizes = {b: int(ends[np.searchsorted(ends, s) + 1] - s) for b, s in self.starts.items()}
         start, size = np.full((joints, 2), -1), np.zeros((joints, 2), int)
         arm, shapes = np.zeros((joints, 2, 2)), np.zeros((joints, 2, 3, max(sizes.values()) - 3))
-        matrix = face_matrix(model.operator)[0].tocsr()
+        matrix, hands = face_matrix(model.operator)[0].tocsr(), _hands(structure)
         for joint, pair in enumerate(structure.pairs):
             axes = np.column_stack([structure.normals[joint], structure.tangents[joint]])
             rows = matrix[[joint, 2 * joints + joint, joints + joint]]  # gap, slip, turn
@@ -95,8 +95,15 @@ class OwnCoordinates:
                 start[joint, side], size[joint, side] = first, number
                 moves = (2 * side - 1) * rows[:, first + 3 : first + number].toarray()
                 shapes[joint, side, :2, : number - 3] = axes @ moves[:2]
-                shapes[joint, side, 2, : number - 3] = moves[2]
+                shapes[joint, side, 2, : number - 3] = hands[joint] * moves[2]
         return Sides(start, size, arm, shapes, held_poses(structure, model.supports))
+
+
+def _hands(structure: Structure) -> Array:
+    """Whether the extrados is on the left of each joint's normal, 1, or on the right, -1 (j,)."""
+    (nx, ny), (tx, ty) = structure.normals.T, structure.tangents.T
+    found: Array = np.where(nx * ty - ny * tx > 0.0, 1.0, -1.0)
+    return found
 
 
 def _own_coordinates(small: Jointed, own: Any, number: int) -> tuple[Array, Array]:

@@ -3,8 +3,9 @@
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
     states     what a state's joints carry
-    moved      where ends of joints and loose blocks are, however far they moved
+    moved      where ends of joints and loose blocks are at some time of a run
     structure  a structure at an instant; several side by side
+    displaced  a structure where its blocks have gone
     names      which joint is which
     joints     joints over time
     envelopes  eccentricity part by part

@@ -1,4 +1,4 @@
-"""Where the ends of joints are once blocks have moved, and where blocks that came loose are."""
+"""Where blocks and the ends of joints are at some time of a run, loose blocks too."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -69,6 +69,39 @@ def turned(points: Array, angle: Array) -> Array:
     return found
 
 
+def kept_fields(run: History) -> tuple[Array, Array]:
+    """Return the fields of a run; where blocks came loose, up to the last.
+
+    Args:
+        run: with fields.
+
+    Returns:
+        Times (frames,) [s] and coordinates (frames, n).
+    """
+    data = run.dataset
+    times, fields = data["frame_time"].values, data["q"].values
+    if "fall_pose" in data and data.attrs["last_time"] > times[-1]:
+        times = np.append(times, data.attrs["last_time"])
+        fields = np.concatenate([fields, data["last_q"].values[None]])
+    return times, fields
+
+
+def fields_at(run: History, times: Array) -> Array:
+    """Return coordinates at some times, straight between those that were kept (frames, n).
+
+    Args:
+        run: with fields.
+        times: at which (frames,) [s].
+    """
+    kept, fields = kept_fields(run)
+    if len(kept) == 1:
+        return np.repeat(fields, len(times), axis=0)
+    after = np.searchsorted(kept, times).clip(1, len(kept) - 1)
+    share = ((times - kept[after - 1]) / (kept[after] - kept[after - 1]))[:, None]
+    found: Array = (1.0 - share) * fields[after - 1] + share * fields[after]
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Falls:
     """Where blocks that came loose in a run are, until they rest.
@@ -106,7 +139,8 @@ class Falls:
             time: from the first frame to the last [s].
         """
         if len(self.times) == 1:
-            return np.asarray(self.poses[0], dtype=float)
+            only: Array = self.poses[0]
+            return only
         after = int(np.searchsorted(self.times, time).clip(1, len(self.times) - 1))
         before, last = self.times[after - 1], self.times[after]
         share = np.clip((time - before) / (last - before), 0.0, 1.0)

@@ -67,9 +67,9 @@ def draw_structure(
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
-        _marks(axes, joint_marks(structure, flagged(joints, criteria)))
+        draw_marks(axes, joint_marks(structure, flagged(joints, criteria)))
         legend(axes)
-    axes.set_title(_title(structure, joints), fontsize=NORMAL, color=INK)
+    axes.set_title(title_of(structure, joints), fontsize=NORMAL, color=INK)
     axes.autoscale_view()
     return cast(Figure, axes.figure)
 
@@ -105,8 +105,13 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     return figure
 
 
-def _title(structure: Structure, joints: xr.Dataset | None) -> str:
-    """Name of the structure, and the time where there is one."""
+def title_of(structure: Structure, joints: xr.Dataset | None) -> str:
+    """Return the name of the structure, and the time where there is one.
+
+    Args:
+        structure: that is drawn.
+        joints: at that instant.
+    """
     if joints is None or "time" not in joints.coords:
         return structure.name
     return f"{structure.name}, t = {float(joints['time']):.3f} s"
@@ -143,8 +148,13 @@ def draw_thrust(axes: Axes, marks: Marks) -> None:
     axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5, gid="thrust")
 
 
-def _marks(axes: Axes, marks: Marks) -> None:
-    """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
+def draw_marks(axes: Axes, marks: Marks) -> None:
+    """Draw thrust line, hinges, slips and gaps; what does not occur has no label.
+
+    Args:
+        axes: to draw into.
+        marks: of one instant.
+    """
     draw_thrust(axes, marks)
     if len(marks.hinges):
         disc: dict[str, Any] = {"mfc": HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}

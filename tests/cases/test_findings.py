@@ -59,3 +59,15 @@ def test_a_table_counts_the_pairs_asked_for_and_runs_that_broke_off():
     assert "ring: 1 of 2 runs broke off" in study_table({"ring": found})
     assert "broke off" not in study_table({"ring": found.of_pairs(["a"])})
     assert "0 of 1" in study_table({"ring": found.of_pairs(["a"])})
+
+
+def test_a_study_counts_falls_where_displacements_may_be_large():
+    def fell(kind):
+        return finding().runs["a"] | {"fall": kind}
+
+    large = finding(runs={"a": fell("fallen"), "b": fell("dislocated"), "c": fell("partly fallen")})
+    lines = study_table({"large": large, "small": finding()}).splitlines()
+    assert lines[0].endswith("blocks fall")
+    assert lines[1].endswith("2 of 3")
+    assert lines[2].endswith("-")
+    assert "blocks fall" not in study_table({"small": finding()})

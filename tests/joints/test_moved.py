@@ -72,7 +72,7 @@ def two_joints(shapes, friction, facets, rng):
         np.repeat([3e4, 2e4], points) / points,
         facets,
     )
-    return Moved(sides, faces, rng.uniform(-3, 3, 2))
+    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2))
 
 
 def gathered(joints, before, after, late, slid):

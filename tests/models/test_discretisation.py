@@ -36,6 +36,9 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
         ({"quadrature": "nodal", "points": 3}, "nodal quadrature has points of its own"),
         ({"quadrature": "exact", "degree": 2}, "linear along a facet"),
         ({"quadrature": "exact", "fidelity": "monolithic"}, "linear along a facet"),
+        ({"displacements": "huge"}, "displacements 'huge' are not known: use one of"),
+        ({"displacements": "large"}, "the rung 'full' does not know: use one of .*'rigid'"),
+        ({"displacements": "large", "fidelity": {"rest": "rigid"}}, "'rest: rigid' does not know"),
     ],
 )
 def test_refusals(ring, given, says):

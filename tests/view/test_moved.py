@@ -58,7 +58,7 @@ def test_small_motions_move_ends_as_of_small_displacements(column):
 
 
 def test_the_thrust_line_goes_through_the_hinge_of_moved_faces(column, toppled):
-    """Just before stones are loose, e of 0.48 of what overlaps, at the joint's end."""
+    """At the last instant before stones are loose, between the ends of what overlaps."""
     q = toppled.dataset["last_q"].values
     joints = toppled.joints.isel(time=-1)
     ends = column.structure.ends + carrier(column)(q)

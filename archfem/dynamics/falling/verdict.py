@@ -15,6 +15,9 @@ from archfem.masonry.structure import Structure
 KINDS = ("stands", "dislocated", "partly fallen", "fallen")
 """What can be said of a structure, from the best to the worst."""
 
+LOST = KINDS[2:]
+"""Those of structures that have lost blocks."""
+
 SUNK = 0.5
 """How far the centroid of a block that is lost has sunk, over the root of the block's area [-]."""
 

@@ -29,11 +29,14 @@ class Moved(NamedTuple):
         sides: faces of the blocks.
         faces: what the law needs.
         angle: direction of the normals before anything moved (j,) [rad].
+        hand: 1 where the extrados is on the left of the normal, -1 where it is on the right: slip,
+            turn, V and M are told as positive toward the extrados (j,).
     """
 
     sides: Sides
     faces: Faces
     angle: Array
+    hand: Array
 
 
 class Answer(NamedTuple):
@@ -73,7 +76,7 @@ def answer(joints: Moved) -> Answer:
 
 @numba.njit(cache=True)
 def find_measures(joints, joint, q, found):  # type: ignore
-    """Find opening, slip and turn of a joint.
+    """Find opening, slip and turn of a joint, positive to the left of its normal.
 
     Args:
         joints: `Moved`.
@@ -89,7 +92,7 @@ def find_measures(joints, joint, q, found):  # type: ignore
 
 @numba.njit(cache=True)
 def all_measures(joints, q):  # type: ignore
-    """Return opening, slip and turn of all joints (j, 3) [m, m, -].
+    """Return opening, slip and turn of all joints, with their signs (j, 3) [m, m, -].
 
     Args:
         joints: `Moved`.
@@ -98,6 +101,8 @@ def all_measures(joints, q):  # type: ignore
     found = np.empty((len(joints.angle), 3))
     for joint in range(len(found)):
         find_measures(joints, joint, q, found[joint])
+        found[joint, 1] *= joints.hand[joint]
+        found[joint, 2] *= joints.hand[joint]
     return found
 
 
@@ -155,8 +160,9 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         shear, rubbing = rub_faces(
             joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
         )
-        found.resultants[joint, 0], found.resultants[joint, 1] = -force[0], shear
-        found.resultants[joint, 2] = force[2]
+        found.resultants[joint, 0] = -force[0]
+        found.resultants[joint, 1] = joints.hand[joint] * shear
+        found.resultants[joint, 2] = joints.hand[joint] * force[2]
         found.lost[joint] = lagging + rubbing
         bend(poses[0], poses[1], angle, force, curved)
         _between(rates, rate, now, curved)

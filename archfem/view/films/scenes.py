@@ -22,7 +22,7 @@ from archfem.view.films.shots import falling, moving, still
 from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, swung
-from archfem.view.moved import Falls
+from archfem.view.moved import Falls, fields_at, kept_fields
 from archfem.view.states import drawn, joints_at
 
 SMALLEST = (480, 320)
@@ -76,10 +76,11 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     _check_picture(model, colour, magnification, size)
     _check_run(model, run)
     falls = Falls.of(model.structure, run)
-    known = _kept(run)[0] if falls is None else np.append(_kept(run)[0], falls.times[1:])
+    known = kept_fields(run)[0]
+    known = known if falls is None else np.append(known, falls.times[1:])
     times, fps = _times(known, fps, seconds)
     held = times if falls is None else times[times < falls.times[0]]
-    setup = Setup.of(model, _fields(run, held), colour, magnification).with_falls(falls)
+    setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     return write_film(target, _shots(_with(setup, mechanism), run, times, falls, size), fps)
 
 
@@ -137,7 +138,7 @@ def _shots(
     page, held = Page(setup, size, run), times
     if falls is not None:
         held, loose = times[times < falls.times[0]], times[times >= falls.times[0]]
-    shown = moving(setup, run, held, _fields(run, held))
+    shown = moving(setup, run, held, fields_at(run, held))
     if falls is not None:
         shown = chain(shown, falling(setup, falls, loose))
     bar = tqdm(shown, total=len(times), unit="frame", disable=None, leave=False)
@@ -154,27 +155,6 @@ def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, floa
     lasting = seconds or max(float(times[-1] - times[0]), 1.0 / fps)
     count = min(len(times), max(1, round(lasting * fps)))
     return np.linspace(times[0], times[-1], count), count / lasting
-
-
-def _kept(run: History) -> tuple[Array, Array]:
-    """Times of the fields that were kept, and the fields; where blocks came loose, to the last."""
-    data = run.dataset
-    times, fields = data["frame_time"].values, data["q"].values
-    if "fall_pose" in data and data.attrs["last_time"] > times[-1]:
-        times = np.append(times, data.attrs["last_time"])
-        fields = np.concatenate([fields, data["last_q"].values[None]])
-    return times, fields
-
-
-def _fields(run: History, times: Array) -> Array:
-    """Coordinates at some times, straight between those that were kept (frames, n)."""
-    kept, fields = _kept(run)
-    if len(kept) == 1:
-        return np.repeat(fields, len(times), axis=0)
-    after = np.searchsorted(kept, times).clip(1, len(kept) - 1)
-    share = ((times - kept[after - 1]) / (kept[after] - kept[after - 1]))[:, None]
-    found: Array = (1.0 - share) * fields[after - 1] + share * fields[after]
-    return found
 
 
 def _check_picture(

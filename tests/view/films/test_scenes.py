@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.films.scenes import _fields, _times, film, picture
+from archfem.view.films.scenes import _times, film, picture
+from archfem.view.moved import fields_at
 from archfem.view.style import HINGE, MOVED
 
 SIZE = (640, 400)  # small: rendering takes the time
@@ -59,7 +60,7 @@ def test_frames_follow_at_even_times_whatever_the_steps(model):
     times, fps = _times(kept, 20.0, None)
     assert fps == 20.0
     assert np.diff(times) == pytest.approx(1.0 / 19.0)
-    assert _fields(run, times) == pytest.approx(np.outer(times, np.arange(1.0, 4.0)))
+    assert fields_at(run, times) == pytest.approx(np.outer(times, np.arange(1.0, 4.0)))
 
 
 def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
@@ -70,7 +71,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     steps = np.diff(run.dataset["frame_time"].values)
     assert steps.max() > 5.0 * steps.min()
     times, _ = _times(run.dataset["frame_time"].values, 100.0, None)
-    fields = _fields(run, times)
+    fields = fields_at(run, times)
     assert np.diff(times) == pytest.approx(times[1] - times[0])
     nearest = run.dataset["q"].values[
         np.abs(run.dataset["frame_time"].values[:, None] - times).argmin(axis=0)

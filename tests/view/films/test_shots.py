@@ -1,14 +1,14 @@
-"""Pictures of what falls: joints while they hold, then blocks alone, at even times."""
+"""Pictures of what falls: joints while they hold, then blocks alone, to the ground."""
 
 import imageio.v2 as imageio
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.scenes import _fields, film
+from archfem.view.films.scenes import film
 from archfem.view.films.setup import Setup
 from archfem.view.films.shots import falling, moving
-from archfem.view.moved import Falls
+from archfem.view.moved import Falls, fields_at
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_what_flies_far_is_not_followed(setup, falls, column):
 
 def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
     times = np.array([0.1, 0.3, falls.times[0] - 1e-3])
-    held = list(moving(setup, toppled, times, _fields(toppled, times)))
+    held = list(moving(setup, toppled, times, fields_at(toppled, times)))
     assert all(len(shot.marks.links) for shot in held)
     (loose,) = falling(setup, falls, falls.times[-1:])
     assert loose.joints is None
@@ -65,7 +65,7 @@ def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
 def test_pictures_pass_over_into_the_fall(setup, toppled, falls):
     """The last state that was kept is that in which blocks came loose."""
     time = falls.times[:1]
-    (before,) = moving(setup, toppled, time, _fields(toppled, time))
+    (before,) = moving(setup, toppled, time, fields_at(toppled, time))
     (after,) = falling(setup, falls, time)
     np.testing.assert_allclose(before.places, after.places, atol=1e-9)
     np.testing.assert_allclose(before.shades, after.shades, atol=1e-6)

@@ -1,0 +1,89 @@
+"""Cases whose displacements may be large: what they refuse, and all that a run of one writes."""
+
+import pytest
+
+import archfem as af
+from archfem.cases.commands import run as run_command
+from archfem.cases.summary import pair_table
+
+CASE = """
+title = "a column that falls"
+[structure]
+shape = "column"
+breadth = 0.4
+heights = [0.8, 0.8]
+[model]
+fidelity = "rigid"
+displacements = "large"
+[motion]
+synthetic = { seed = 1, duration = 1.5, pga = 30.0 }
+[analysis]
+dt = 0.005
+[output]
+animation = false
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "falls.toml"
+    file.write_text(CASE)
+    return file
+
+
+def test_displacements_reach_the_model(path):
+    case = af.Case.read(path)
+    assert case.discretisation.displacements == "large"
+    assert af.Case.read(path, ["model.displacements=small"]).discretisation.displacements == "small"
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("model.fidelity=full", "the rung 'full' does not know: use one of"),
+        ("model.fidelity=auto", "'auto' chooses among models of small displacements: .*'faces'"),
+        ("model.displacements=far", "displacements 'far' are not known"),
+        ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),
+        ("dead_load.stages=usual", r"'large' and \[dead_load\] in stages: .* leave out one"),
+        ("model.quadrature=exact", None),
+        ("model.quadrature=nodal", None),
+    ],
+)
+def test_what_large_displacements_do_not_know_is_refused(path, change, says):
+    if says is None:
+        assert af.Case.read(path, [change]).discretisation.rule.rule == change.split("=")[1]
+        return
+    with pytest.raises(af.InvalidInput, match=says):
+        af.Case.read(path, [change])
+
+
+def test_schemes_without_memory_are_refused_in_python_too(path):
+    model = af.build(af.Case.read(path).structure, fidelity="rigid", displacements="large")
+    motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
+    with pytest.raises(af.InvalidInput, match="blocks that turn far"):
+        af.time_history(model, motion, scheme=af.dynamics.Newmark())
+    with pytest.raises(af.InvalidInput, match="cannot be built in stages"):
+        af.dead_load(model, stages=[])
+
+
+def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):
+    class Given:
+        case, changes, out = path, (), tmp_path / "out"
+
+    run_command(Given)
+    names = {file.name for file in Given.out.iterdir()}
+    written = {"dead.png", "names.png", "gravest.png", "envelope.png", "joints.png", "fall.png"}
+    assert written | {"history.nc"} <= names
+    summary = (Given.out / "summary.txt").read_text(encoding="utf-8")
+    assert summary.startswith("the structure is fallen, at ")
+    assert "before blocks came loose none was farther than " in summary
+    history = af.dynamics.History.read(Given.out / "history.nc", af.Case.read(path).structure)
+    assert history.fall.kind == "fallen"
+    assert pair_table({"pair": history}).rstrip().endswith(", fallen")
+
+
+def test_a_run_that_holds_says_so(path):
+    case = af.Case.read(path, ["motion.scale=0.01", "motion.end=0.5"])
+    *_, done = af.cases.carried_out(case)
+    assert done.history.verdict.startswith("the structure stands; ")
+    assert "at the end no block is farther than " in done.history.verdict
