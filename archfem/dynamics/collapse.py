@@ -22,6 +22,10 @@ from archfem.motion.motion import Motion
 TURNED = 0.3
 """Turn of a joint beyond which its blocks are loose: a voussoir is then about to tumble [rad]."""
 
+TILTED = 0.05
+"""Turn of a joint at the end of a motion beyond which blocks that still move are followed on
+[rad]."""
+
 SETTLING = 20.0
 """Time after the motion in which what falls may come to rest [s]."""
 
@@ -56,6 +60,17 @@ class Parting:
         if abs(turn[k, joint]) > TURNED:
             return k, f"'{name}' had turned by {abs(turn[k, joint]):.2g} rad"
         return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
+
+
+def tilting(model: Moving, state: State) -> bool:
+    """Return whether blocks are on their way to fall, or back.
+
+    Args:
+        model: that has not parted.
+        state: at the end of its motion.
+    """
+    turned = float(np.abs(model.measures(state.q)[:, 2]).max())
+    return turned > TILTED and not left_standing(model, state).resting
 
 
 def fallen(model: Moving, state: State, motion: Motion) -> tuple[xr.Dataset, Fall]:

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
-from archfem.dynamics.collapse import Parting, fallen, left_standing
+from archfem.dynamics.collapse import Parting, fallen, left_standing, tilting
 from archfem.dynamics.events import Until, Watch, agreed, begun
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import Ending, History, with_fall
@@ -178,7 +178,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 
 def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
     """A run of a structure that may fall, with what it has left of it."""
-    if history.ended is not Ending.PARTED:
+    tilts = history.ended is Ending.FINISHED and tilting(model, state)
+    if history.ended is not Ending.PARTED and not tilts:
         return with_fall(history, left_standing(model, state))
     frames, fall = fallen(model, state, motion)
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)

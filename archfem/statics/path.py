@@ -22,6 +22,9 @@ TOLERANCE, ITERATIONS = 1e-9, 30
 FIRST = 1e-6
 """First displacement, relative to the structure's size."""
 
+DENSE = 400
+"""Unknowns up to which a bordered system is solved as a dense one."""
+
 FIRM = 1e-3
 """Share of the closed stiffness that a tangent is given where it alone leads nowhere: where several
 joints slide or turn under the same load it is singular, although each step has an equilibrium."""
@@ -180,10 +183,10 @@ class LoadPath:
                 tangent = (1.0 - share) * tangent + share * model.closed()
             column = sparse.csr_matrix(-self.load.forces(x[:-1])[:, None])
             matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
-            try:
-                x = x + splu(matrix).solve(np.append(rest, missing))
-            except RuntimeError:  # SuperLU: exactly singular
+            step = _solved(matrix, np.append(rest, missing))
+            if step is None:
                 return None
+            x = x + step
         return None
 
     def _add(self, model: Model, x: Array, iterations: int) -> None:
@@ -204,3 +207,13 @@ class LoadPath:
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.load.forces(x[:-1]))
         rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
         return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
+
+
+def _solved(matrix: sparse.csc_matrix, right: Array) -> Array | None:
+    """Solve a system; None where the matrix is exactly singular."""
+    try:
+        if matrix.shape[0] <= DENSE:
+            return np.asarray(np.linalg.solve(matrix.toarray(), right))
+        return np.asarray(splu(matrix).solve(right))
+    except (RuntimeError, np.linalg.LinAlgError):  # SuperLU's, LAPACK's
+        return None

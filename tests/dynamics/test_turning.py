@@ -128,6 +128,17 @@ def test_a_ring_stands_or_falls_and_says_so(tmp_path):
     assert read.fall == falls.fall
 
 
+def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_ground():
+    contact = af.Contact(1e10, 0.5e10, friction=0.7)
+    block = af.column(breadth=0.4, heights=[2.0], contact=contact)
+    built = af.build(block, fidelity="rigid", displacements="large")
+    push = af.Motion(np.concatenate([np.full(42, 4.0), np.zeros(5)]), 0.01)
+    run = af.time_history(built, push, dt=0.002)
+    assert run.ended == "finished"
+    assert run.fall.kind == "fallen"
+    assert run.fall.time > push.duration
+
+
 def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_falls():
     found = collapse_scale(
         model(),
