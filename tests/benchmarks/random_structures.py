@@ -93,7 +93,7 @@ def main() -> None:
     for seed in range(asked.seed, asked.seed + asked.count):
         kind, words, ms = tried(seed, asked.displacements)
         found[kind] += 1
-        left += " 0 steps" not in words and "steps by" in words
+        left += "steps by" in words and ", 0 steps" not in words
         spent += [ms] if ms else []
         if kind in ("FOREIGN", "WRONG", "InvalidInput", "DidNotConverge"):
             print(f"{seed:5} {kind:16} {words}", flush=True)
