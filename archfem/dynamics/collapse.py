@@ -15,6 +15,7 @@ from archfem.dynamics.falling.handover import Handover, released
 from archfem.dynamics.falling.state import Loose
 from archfem.dynamics.falling.verdict import Fall, fall_of
 from archfem.dynamics.steps import Batch, State
+from archfem.masonry.structure import Structure
 from archfem.models.gauges import Gauges
 from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
@@ -62,6 +63,10 @@ class Parting:
         return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
 
 
+FRICTION = 0.6
+"""Coefficient between loose stones whose joint was one that never slides [-]."""
+
+
 def tilting(model: Moving, state: State) -> bool:
     """Return whether blocks are on their way to fall, or back.
 
@@ -86,7 +91,8 @@ def fallen(model: Moving, state: State, motion: Motion) -> tuple[xr.Dataset, Fal
     """
     given = released(model, state)
     end = max(motion.duration, state.time) + SETTLING
-    frames = list(Falling(model.structure).frames(given.start, end, motion, spacing=SPACING))
+    falling = Falling(_rubbing(model.structure))
+    frames = list(falling.frames(given.start, end, motion, spacing=SPACING))
     return _as_dataset(frames, motion, given), fall_of(model.structure, frames)
 
 
@@ -125,3 +131,14 @@ def left_standing(model: Moving, state: State) -> Fall:
     loose = released(model, state).start
     resting = bool(np.abs(loose.velocities[:, :2]).max() <= STILL)
     return replace(fall_of(model.structure, [loose]), resting=resting)
+
+
+def _rubbing(structure: Structure) -> Structure:
+    """The structure with joints that can all slide."""
+    joints = [
+        joint
+        if joint.contact.slides
+        else replace(joint, contact=replace(joint.contact, friction=FRICTION))
+        for joint in structure.joints
+    ]
+    return replace(structure, joints=tuple(joints))

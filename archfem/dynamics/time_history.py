@@ -181,7 +181,11 @@ def _judged(history: History, model: Moving, state: State, motion: Motion) -> Hi
     tilts = history.ended is Ending.FINISHED and tilting(model, state)
     if history.ended is not Ending.PARTED and not tilts:
         return with_fall(history, left_standing(model, state))
-    frames, fall = fallen(model, state, motion)
+    try:
+        frames, fall = fallen(model, state, motion)
+    except DidNotConverge as error:
+        error.history = history
+        raise
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
     return with_fall(History(dataset, history.structure), fall)
 

@@ -128,6 +128,11 @@ def test_a_ring_stands_or_falls_and_says_so(tmp_path):
     assert read.fall == falls.fall
 
 
+def test_stones_whose_joints_never_slide_rub_once_they_are_loose():
+    falls = af.time_history(model(friction=None), PULSE, dt=0.005, damping=DAMPED)
+    assert falls.fall.kind == "fallen"
+
+
 def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_ground():
     contact = af.Contact(1e10, 0.5e10, friction=0.7)
     block = af.column(breadth=0.4, heights=[2.0], contact=contact)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import archfem as af
@@ -41,6 +41,7 @@ def test_a_voussoir_of_chords_is_cut_along_its_depth():
     assert covered(points, pieces) == pytest.approx((area, area), rel=1e-9)
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.lists(st.floats(0.2, 1.0), min_size=4, max_size=12))
 def test_any_star_is_covered_once(radii):
     angles = 2.0 * np.pi * np.arange(len(radii)) / len(radii)
