@@ -19,70 +19,49 @@ def press(law, gap, stretches):  # type: ignore
         gap: z, of all rows (r,) [m].
         stretches: their numbers (k,).
     """
-    half, facets, start = 0.5 * law.gain, law.still.facets, law.start
-    points, parts, pressed, carried = law.points, law.stretches, law.work.points, law.work.stretches
-    for number in stretches:
-        part = parts[number]
-        near, far = gap[part.near], gap[part.far]
-        moved = half * (near - start[part.near]), half * (far - start[part.far])
-        before, after = (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
-        if max(before[0], before[1], after[0], after[1]) <= 0.0:
-            _press_closed((points, pressed), part, (near, far), facets)
-        else:
-            _press_open((points, pressed), part, (before, after), (facets, half))
-        _sum_up((points, pressed), part, carried[number])
+    half, facets, work = 0.5 * law.gain, law.still.facets, law.work
+    for stretch in stretches:
+        near, far = law.near[stretch], law.far[stretch]
+        moved = half * (gap[near] - law.start[near]), half * (gap[far] - law.start[far])
+        before = gap[near] - moved[0], gap[far] - moved[1]
+        after = gap[near] + moved[0], gap[far] + moved[1]
+        for point in range(law.begin[stretch], law.begin[stretch + 1], 2 if facets else 1):
+            other = point + 1 if facets else point
+            a, b = law.share[point], law.share[other]
+            ends = between(before, a), between(before, b), between(after, a), between(after, b)
+            normal, taken, rate, time = _means(ends, (1.0 - half, 1.0 + half), facets)
+            stiffness, area = law.still.stiffness[point], law.area[point]
+            for k in range(other - point + 1):
+                work.normal[point + k] = stiffness * normal[k]
+                work.taken[point + k] = stiffness * taken[k]
+                work.area[point + k] = area * time[k]
+                by = stiffness * rate[k], stiffness * rate[k + 1]
+                work.rate[point + k, 0] = by[0] * (1.0 - a) + by[1] * (1.0 - b)
+                work.rate[point + k, 1] = by[0] * a + by[1] * b
+    _sum_up(law, stretches)
 
 
 @numba.njit(cache=True)
-def _press_closed(points, part, gaps, facets):  # type: ignore
-    """What points of a stretch carry that stays closed."""
-    known, found = points
-    for k in range(part.begin, part.end):
-        point, pressed = known[k], found[k]
-        pressed.normal = point.near * gaps[0] + point.far * gaps[1]
-        pressed.area = 0.5 * point.whole if facets else point.whole
-        pressed.taken = pressed.near = pressed.far = 0.0
-
-
-@numba.njit(cache=True)
-def _press_open(points, part, path, rule):  # type: ignore
-    """What points of a stretch carry that opens, or closes, somewhere on its path."""
-    (known, found), (before, after), (facets, half) = points, path, rule
-    for k in range(part.begin, part.end, 2 if facets else 1):
-        point, other = known[k], k + 1 if facets else k
-        a, b = point.share, known[other].share
-        ends = between(before, a), between(before, b), between(after, a), between(after, b)
-        normal, taken, rate, time = _means(ends, (1.0 - half, 1.0 + half), facets)
-        for end in range(other - k + 1):
-            pressed = found[k + end]
-            pressed.normal = point.stiffness * normal[end]
-            pressed.taken = point.stiffness * taken[end]
-            pressed.area = point.whole * time[end]
-            first, second = point.stiffness * rate[end], point.stiffness * rate[end + 1]
-            pressed.near = first * (1.0 - a) + second * (1.0 - b)
-            pressed.far = first * a + second * b
-
-
-@numba.njit(cache=True)
-def _sum_up(points, part, carried):  # type: ignore
-    """λ of a stretch and its derivatives, from those of its points."""
-    (known, found), near, far, first, mixed, last = points, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(part.begin, part.end):
-        share, pressed = known[k].share, found[k]
-        near += (1.0 - share) * pressed.taken
-        far += share * pressed.taken
-        first += (1.0 - share) * pressed.near
-        mixed += (1.0 - share) * pressed.far
-        last += share * pressed.far
-    carried.near, carried.far = near, far
-    carried.first, carried.mixed, carried.last = first, mixed, last
+def _sum_up(law, stretches):  # type: ignore
+    """λ of stretches and its derivatives, from those of their points."""
+    work = law.work
+    for stretch in stretches:
+        near = far = first = mixed = last = 0.0
+        for point in range(law.begin[stretch], law.begin[stretch + 1]):
+            share, taken = law.share[point], work.taken[point]
+            near += (1.0 - share) * taken
+            far += share * taken
+            first += (1.0 - share) * work.rate[point, 0]
+            mixed += (1.0 - share) * work.rate[point, 1]
+            last += share * work.rate[point, 1]
+        work.ends[stretch, 0], work.ends[stretch, 1] = near, far
+        work.rates[stretch, 0], work.rates[stretch, 1] = first, mixed
+        work.rates[stretch, 2] = last
 
 
 @numba.njit(cache=True)
 def _means(ends, rates, facets):  # type: ignore
     """What `facet_means` gives of a facet, or with zeros `point_means` of a spring."""
-    if facets and (max(ends) <= 0.0 or min(ends) > 0.0):
-        return _whole_means(ends, 0.5 * (rates[0] + rates[1]))
     if facets:
         return facet_means(ends, rates[0], rates[1])
     normal, taken, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
@@ -120,28 +99,30 @@ def slide(law, gap, rows):  # type: ignore
         gap: z, of all rows (r,) [m].
         rows: of slips (k,).
     """
-    known, found, along, members = law.points, law.work.points, law.work.along, law.members
-    first, start, gain, late = law.first, law.start, law.gain, law.late
+    work, late, openings = law.work, law.late, len(law.stiffness)
     for row in rows:
-        slip, taken, rate = gain * (gap[row] - start[row]), 0.0, 0.0
-        group = row - len(law.stiffness)
-        for place in range(first[group], first[group + 1]):
-            point, passed = known[members[place]], found[members[place]]
-            held, change = point.elastic * (start[row] - point.slid), point.elastic * slip
-            limit = np.inf
-            if point.friction < np.inf:
-                limit = max(point.cohesion * passed.area - point.friction * passed.normal, 0.0)
-            trial = held + (0.5 + late) * change
-            passed.lost, passed.shear, passed.slides = late * change * slip, trial, 0.0
-            passed.by_change, passed.by_limit = 0.5 + late, 0.0
-            if max(abs(held), abs(held + change), abs(trial)) > limit:
-                shear, slid, by_change, by_limit, rubbing = _rub(held, change, late, limit)
-                passed.shear, passed.slides = shear, slid / point.elastic
-                passed.by_change, passed.by_limit = by_change, by_limit
-                passed.lost = rubbing / point.elastic
+        slip, taken, rate = law.gain * (gap[row] - law.start[row]), 0.0, 0.0
+        group = row - openings
+        for place in range(law.first[group], law.first[group + 1]):
+            point = law.members[place]
+            stiffness, limit = law.shear[point], np.inf
+            first = stiffness * (law.start[row] - law.slid[point])
+            if law.friction[point] < np.inf:
+                limit = law.cohesion[point] * work.area[point]
+                limit = max(limit - law.friction[point] * work.normal[point], 0.0)
+            change = stiffness * slip
+            trial = first + (0.5 + late) * change
+            work.lost[point] = late * change * slip
+            work.held[point, 0], work.held[point, 1] = 0.5 + late, 0.0
+            work.shear[point], work.slid[point] = trial, 0.0
+            if max(abs(first), abs(first + change), abs(trial)) > limit:
+                shear, slid, by_change, by_limit, rubbing = _rub(first, change, late, limit)
+                work.shear[point], work.slid[point] = shear, slid / stiffness
+                work.held[point, 0], work.held[point, 1] = by_change, by_limit
+                work.lost[point] = rubbing / stiffness
                 taken += trial - shear
-                rate += point.elastic * (1.0 - gain * by_change)
-        along[group, 0], along[group, 1] = taken, rate
+                rate += stiffness * (1.0 - law.gain * by_change)
+        work.along[group, 0], work.along[group, 1] = taken, rate
 
 
 @numba.njit(cache=True)

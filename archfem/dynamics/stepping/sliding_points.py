@@ -56,11 +56,11 @@ def _shifted(law, gap):  # type: ignore
 
 def _held(law, opening, right):  # type: ignore
     """Add to a right side what joints would carry more had nothing slid before the step."""
-    force = np.zeros(len(law.start))
-    for point in law.points:
-        if point.group >= 0:
-            force[point.group] += point.elastic * point.slid
-    add_rows(opening, np.flatnonzero(force), force, right)
+    force, openings = np.zeros(len(law.start)), len(law.stiffness)
+    for point in range(len(law.group)):
+        if law.group[point] >= 0:
+            force[law.group[point]] += law.shear[point] * law.slid[point]
+    add_rows(opening, np.arange(openings, len(force)), force, right)
 
 
 def _largest(law, gap):  # type: ignore
@@ -75,49 +75,43 @@ def _foreseen(law, gap, before, force):  # type: ignore
         law.guess[row] = law.start[row] + law.speed[row] / law.gain
         if row < len(law.stiffness) and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
             works[row] = True
-    for part in law.stretches:
-        if works[part.near] or works[part.far]:
-            near[part.near] = near[part.far] = True
-            for point in range(part.begin, part.end):
-                if law.points[point].group >= 0:
-                    near[law.points[point].group] = True
-    _work_at(law, law.guess, near, np.zeros(len(gap)))
+    for stretch in range(len(law.near)):
+        a, b = law.near[stretch], law.far[stretch]
+        if works[a] or works[b]:
+            near[a] = near[b] = True
+            for point in range(law.begin[stretch], law.begin[stretch + 1]):
+                if law.group[point] >= 0:
+                    near[law.group[point]] = True
+    _involve(law, near)
     return near
 
 
 @numba.njit(cache=True)
 def _involve(law, near):  # type: ignore
     """Add to rows of slips at work the openings that press on their points."""
-    for point in law.points:
-        if point.group >= 0 and near[point.group]:
-            stretch = law.stretches[point.stretch]
-            near[stretch.near] = near[stretch.far] = True
+    for point in range(len(law.group)):
+        if law.group[point] >= 0 and near[law.group[point]]:
+            stretch = law.stretch[point]
+            near[law.near[stretch]] = near[law.far[stretch]] = True
 
 
 def _fits(law, gap, force, near):  # type: ignore
     """Return whether the gaps ask for the λ they were found with; adds rows at work to near."""
-    wanted = np.zeros(len(gap))
+    openings, wanted = len(law.stiffness), np.zeros(len(gap))
     law.guess[:] = gap
-    _work_at(law, gap, near, wanted)
-    return np.max(np.abs(wanted - force)) <= EXACT * largest(law, gap)
-
-
-@numba.njit(cache=True)
-def _work_at(law, gap, near, wanted):  # type: ignore
-    """Add to near what rows are at work at some gaps; λ there, added to what is wanted."""
-    openings = len(law.stiffness)
-    press(law, gap, np.arange(len(law.stretches)))
+    press(law, gap, np.arange(len(law.near)))
     slide(law, gap, np.arange(openings, len(gap)))
-    for number in range(len(law.stretches)):
-        part, carried = law.stretches[number], law.work.stretches[number]
-        wanted[part.near] += carried.near
-        wanted[part.far] += carried.far
-        if carried.near != 0.0 or carried.far != 0.0:
-            near[part.near] = near[part.far] = True
+    for stretch in range(len(law.near)):
+        a, b = law.near[stretch], law.far[stretch]
+        wanted[a] += law.work.ends[stretch, 0]
+        wanted[b] += law.work.ends[stretch, 1]
+        if law.work.ends[stretch, 0] != 0.0 or law.work.ends[stretch, 1] != 0.0:
+            near[a] = near[b] = True
     for row in range(openings, len(gap)):
         wanted[row] = law.work.along[row - openings, 0]
         near[row] = near[row] or wanted[row] != 0.0
     _involve(law, near)
+    return np.max(np.abs(wanted - force)) <= EXACT * largest(law, gap)
 
 
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
@@ -126,7 +120,7 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     for k in range(size):
         local[rows[k]] = k
     slips = rows[np.searchsorted(rows, len(law.stiffness)) :]
-    known = local, _within(law.stretches, local), slips
+    known = local, np.flatnonzero((local[law.near] >= 0) & (local[law.far] >= 0)), slips
     matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
     gap, z, last = law.guess.copy(), chosen(law.guess, rows), np.inf
     wanted, share, calm = np.empty(size), 1.0, 0
@@ -163,59 +157,40 @@ solved_by(
 
 
 @numba.njit(cache=True)
-def _within(stretches, local):  # type: ignore
-    """Numbers of the stretches of which both ends are among the rows."""
-    inside = np.empty(len(stretches), dtype=np.bool_)
-    for number in range(len(stretches)):
-        part = stretches[number]
-        inside[number] = local[part.near] >= 0 and local[part.far] >= 0
-    return np.flatnonzero(inside)
-
-
-@numba.njit(cache=True)
 def _taken(law, gap, known, wanted):  # type: ignore
     """λ of the rows, and its derivatives as entries of a matrix; returns how many those are."""
-    local, stretches, slips = known
+    (local, stretches, slips), openings, work = known, len(law.stiffness), law.work
     press(law, gap, stretches)
     slide(law, gap, slips)
-    count, entries = 0, (law.work.places, law.work.values)
+    count, entries = 0, (work.places, work.values)
     wanted[:] = 0.0
-    for number in stretches:
-        part, carried = law.stretches[number], law.work.stretches[number]
-        a, b = local[part.near], local[part.far]
-        wanted[a] += carried.near
-        wanted[b] += carried.far
-        if carried.first != 0.0 or carried.last != 0.0:
-            count = _enter(entries, count, a, a, carried.first)
-            count = _enter(entries, count, a, b, carried.mixed)
-            count = _enter(entries, count, b, a, carried.mixed)
-            count = _enter(entries, count, b, b, carried.last)
-    openings, along = len(law.stiffness), law.work.along
+    for stretch in stretches:
+        a, b = local[law.near[stretch]], local[law.far[stretch]]
+        wanted[a] += work.ends[stretch, 0]
+        wanted[b] += work.ends[stretch, 1]
+        if work.rates[stretch, 0] != 0.0 or work.rates[stretch, 2] != 0.0:
+            count = _enter(entries, count, a, a, work.rates[stretch, 0])
+            count = _enter(entries, count, a, b, work.rates[stretch, 1])
+            count = _enter(entries, count, b, a, work.rates[stretch, 1])
+            count = _enter(entries, count, b, b, work.rates[stretch, 2])
     for row in slips:
-        k, group = local[row], row - openings
-        wanted[k] = along[group, 0]
-        if along[group, 1] != 0.0 or wanted[k] != 0.0:
-            count = _enter(entries, count, k, k, along[group, 1])
-            own = law.members[law.first[group] : law.first[group + 1]]
-            count = _press_on(law, own, local, (k, entries, count))
-    return count
-
-
-@numba.njit(cache=True)
-def _press_on(law, own, local, entered):  # type: ignore
-    """Add derivatives of a slip's λ by the openings that press on its points; returns entries."""
-    (k, entries, count), last = entered, -1
-    for place in own:
-        point, pressed = law.points[place], law.work.points[place]
-        if pressed.by_limit == 0.0 or point.friction == 0.0:
+        k, group, last = local[row], row - openings, -1
+        wanted[k] = work.along[group, 0]
+        if work.along[group, 1] == 0.0 and wanted[k] == 0.0:
             continue
-        if point.stretch != last:
-            part, last = law.stretches[point.stretch], point.stretch
-            count = _enter(entries, count, k, local[part.near], 0.0)
-            count = _enter(entries, count, k, local[part.far], 0.0)
-        factor = pressed.by_limit * point.friction
-        entries[1][count - 2] += factor * (point.near - pressed.near)
-        entries[1][count - 1] += factor * (point.far - pressed.far)
+        count = _enter(entries, count, k, k, work.along[group, 1])
+        for place in range(law.first[group], law.first[group + 1]):
+            point = law.members[place]
+            if work.held[point, 1] == 0.0 or law.friction[point] == 0.0:
+                continue
+            factor, stretch = work.held[point, 1] * law.friction[point], law.stretch[point]
+            if stretch != last:
+                count = _enter(entries, count, k, local[law.near[stretch]], 0.0)
+                count = _enter(entries, count, k, local[law.far[stretch]], 0.0)
+                last = stretch
+            for end in range(2):
+                value = factor * (law.closed[point, end] - work.rate[point, end])
+                work.values[count - 2 + end] += value
     return count
 
 
@@ -231,66 +206,46 @@ def _enter(entries, count, row, column, value):  # type: ignore
 def _newton(matrix, rest, entries, count):  # type: ignore
     """Solve (1 - λ' F) μ = λ' rest for the change μ of λ, which is 0 where no row of λ' is."""
     (places, values), changes = entries, np.zeros(len(rest), dtype=np.bool_)
-    whole, change = np.eye(len(rest)), np.zeros(len(rest))
+    change = np.zeros(len(rest))
     for entry in range(count):
-        row, column, value = places[entry, 0], places[entry, 1], values[entry]
+        row, column = places[entry, 0], places[entry, 1]
         changes[row] = True
-        change[row] += value * rest[column]
-        line, other = whole[row], matrix[column]
-        for k in range(len(line)):
-            line[k] -= value * other[k]
+        change[row] += values[entry] * rest[column]
     rows = np.flatnonzero(changes)
     if len(rows) > FEW:
-        return _gradients(whole, change)
-    own = chosen(change, rows)
-    _eliminate(square(whole, rows), own)
-    change[rows] = own
+        return _gradients(matrix, change, entries, count)
+    whole = np.eye(len(rest))
+    for entry in range(count):
+        row, column, value = places[entry, 0], places[entry, 1], values[entry]
+        for k in range(len(rest)):
+            whole[row, k] -= value * matrix[column, k]
+    change[rows] = np.linalg.solve(square(whole, rows), chosen(change, rows))
     return change
 
 
-@numba.njit(cache=True, fastmath={"contract"})
-def _eliminate(matrix, right):  # type: ignore
-    """Solve a small system in place; without a solution none of it is a number.
-
-    Faster than LAPACK's where there are but some tens of rows.
-    """
-    size = len(right)
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if best != k:
-            right[k], right[best] = right[best], right[k]
-            for j in range(k, size):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-        scale = 1.0 / matrix[k, k] if matrix[k, k] != 0.0 else np.nan
-        top = matrix[k, k + 1 :]
-        for i in range(k + 1, size):
-            factor, row = scale * matrix[i, k], matrix[i, k + 1 :]
-            right[i] -= factor * right[k]
-            for j in range(len(top)):
-                row[j] -= factor * top[j]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
-            right[k] -= matrix[k, j] * right[j]
-        right[k] *= 1.0 / matrix[k, k] if matrix[k, k] != 0.0 else np.nan
+@numba.njit(cache=True)
+def _applied(matrix, vector, entries, count):  # type: ignore
+    """(1 - λ' F) times a vector."""
+    (places, values), image, result = entries, matrix @ vector, vector.copy()
+    for entry in range(count):
+        result[places[entry, 0]] -= values[entry] * image[places[entry, 1]]
+    return result
 
 
 @numba.njit(cache=True)
-def _gradients(matrix, right):  # type: ignore
-    """Solve a system by stabilised biconjugate gradients from zero."""
+def _gradients(matrix, right, entries, count):  # type: ignore
+    """Solve (1 - λ' F) μ = right by stabilised biconjugate gradients from zero."""
     solution, left = np.zeros(len(right)), right.copy()
     direction, rho = right.copy(), right @ right
     end = (ROUGH**2) * rho
     for _ in range(2 * len(right)):
-        image = matrix @ direction
+        image = _applied(matrix, direction, entries, count)
         seen = right @ image
         if left @ left <= end or seen == 0.0:
             break
         length = rho / seen
         half = left - length * image
-        other = matrix @ half
+        other = _applied(matrix, half, entries, count)
         square_of = other @ other
         weight = (other @ half) / square_of if square_of > 0.0 else 0.0
         solution += length * direction + weight * half
