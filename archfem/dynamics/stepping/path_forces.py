@@ -7,7 +7,7 @@ gaps, as in `facets.Facets`; where it stays closed or open all the way, what it 
 import numba
 import numpy as np
 
-from archfem.joints.moving.means import facet_means, point_means
+from archfem.joints.moving.means import facet_means, point_means, shear_means
 
 
 @numba.njit(cache=True)
@@ -80,17 +80,6 @@ def between(ends, share):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _whole_means(ends, rate):  # type: ignore
-    """The same of a facet that is closed, or open, everywhere and all the way."""
-    a, c, b, d = ends
-    near, far = (a + b) / 12.0, (c + d) / 12.0
-    means, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
-    if max(ends) <= 0.0:
-        return means, none, (0.0, 0.0, 0.0), (0.5, 0.5)
-    return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
-
-
-@numba.njit(cache=True)
 def slide(law, gap, rows):  # type: ignore
     """Find what the points of rows of slips carry along the joints over the step.
 
@@ -116,34 +105,10 @@ def slide(law, gap, rows):  # type: ignore
             work.held[point, 0], work.held[point, 1] = 0.5 + late, 0.0
             work.shear[point], work.slid[point] = trial, 0.0
             if max(abs(first), abs(first + change), abs(trial)) > limit:
-                shear, slid, by_change, by_limit, rubbing = _rub(first, change, late, limit)
+                shear, slid, by_change, by_limit, rubbing = shear_means(first, change, late, limit)
                 work.shear[point], work.slid[point] = shear, slid / stiffness
                 work.held[point, 0], work.held[point, 1] = by_change, by_limit
                 work.lost[point] = rubbing / stiffness
                 taken += trial - shear
                 rate += stiffness * (1.0 - law.gain * by_change)
         work.along[group, 0], work.along[group, 1] = taken, rate
-
-
-@numba.njit(cache=True)
-def _rub(first, change, late, limit):  # type: ignore
-    """Shear of a point that slides during the step, as `joints.law.shear_over_step`.
-
-    Returns:
-        Mean shear, what the elastic shear loses by sliding, derivatives of the mean by its elastic
-        change and by the limit, and the energy lost times the stiffness.
-    """
-    start = min(max(first, -limit), limit)
-    last = min(max(start + change, -limit), limit)
-    over = start + change - last
-    slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
-    mean = start + 0.5 * change - 0.5 * over * slid
-    shear = min(max(mean + late * change, -limit), limit)
-    if abs(mean + late * change) > limit:
-        by_change, by_limit = 0.0, np.sign(shear)
-    else:
-        lost = np.sign(first) if abs(first) > limit else 0.0
-        by_change = 0.5 * (1.0 - slid) ** 2 + late
-        by_limit = (1.0 - slid) * lost + slid * np.sign(change)
-    rubbing = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
-    return shear, first + change - last, by_change, by_limit, rubbing

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numba
+import numpy as np
 
 from archfem.files import forget_stale
 from archfem.joints.facets import PLACES, SHARES
@@ -67,3 +68,33 @@ def facet_means(ends, first, second):  # type: ignore
             s0 += weight * near * time
             s1 += weight * far * time
     return (n0, n1), (t0, t1), (r00, r01, r11), (s0, s1)
+
+
+@numba.njit(cache=True)
+def shear_means(first, change, late, limit):  # type: ignore
+    """Return what a point that slides during a step carries, as `joints.law.shear_over_step`.
+
+    Args:
+        first: elastic shear at the start [N].
+        change: of it, if the point did not slide [N].
+        late: lag of damping over the length of the step [-].
+        limit: Coulomb's, finite [N].
+
+    Returns:
+        Mean shear, what the elastic shear loses by sliding, derivatives of the mean by its elastic
+        change and by the limit, and the energy lost times the stiffness.
+    """
+    start = min(max(first, -limit), limit)
+    last = min(max(start + change, -limit), limit)
+    over = start + change - last
+    slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
+    mean = start + 0.5 * change - 0.5 * over * slid
+    shear = min(max(mean + late * change, -limit), limit)
+    if abs(mean + late * change) > limit:
+        by_change, by_limit = 0.0, np.sign(shear)
+    else:
+        lost = np.sign(first) if abs(first) > limit else 0.0
+        by_change = 0.5 * (1.0 - slid) ** 2 + late
+        by_limit = (1.0 - slid) * lost + slid * np.sign(change)
+    rubbing = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
+    return shear, first + change - last, by_change, by_limit, rubbing

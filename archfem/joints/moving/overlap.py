@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.means import facet_means, point_means
+from archfem.joints.moving.means import facet_means, point_means, shear_means
 
 
 class Faces(NamedTuple):
@@ -218,36 +218,15 @@ def _slope(before, after, depth):  # type: ignore
 
 
 @numba.njit(cache=True)
-def rub(first, change, late, limit, found):  # type: ignore
-    """Find the mean shear of a point over a step, as `law.shear_over_step`.
-
-    Args:
-        first: elastic shear at the start [N].
-        change: of it, if the point did not slide [N].
-        late: lag of damping over the length of the step [-].
-        limit: Coulomb's [N].
-        found: mean shear [N], what friction has not held at the end [N], derivatives of the mean
-            by the change and by the limit [-], and loss times the stiffness [N²], filled (5,).
-    """
+def _rubbed(first, change, late, limit):  # type: ignore
+    """What `shear_means` gives of a point whether it slides or not, also over no step at all."""
     trial = first + (0.5 + late) * change
     if max(abs(first), abs(first + change), abs(trial)) <= limit:
-        found[0], found[1], found[2], found[3] = trial, 0.0, 0.5 + late, 0.0
-        found[4] = late * change * change
-        return
-    start = min(max(first, -limit), limit)
-    last = min(max(start + change, -limit), limit)
-    over = start + change - last
-    slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
-    mean = start + 0.5 * change - 0.5 * over * slid
-    shear = min(max(mean + late * change, -limit), limit)
-    found[0], found[1] = shear, first + change - last
-    if abs(mean + late * change) > limit or (change == 0.0 and abs(first) > limit):
-        found[2], found[3] = 0.0, np.sign(shear)
-    else:
-        lost = np.sign(first) if abs(first) > limit else 0.0
-        found[2] = 0.5 * (1.0 - slid) ** 2 + late
-        found[3] = (1.0 - slid) * lost + slid * np.sign(change)
-    found[4] = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
+        return trial, 0.0, 0.5 + late, 0.0, late * change * change
+    found = shear_means(first, change, late, limit)
+    if change == 0.0 and abs(first) > limit:
+        return found[0], found[1], 0.0, np.sign(found[0]), found[4]
+    return found
 
 
 @numba.njit(cache=True)
@@ -267,20 +246,20 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    (force, rate, after), friction, own = found, faces.friction[joint], np.empty(5)
+    (force, rate, after), friction = found, faces.friction[joint]
     total = lost = 0.0
     for point in range(faces.first[joint], faces.first[joint + 1]):
         stiff = faces.shear[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
-        rub(first, change, late, limit, own)
-        total += own[0]
-        lost += own[4] / stiff
-        rate[1, 1] += stiff * own[2]
-        after[point] = slid[point] + own[1] / stiff
-        if own[3] != 0.0:
+        shear, over, by_change, by_limit, rubbing = _rubbed(first, change, late, limit)
+        total += shear
+        lost += rubbing / stiff
+        rate[1, 1] += stiff * by_change
+        after[point] = slid[point] + over / stiff
+        if by_limit != 0.0:
             for k in range(3):
-                rate[1, k] += own[3] * friction * normals[point, 1 + k]
+                rate[1, k] += by_limit * friction * normals[point, 1 + k]
     force[1] += total
     return total, lost

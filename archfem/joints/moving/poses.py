@@ -49,6 +49,16 @@ def _reach(sides, joint, side, q):  # type: ignore
 
 
 @numba.njit(cache=True)
+def _midway(sides, joint, side, before, after):  # type: ignore
+    """Half-way through a step: r + U ξ on the mean, half the turn, and cosine and sine there."""
+    turn = sides.start[joint, side] + 2
+    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
+    half = 0.5 * (after[turn] - before[turn])
+    middle = before[turn] + half
+    return (0.5 * (x0 + x1), 0.5 * (y0 + y1)), half, (np.cos(middle), np.sin(middle))
+
+
+@numba.njit(cache=True)
 def pose(sides, joint, side, q, found):  # type: ignore
     """Find the pose of a face.
 
@@ -93,11 +103,8 @@ def pose_gradient(sides, joint, side, before, after, rates):  # type: ignore
     rates[:] = 0.0
     if start < 0:
         return
-    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
-    x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-    half = 0.5 * (after[start + 2] - before[start + 2])
-    middle = before[start + 2] + half
-    c, s, shrunk, mean = np.cos(middle), np.sin(middle), sinc(half), np.cos(half)
+    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
+    shrunk, mean = sinc(half), np.cos(half)
     rates[0, 0] = rates[1, 1] = rates[2, 2] = 1.0
     rates[0, 2], rates[1, 2] = -shrunk * (s * x + c * y), shrunk * (c * x - s * y)
     for k in range(size - 3):
@@ -123,11 +130,8 @@ def pose_bend(sides, joint, side, before, after, force, rates):  # type: ignore
     rates[:] = 0.0
     if start < 0:
         return
-    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
-    x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-    half = 0.5 * (after[start + 2] - before[start + 2])
-    middle = before[start + 2] + half
-    c, s, shrunk, mean = np.cos(middle), np.sin(middle), sinc(half), np.cos(half)
+    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
+    shrunk, mean = sinc(half), np.cos(half)
     along = force[0] * (c * x - s * y) + force[1] * (s * x + c * y)  # F·R x
     across = -force[0] * (s * x + c * y) + force[1] * (c * x - s * y)  # F·J R x
     rates[2, 2] = 0.5 * (sinc_rate(half) * across - shrunk * along)
