@@ -21,6 +21,7 @@
     ladder        which rung, mesh and step a scene needs
     candidates    models that may be chosen, and finer ones to compare them with
     yardstick     what a model and its steps err by
+    smallness     what it errs by to take displacements as small
     probe         what a short run tells of a model
     tradeoff      speed against error over settings
 

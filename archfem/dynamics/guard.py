@@ -8,6 +8,7 @@ from archfem.arrays import Array
 from archfem.dynamics.energy import Balance
 from archfem.dynamics.steps import Batch, State
 from archfem.errors import DidNotConverge
+from archfem.models.gauges import Gauges
 from archfem.models.model import Model
 from archfem.models.moving import Moving
 
@@ -19,6 +20,10 @@ DOUBTFUL = 0.05
 WRONG = 0.5
 """Gain of energy beyond the work of the ground, relative to the largest exchanged, above which a
 run is wrong: damping aside, which only takes, half of what moves came from nowhere."""
+
+TURNED = 0.01
+"""Turn of a joint above which a run with small displacements is doubted aloud: from there on those
+of six arches and columns erred by 0.01 to 0.03 in the largest |e| [rad]."""
 
 LOOK = 32
 """Steps between two looks at displacements."""
@@ -34,12 +39,14 @@ class Guard:
     Attributes:
         worst: largest drift of energy so far, as a fraction of the largest exchanged [-].
         largest_displacement: of any point of a block, at the looks taken [m].
+        largest_turn: of any joint, at the looks taken [rad].
     """
 
     def __init__(self, model: Model, start: Batch) -> None:
         self.model = model
         self.worst = 0.0
         self.largest_displacement = 0.0
+        self.largest_turn = 0.0
         self._balance = Balance(*start.energy[0, :2])
         self._small = not isinstance(model, Moving)
         self._depth = float(model.structure.depths.min())
@@ -69,6 +76,10 @@ class Guard:
     def _look(self, state: State) -> None:
         moved = np.abs(self.model.cells.displacement(state.q)).max()
         self.largest_displacement = max(self.largest_displacement, float(moved))
+        if self._small:
+            gauges = Gauges.on(self.model)
+            turned = gauges.faces(gauges.read(state.q))[1]
+            self.largest_turn = max(self.largest_turn, float(np.abs(turned).max()))
 
     def judge(self) -> None:
         """Warn of what is doubtful in what was added.
@@ -105,6 +116,13 @@ class Guard:
                 "energy",
                 f"energy drifts: by t = {time:.4g} s {abs(share):.0%} of the largest exchanged "
                 f"{what}; compare with a smaller dt, or with more damping",
+            )
+        if self._small and self.largest_turn > TURNED:
+            self._tell(
+                "turn",
+                f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
+                "displacements as small errs by 0.01 and more in |e| there; compare with "
+                "build(…, displacements='large')",
             )
         if self._small and self.largest_displacement > self._depth:
             self._tell(

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
 from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.smallness import error_of_small
 from archfem.dynamics.yardstick import Steps, Yardstick
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
@@ -111,7 +112,8 @@ def choose(
     """Return the cheapest model, and its steps, whose predicted error is within a tolerance.
 
     Steps may have half of it, models what is left. Steps become finer while they err by more,
-    models while they do. Where the tolerance is not met, the best is given, and a warning says so.
+    models while they do. Where the tolerance is not met, the best is given, and a warning says so;
+    so it does where displacements are too large to be taken as small.
 
     Args:
         structure: what stands.
@@ -135,9 +137,12 @@ def choose(
             break
     in_model, model = min(found, key=lambda each: (each[0] > allowed, each[0]))
     error = in_model + in_time
-    told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered))
+    small = error_of_small(yardstick, steps)
+    told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered), small)
     if not told.met:
         logger.warning("%s", _unmet(told, in_model <= allowed))
+    if small > tolerance:
+        logger.warning("%s", _far(small, tolerance))
     return model.predicted(told)
 
 
@@ -188,6 +193,16 @@ def _unmet(told: Prediction, model_errs_little: bool) -> str:
     else:
         remedy = "no shorter steps are tried: what comes of impacts hangs on more than the steps"
     return f"no setting meets the tolerance; the best is {told.text}; {remedy}"
+
+
+def _far(error: float, tolerance: float) -> str:
+    """That displacements are not small, and what to do."""
+    found = f"errs by {error:.2g} in |e|" if error < 1.0 else "lets stand what falls"
+    return (
+        f"to take displacements as small {found}, and {tolerance:g} was asked for: joints turn "
+        "and slide too far; build(…, fidelity='rigid' or 'faces', displacements='large') follows "
+        "them"
+    )
 
 
 def _yardstick(finest: Model, motion: Motion | None, damping: Damping) -> Yardstick:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import eigsh
 
 from archfem.arrays import Array
+from archfem.dynamics.history import History
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
@@ -86,6 +87,15 @@ def peaks(
         DidNotConverge: a step failed.
     """
     run = time_history(model, motion, damping=damping, dt=dt, tolerance=tolerance, start=start)
+    return peaks_of(run)
+
+
+def peaks_of(run: History) -> Array:
+    """Return the largest |e| of each judged joint over a run (n,) [-]; 0.5 where it came apart.
+
+    Args:
+        run: of any model.
+    """
     return abs(judged(run.joints)["eccentricity"]).fillna(0.5).max("time").values
 
 

@@ -30,6 +30,8 @@ class Prediction:
         pace: tolerance of |e| by which they do so [-]; None where there is a time step.
         considered: settings that were tried, in that order, and the error predicted of each: of
             steps alone, then of models with the steps taken.
+        of_small: error of taking displacements as small, which no finer model lessens [-];
+            infinite where blocks fall that small displacements let stand.
     """
 
     error: float
@@ -38,10 +40,11 @@ class Prediction:
     dt: float | None
     pace: float | None
     considered: tuple[tuple[str, float], ...]
+    of_small: float = 0.0
 
     @property
     def met(self) -> bool:
-        """Whether the error is within the tolerance."""
+        """Whether the error of model and steps is within the tolerance."""
         return self.error <= self.tolerance
 
     @property
@@ -51,7 +54,8 @@ class Prediction:
         tried = "; ".join(f"{name}: {error:.2g}" for name, error in self.considered)
         return (
             f"predicted to err by {self.error:.2g} in the largest |e|, of which {self.in_time:.2g} "
-            f"by steps of {steps}; {self.tolerance:g} was asked for (tried: {tried})"
+            f"by steps of {steps}, and by {self.of_small:.2g} because displacements are taken as "
+            f"small; {self.tolerance:g} was asked for (tried: {tried})"
         )
 
 
