@@ -186,7 +186,8 @@ def restitution_damping(
     """Return damping by which a rocking block keeps a wanted part of its turning at an impact.
 
     It is found by runs of the block, as by `restitution`, to 1e-4 of r. What serves one block and
-    contact does not serve another: the impact of a stiffer joint is shorter.
+    contact does not serve another: the impact of a stiffer joint is shorter. It serves large
+    displacements as well, where r is the same to 0.005.
 
     Args:
         coefficient: ω after over ω before [-]; None is Housner's, 1 - 3/2 sin² α.
