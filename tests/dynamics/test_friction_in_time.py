@@ -62,6 +62,7 @@ def test_newmarks_block_slides_as_far_as_it_should():
     assert slid(0.3, 3e11, pulse(), 2.5e-4) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_elastic_slip_errs_in_proportion_to_its_size():
     """Of a block that stops and stays the error is as 1/k_s, if steps are short enough."""
     expected, _ = slide(pulse().horizontal, 0.05, 0.3 * GRAVITY)
@@ -94,7 +95,10 @@ def test_newmarks_block_under_an_earthquake(friction):
     assert abs(slid(friction, 1e11, motion, 2.5e-4) - expected) < 1e-3 * path
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.2, 0.3])
+@pytest.mark.parametrize(
+    "friction",
+    [pytest.param(0.1, marks=pytest.mark.slow), 0.2, pytest.param(0.3, marks=pytest.mark.slow)],
+)
 def test_newmarks_block_under_a_record(friction):
     """The first 10 s of Erzincan: 0.37, 0.20 and 0.06 m, to 1e-4 of the way."""
     if not RECORDS.is_dir():

@@ -50,6 +50,7 @@ def test_steps_are_long_at_rest_and_short_in_an_impact(ring):
     assert run.dataset.attrs["shortest_step"] == pytest.approx(steps.min())
 
 
+@pytest.mark.slow
 def test_snes_and_strategies_take_the_same_steps(ring):
     model, dead = ring
     motion = af.Motion.synthetic(duration=4.0, pga=2.5, seed=2).cut(1.0, 1.1)

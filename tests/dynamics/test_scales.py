@@ -100,6 +100,7 @@ def test_search_closes_in_on_every_threshold():
     assert len(found.runs) <= 10 + 5 * 4  # ladder, and ln(√2) / ln(1.02) halved to 1 for each
 
 
+@pytest.mark.slow
 def test_every_run_of_a_search_has_the_criteria(on_piers):
     motion = af.Motion.synthetic(duration=2.0, pga=6.0, seed=2)
     given = {"damping": DAMPING, "criteria": af.Criteria(hinge=0.4, failures=60), "dt": 0.005}

@@ -121,6 +121,7 @@ def descent(structure, motion, x):
     return -v - turn * (point[0] - structure.blocks[number].centroid[0])
 
 
+@pytest.mark.slow
 def test_more_cover_spreads_axles_and_carries_more():
     """Of a weightless fill without strength, only the spreading is left."""
     soil = af.Material(SOIL.young, SOIL.poisson, 1e-3, None, "light")

@@ -75,7 +75,7 @@ def pressed(structure, move):
     return float(on_wall(structure, af.pushover(model, way, stop=stop).joints)[-1])
 
 
-@pytest.mark.parametrize("size", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("size", [1.0, 0.5, pytest.param(0.25, marks=pytest.mark.slow)])
 def test_compliance_does_not_depend_on_the_size(size):
     """A fill between smooth walls is pressed like a bar: E ε, whatever is cut, clipped or merged.
 
@@ -104,7 +104,16 @@ def test_an_oedometer_is_as_compliant_as_a_bar(rows):
     assert work == pytest.approx(exact, rel=0.3 / rows**2)
 
 
-@pytest.mark.parametrize(("angle", "rows"), [(20.0, 1), (20.0, 4), (30.0, 2), (40.0, 1), (40.0, 4)])
+@pytest.mark.parametrize(
+    ("angle", "rows"),
+    [
+        (20.0, 1),
+        pytest.param(20.0, 4, marks=pytest.mark.slow),
+        (30.0, 2),
+        (40.0, 1),
+        pytest.param(40.0, 4, marks=pytest.mark.slow),
+    ],
+)
 def test_active_force_is_that_of_the_best_wedge(angle, rows):
     """The wedge on the joints at 60° presses with cot 60° tan(60° - φ); Rankine's where φ = 30°."""
     found = pressed(smooth_box(angle, rows), 0.004)
@@ -113,7 +122,15 @@ def test_active_force_is_that_of_the_best_wedge(angle, rows):
     assert found == pytest.approx(rankine, rel={20.0: 0.012, 30.0: WEDGE, 40.0: 0.034}[angle])
 
 
-@pytest.mark.parametrize(("angle", "rows"), [(20.0, 2), (30.0, 1), (30.0, 2), (40.0, 2)])
+@pytest.mark.parametrize(
+    ("angle", "rows"),
+    [
+        pytest.param(20.0, 2, marks=pytest.mark.slow),
+        (30.0, 1),
+        pytest.param(30.0, 2, marks=pytest.mark.slow),
+        pytest.param(40.0, 2, marks=pytest.mark.slow),
+    ],
+)
 def test_passive_force_is_that_of_the_best_wedge(angle, rows):
     """The wedge on the joints at 30° resists with cot 30° tan(30° + φ)."""
     found = pressed(smooth_box(angle, rows, passive=True), -0.08)
@@ -132,6 +149,7 @@ def test_where_no_joint_meets_the_foot_forces_converge_in_proportion_to_the_size
     assert np.all(errors[1:] < 0.6 * errors[:-1])
 
 
+@pytest.mark.slow
 def test_fill_bears_no_tension():
     """Elastic fill hangs between walls that part; pieces open, and rest on the floor."""
     glue = af.Contact(1e10, 1e10, None)

@@ -175,7 +175,9 @@ def test_cells_of_touching_blocks_meet(make, cell):
         assert np.abs((gaps @ stretched.ravel())[between]).max() < 1e-12
 
 
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize(
+    "cell", [pytest.param("quadrilateral", marks=pytest.mark.slow), "triangle"]
+)
 def test_supports_of_a_bridge_carry_its_weight(cell):
     structure = viaduct(paving=af.shapes.Paving(thickness=0.2))
     made = af.build(structure, fidelity="full", cells=(2, 2), cell=cell)

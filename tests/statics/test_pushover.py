@@ -39,13 +39,14 @@ REACHED = 5e-3
 """Relative: how near a pushover must come to the limit of the polygon it models."""
 
 
-SLOW = [("force", "eccentric"), ("force", "two at the crown")]
+QUICK = [("force", "sideways"), ("displacement", "eccentric"), ("arc length", "two at the crown")]
+"""Each way to follow a path, and each load, once."""
 
 
 @pytest.mark.parametrize(
     ("control", "load"),
     [
-        pytest.param(*each, marks=pytest.mark.slow if each in SLOW else ())
+        pytest.param(*each, marks=() if each in QUICK else pytest.mark.slow)
         for each in product(CONTROLS, LOADS)
     ],
 )

@@ -69,12 +69,14 @@ def test_fill_in_pieces_creeps_to_rest(bridge):
     assert at_most_coulomb(fill, found.joints, 10e3)
 
 
+@pytest.mark.slow
 def test_upright_ends_of_dry_sand_flow(bridge):
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=20.0)
     with pytest.raises(af.DidNotConverge, match="cannot carry it"):
         af.dead_load(af.build(fill, fidelity="rigid", cells=(1, 1)))
 
 
+@pytest.mark.slow
 def test_a_support_spreads_under_fill_in_pieces(bridge):
     """Newton's method alone loses it after 3 cm; each step is in balance, and none beyond Coulomb.
 

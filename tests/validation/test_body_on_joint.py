@@ -113,6 +113,7 @@ def test_a_joint_that_never_slides_is_judged_by_the_criteria(factor, slides):
     assert bool(judged["slide"][0]) == slides
 
 
+@pytest.mark.slow
 def test_rocking_period():
     """Quarter period of free rocking from θ₀ = 0.1 α: sqrt(2 I₀ θ₀ / (W b)), 0.737 s in all."""
     stiff = af.Contact(1e12, 1e12, 0.6)

@@ -31,9 +31,9 @@ def curve(load, rule, control, stiff=1.0):
     ("load", "rule", "peak"),
     [
         (POINT, "nodal", 53.53),
-        (SIDEWAYS, "nodal", 0.4427),
+        pytest.param(SIDEWAYS, "nodal", 0.4427, marks=pytest.mark.slow),
         (POINT, "exact", 44.93),
-        (SIDEWAYS, "exact", 0.3818),
+        pytest.param(SIDEWAYS, "exact", 0.3818, marks=pytest.mark.slow),
     ],
 )
 def test_peaks(load, rule, peak):

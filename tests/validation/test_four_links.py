@@ -100,6 +100,7 @@ def links():
     return found.factor, Links(structure, hinges), hinges
 
 
+@pytest.mark.slow
 def test_it_follows_four_links_until_a_hinge_moves_on():
     """Within 0.1 % up to a turn of 0.027 at the springing, where half of the factor is gone."""
     factor, chain, _ = links()

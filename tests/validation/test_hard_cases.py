@@ -4,6 +4,13 @@ import pytest
 from hard.table import CASES
 
 LONG = (
+    "fill of 0.5 MPa",
+    "0.98 × least thickness, rigid",
+    "filled span at 0.8 g, 0.4 s",
+    "filled span, rungs by part",
+    "filled span, damping 'none', average acceleration",
+    "sidewalls retained",
+    "piers of 20 m, 50 courses",
     "contact stepper, faces, exact",
     "chain stepper, faces, exact",
     "paving on an eroded deck",

@@ -68,6 +68,7 @@ def test_semicircle_of_few_voussoirs(voussoirs, ratio):
     assert not af.stands(ring(0.98 * found, voussoirs))
 
 
+@pytest.mark.slow
 def test_semicircle_with_a_joint_where_it_hinges(least):
     assert least == pytest.approx(0.10748, abs=1e-5)
     spread = af.collapse_factor(
@@ -108,6 +109,7 @@ def test_below_that_friction_more_thickness_is_needed():
     assert not af.stands(ring(1.02 * free, 50, friction=0.39))
 
 
+@pytest.mark.slow
 def test_embrace_of_120_degrees():
     """Of 76 stones, joints 25 from the crown lie at 39.47°, as near to 39.5° as matters."""
     found = af.minimum_thickness(lambda t: ring(t, 76, embrace=120.0), friction=None)

@@ -104,6 +104,7 @@ def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_da
     assert asked == [built[0][1]]
 
 
+@pytest.mark.slow
 def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
     """A function of the model, and what it gives, are the same to the last digit."""
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
@@ -156,6 +157,7 @@ def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not(law):
     assert 1.0 / 2.0 < told.error / actual < 5.0
 
 
+@pytest.mark.slow
 def test_without_a_motion_a_severe_one_is_assumed(ring):
     model = af.build(ring, fidelity="auto", tolerance=0.02)
     assert model.prediction.met
@@ -178,6 +180,7 @@ def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
     assert [name for name, error in told.considered if error == told.error]
 
 
+@pytest.mark.slow
 def test_steps_alone_are_refined_where_they_err(ring):
     """No finer mesh is tried for what steps of 20 ms err by; steps of any length do better."""
     motion = af.Motion.synthetic(duration=1.5, pga=2.5, seed=5)
@@ -190,6 +193,7 @@ def test_steps_alone_are_refined_where_they_err(ring):
     assert free.in_time <= 0.02
 
 
+@pytest.mark.slow
 def test_error_in_time_is_that_against_very_short_steps(ring):
     """By steps half as long alone, against 0.16 ms; the yardstick's margin taken off."""
     motion = af.Motion.synthetic(duration=2.0, pga=2.5, seed=5)
@@ -211,6 +215,7 @@ def test_the_strongest_part_holds_the_peak():
     assert part.pga == pytest.approx(motion.pga)
 
 
+@pytest.mark.slow
 def test_study_of_speed_against_error(ring):
     """Exact facets beat springs on one mesh; what is chosen is the fastest within the tolerance.
 

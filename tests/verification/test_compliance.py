@@ -215,6 +215,7 @@ def test_matrix_that_is_not_definite_is_refused():
         factorised(matrix[plan.order][:, plan.order], plan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["springs", "facets"])
 def test_released_forces_leave_no_tension(rule):
     """Against the joint law as SNES has it: closed stiffness less λ is the law's own force."""

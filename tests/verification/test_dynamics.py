@@ -97,6 +97,7 @@ def pushed(model, dead):
     return equation.released(state), 0.5 * velocity @ (model.mass @ velocity)
 
 
+@pytest.mark.slow
 def test_energy_balance_of_an_undamped_rocking_ring(model, dead):
     """A push that opens joints: what the weight and the springs give is kept, but for O(dt²)."""
     start, given = pushed(model, dead)
@@ -148,7 +149,14 @@ def test_free_fall(stack):
     assert rate == pytest.approx(2.0 * 9.81, rel=1e-9)
 
 
-@pytest.mark.parametrize("joints", ["closed", "initial", "none"])
+@pytest.mark.parametrize(
+    "joints",
+    [
+        "closed",
+        pytest.param("initial", marks=pytest.mark.slow),
+        pytest.param("none", marks=pytest.mark.slow),
+    ],
+)
 def test_damping_ratio_is_met_at_its_frequencies(stack, joints):
     """Logarithmic decrement of a closed structure; "none" leaves rigid blocks the mass part."""
     model = af.build(stack, fidelity="rigid")
