@@ -77,6 +77,28 @@ def test_a_file_that_is_not_there(ring):
         read_mesh(ring, "none.msh")
 
 
+@pytest.mark.parametrize("hidden", ["", "\n", "// $MeshFormat\n", "$Comments\n$EndComments\n"])
+def test_a_script_is_not_a_mesh_and_is_never_run(stack, tmp_path, hidden):
+    mark, path = tmp_path / "ran", tmp_path / "script.msh"
+    path.write_text(f'{hidden}SystemCall "touch {mark}";\n')
+    with pytest.raises(
+        af.errors.MeshError, match=r"does not begin with \$MeshFormat.*run it as a script"
+    ):
+        read_mesh(stack, path)
+    assert not mark.exists()
+
+
+def test_nothing_beside_or_behind_a_mesh_is_run(stack, tmp_path):
+    """Gmsh merges the options beside a file, a script; what follows the last section is ignored."""
+    mark, path = tmp_path / "ran", tmp_path / "stack.msh"
+    write_mesh(stack, path)
+    call = f'SystemCall "touch {mark}";\n'
+    path.with_suffix(".msh.opt").write_text(call)
+    path.write_bytes(path.read_bytes() + call.encode())
+    read_mesh(stack, path)
+    assert not mark.exists()
+
+
 def test_a_face_of_several_chords_gets_a_cell_for_each():
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
     assert len(mesh(ring, af.models.Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import gmsh
@@ -23,6 +24,9 @@ from archfem.models.fem.division import Division, divided
 
 FRONTAL = 6
 """Gmsh's number for the frontal Delaunay algorithm."""
+
+MESH = b"$MeshFormat"
+"""How a file of gmsh begins that is a mesh; anything else gmsh may read as a script."""
 
 FULL_QUAD = 3
 """Gmsh's number for recombination that leaves no triangle: it splits a mesh twice as coarse."""
@@ -91,13 +95,21 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
 
     Raises:
         InvalidInput: there is no such file.
-        MeshError: its groups are not the structure's blocks and joints.
+        MeshError: it is no mesh, or its groups are not the structure's blocks and joints.
     """
     if not Path(path).is_file():
         raise InvalidInput(f"there is no mesh file {path}: write it with write_mesh")
-    with _model(structure.name):
+    given = Path(path).read_bytes()
+    if not given.startswith(MESH):
+        raise MeshError(
+            f"{path} does not begin with {MESH.decode()}: gmsh would run it as a script, commands "
+            "of the shell and all; give a mesh as write_mesh makes it"
+        )
+    with _model(structure.name), TemporaryDirectory() as alone:
+        mesh_only = Path(alone) / "mesh.msh"  # without options beside it, which gmsh runs too
+        mesh_only.write_bytes(given)
         try:
-            gmsh.merge(str(path))
+            gmsh.merge(str(mesh_only))
         except Exception as error:  # gmsh raises nothing more specific
             raise MeshError(f"{path} is not a gmsh mesh: {error}") from error
         return _imported(structure)
