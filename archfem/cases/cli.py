@@ -89,6 +89,9 @@ def _parser() -> argparse.ArgumentParser:
     study = case_command("study", "several cases side by side: when do mechanisms form in each?")
     study.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     study.set_defaults(command=commands.study)
+    ready = chosen.add_parser("compile", help="compile once what time steps need: about a minute")
+    ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
+    ready.set_defaults(command=commands.compile_steps)
     _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
 

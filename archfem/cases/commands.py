@@ -99,6 +99,18 @@ def study(given: argparse.Namespace) -> None:
     _tell_written(write_study(asked, found, text, folder))
 
 
+def compile_steps(given: argparse.Namespace) -> None:
+    """Compile what time steps need, so that no run has to wait for it.
+
+    Args:
+        given: `jobs`, how many processes compile; None for one a core.
+    """
+    from archfem.dynamics.compiling import compile_all
+
+    for kind, seconds in compile_all(given.jobs):
+        print(f"{seconds:5.0f} s: {kind}", flush=True)
+
+
 def mesh(given: argparse.Namespace) -> None:
     """Write the mesh of a case as a gmsh file.
 

@@ -6,6 +6,7 @@
     impact        what a rocking block loses at impacts, and damping for a wanted loss
     steps         what passes between stepper and run: states, steps, batches
     stepping      the one stepper and its strategies
+    compiling     all compiled code, compiled beforehand
     falling       loose rigid blocks: impacts, and the way to the ground
     collapse      from a structure that parts to what lies on the ground
     energy        the energy balance of a run
