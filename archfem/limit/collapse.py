@@ -146,7 +146,8 @@ def collapse_factor(
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block; None for no limit.
         fill: strength of blocks softer than their joints, which become weight and pressures on the
-            stones (`Fill`), with those that rest on them; None where there are none.
+            stones (`Fill`), with those that rest on them; None where there are none, or where they
+            are cut into pieces (`jointed_fill`), whose joints have that strength.
 
     Returns:
         The factor, how it was found, and the mechanism.

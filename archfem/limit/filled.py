@@ -16,7 +16,7 @@ from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.limit.blocks import rigid_load
 from archfem.limit.fill import Fill
-from archfem.limit.skeleton import Skeleton, skeleton_of
+from archfem.limit.skeleton import Skeleton, skeleton_of, whole_of
 from archfem.limit.strips import Profile
 from archfem.masonry.actions import BodyForce, PointLoad
 from archfem.masonry.rigid_motion import first_coordinate, motion_of
@@ -262,9 +262,12 @@ class Stones:
 def stones_of(structure: Structure, fill: Fill | None) -> Stones:
     """Return what stands of a structure in limit analysis, under its fill.
 
+    A fill that is cut into pieces has the strength of its joints and needs none told: its pieces
+    are rigid blocks as stones are.
+
     Args:
         structure: the whole.
-        fill: strength of its yielding blocks; None where it has none.
+        fill: strength of its yielding blocks; None where it has none, or only in joints.
 
     Raises:
         InvalidInput: there are such blocks and no strength of theirs, or the other way round; or
@@ -272,6 +275,8 @@ def stones_of(structure: Structure, fill: Fill | None) -> Stones:
     """
     soil = yielding_blocks(structure)
     names = [structure.blocks[number].name for number in soil]
+    if names and fill is None and all(structure.blocks[number].grain for number in soil):
+        return Stones(structure, None, whole_of(structure))
     if names and fill is None:
         raise InvalidInput(
             f"blocks {names} are softer than the joints around them: rigid, they would hold every "

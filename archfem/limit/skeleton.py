@@ -50,13 +50,32 @@ def skeleton_of(structure: Structure) -> Skeleton:
     Returns:
         What is left, and the numbers it has in the whole.
     """
-    everything = tuple(range(len(structure.blocks)))
-    blocks = _standing(structure, set(everything) - set(yielding_blocks(structure)))
+    everything = set(range(len(structure.blocks)))
+    blocks = _standing(structure, everything - set(yielding_blocks(structure)))
     if not set(blocks) & set(structure.free):
-        blocks = everything
+        return whole_of(structure)
+    return _left(structure, blocks)
+
+
+def whole_of(structure: Structure) -> Skeleton:
+    """Leave out nothing: every block is taken as rigid.
+
+    Args:
+        structure: the whole.
+
+    Returns:
+        All of it, with the numbers that it has.
+    """
+    return _left(structure, tuple(range(len(structure.blocks))))
+
+
+def _left(structure: Structure, blocks: tuple[int, ...]) -> Skeleton:
+    """Some of the blocks, with their joints; what supports do to each other is no matter."""
     place = {number: k for k, number in enumerate(blocks)}
     joints = tuple(
-        number for number, joint in enumerate(structure.joints) if place.keys() >= set(joint.blocks)
+        number
+        for number, joint in enumerate(structure.joints)
+        if place.keys() >= set(joint.blocks) and set(joint.blocks) & set(structure.free)
     )
     left = replace(
         structure,
@@ -66,7 +85,7 @@ def skeleton_of(structure: Structure) -> Skeleton:
             for joint in map(structure.joints.__getitem__, joints)
         ),
     )
-    return Skeleton(left, blocks, joints, len(everything))
+    return Skeleton(left, blocks, joints, len(structure.blocks))
 
 
 def _standing(structure: Structure, blocks: set[int]) -> tuple[int, ...]:

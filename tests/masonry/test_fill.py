@@ -139,6 +139,39 @@ def test_passive_force_is_that_of_the_best_wedge(angle, rows):
     assert found == pytest.approx(rankine, rel={20.0: 0.013, 30.0: WEDGE, 40.0: 0.035}[angle])
 
 
+@pytest.mark.parametrize("passive", [False, True], ids=["active", "passive"])
+@pytest.mark.parametrize("angle", [20.0, 30.0, 40.0])
+def test_limit_analysis_of_the_pieces_finds_the_same_wedges(angle, passive):
+    """As rigid blocks: the wall that gives way bears the least thrust, pushed in the greatest."""
+    way = af.Settlement("wall", (-1.0 if passive else 1.0, 0.0, 0.0))
+    found = af.collapse_factor(smooth_box(angle, 2, passive=passive), live=way)
+    thrust = abs(found.factor) / (0.5 * 18e3 * HEIGHT**2)
+    inclined = radians(30.0 + angle if passive else 60.0 - angle)
+    assert thrust == pytest.approx(tan(inclined) * sqrt(3.0) ** (1 if passive else -1), rel=1e-8)
+    assert found.sliding
+
+
+@pytest.mark.slow
+def test_without_dilatancy_the_wedge_is_the_same():
+    found = af.collapse_factor(
+        smooth_box(30.0, 1, passive=True),
+        live=af.Settlement("wall", (-1.0, 0.0, 0.0)),
+        friction="nonassociated",
+    )
+    assert abs(found.factor) / (0.5 * 18e3 * HEIGHT**2) == pytest.approx(3.0, rel=1e-8)
+
+
+def test_dry_pieces_do_not_stand_with_a_free_upright_end():
+    """With c = γ H / 4 or more, tan φ aside, they do (Rankine's critical height is 4 c / γ)."""
+    whole = box(3.0, af.Contact(1e9, 4e8, 0.6), af.Contact(1e9, 4e8, 0.6))
+    free = [number for number, each in enumerate(whole.blocks) if each.name != "wall"]
+    open_end = af.masonry.assembled(
+        [whole.blocks[number] for number in free], lambda a, b: af.Contact(1e9, 4e8, 0.6)
+    )
+    assert not af.stands(jointed_fill(open_end, 0.5, angle=30.0))
+    assert af.stands(jointed_fill(open_end, 0.5, angle=30.0, cohesion=18e3 * HEIGHT / 4.0))
+
+
 @pytest.mark.slow
 def test_where_no_joint_meets_the_foot_forces_converge_in_proportion_to_the_size():
     """Slip lines then leave the wall up to a triangle's height above its foot."""
