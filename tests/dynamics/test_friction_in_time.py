@@ -62,6 +62,17 @@ def test_newmarks_block_slides_as_far_as_it_should():
     assert slid(0.3, 3e11, pulse(), 2.5e-4) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("method", ["contact", "compliance"])
+def test_a_block_that_slides_far_is_never_left_to_snes(method):
+    """Its slip, 0.8 m, rounds to more than 1e-12 of its weight times its stiffness can tell."""
+    model, motion, dt = block(0.1, 1e11), pulse(), 1e-3
+    equation, dead = af.dynamics.Equation(model, motion), af.dead_load(model)
+    start = equation.at_rest(dead.q, memory=dead.model.memory)
+    batches = list(stepper_for(method, equation, start, dt).batches(start, dt, motion.duration))
+    assert not any(batch.fallback for batch in batches)
+    assert np.abs(batches[-1].state(len(batches[-1].times) - 1).memory).min() > 0.5
+
+
 @pytest.mark.slow
 def test_elastic_slip_errs_in_proportion_to_its_size():
     """Of a block that stops and stays the error is as 1/k_s, if steps are short enough."""

@@ -21,6 +21,7 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     small_problem    of the joint points that open or slide: what solves it
     open_points      its solution at an instant
     sliding_points   its solution over a step
+    newton_pass      of which this is one pass
     modal            the strategy in the modes of the closed structure
     banded           the strategy for chains of blocks, with a banded factor
     band             that factor

@@ -161,7 +161,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
     shift(law, start)
     gap[:] = start
     passes = 0
-    while passes < ITERATIONS:
+    for _ in range(ITERATIONS):
         passes += 1
         rows = np.flatnonzero(near)
         if len(rows) > 0:

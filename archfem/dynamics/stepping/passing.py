@@ -58,13 +58,14 @@ def _measure(system, kept, step, states, ground, results, memory):  # type: igno
 def _started(system, state, memory):  # type: ignore
     """Images of a state under M, K and R, its gaps, and the shear that its joints remember."""
     linear, law = system.linear, system.linear.law
-    size, rows, points = state.shape[1], len(law.start), len(law.group)
+    size, rows, points = state.shape[1], len(law.start), len(law.points)
     gap, rate = np.empty(rows), np.empty(rows)
     times(linear.opening, state[0], gap)
     times(linear.opening, state[1], rate)
     gap += law.offset
     law.start[:], law.speed[:] = gap, rate * (2.0 / linear.numbers.velocity[1])
-    law.slid[: len(memory)] = memory
+    for point in range(len(memory)):
+        law.points[point].slid = memory[point]
     images, room = images_of(linear, state), np.empty((2, points))
     before, force = gap - law.speed, np.zeros(rows)
     return Passed(images, gap, before, force, np.empty(size), np.empty(size), room)
@@ -90,14 +91,14 @@ def _measured(system, kept, step, states, ground, results, memory):  # type: ign
 @numba.njit(cache=True)
 def _sum_up(law, resultants):  # type: ignore
     """N, V, M of every joint over the step, V added to what is there."""
-    work, arm, joint = law.work, law.still.arm, law.still.joint
+    pressed, arm, joint, points = law.work.points, law.still.arm, law.still.joint, law.points
     resultants[:, 0] = resultants[:, 2] = 0.0
     for point in range(len(arm)):
         number = joint[point]
-        resultants[number, 0] -= work.normal[point]
-        resultants[number, 2] -= work.normal[point] * arm[point]
-        if law.group[point] >= 0:
-            resultants[number, 1] += work.shear[point]
+        resultants[number, 0] -= pressed[point].normal
+        resultants[number, 2] -= pressed[point].normal * arm[point]
+        if points[point].group >= 0:
+            resultants[number, 1] += pressed[point].shear
 
 
 @numba.njit(cache=True)
@@ -107,53 +108,54 @@ def _go_on(law, kept, energy, memory):  # type: ignore
     Energies are as if joints held tension and did not slide: what open ones do not store or damp
     is taken off, and what friction takes is added.
     """
-    work, late, start, (opened, pulled) = law.work, law.late, law.start, kept.room
+    late, start, points, (opened, pulled) = law.late, law.start, law.points, kept.room
+    pressed, stretches, gap, speed = law.work.points, law.stretches, kept.gap, law.speed
     if late > 0.0:
-        energy[3] += _lagged(law, kept.gap)
-    for point in range(len(law.group)):
-        row = law.group[point]
+        energy[3] += _lagged(law, gap)
+    for k in range(len(points)):
+        row = points[k].group
         if row >= 0:
-            stiffness, slip = law.shear[point], law.gain * (kept.gap[row] - start[row])
-            energy[3] += work.lost[point] - late * stiffness * slip**2
+            slip = law.gain * (gap[row] - start[row])
+            energy[3] += pressed[k].lost - late * points[k].elastic * slip**2
     for row in range(len(start)):
-        moved = law.gain * (kept.gap[row] - start[row])
+        moved = law.gain * (gap[row] - start[row])
         start[row] += moved
-        law.speed[row] = 2.0 * moved - law.speed[row]
-    for point in range(len(law.group)):
-        stretch = law.stretch[point]
-        ends = start[law.near[stretch]], start[law.far[stretch]]
-        opened[point] = between(ends, law.share[point])
+        speed[row] = 2.0 * moved - speed[row]
+    for k in range(len(points)):
+        stretch = stretches[points[k].stretch]
+        opened[k] = between((start[stretch.near], start[stretch.far]), points[k].share)
     pulls(opened, law.still, pulled)
-    for point in range(len(law.group)):
-        energy[1] -= 0.5 * opened[point] * pulled[point]
-        row = law.group[point]
+    for k in range(len(points)):
+        energy[1] -= 0.5 * opened[k] * pulled[k]
+        point, row = points[k], points[k].group
         if row >= 0:
-            law.slid[point] += work.slid[point]
-            memory[point] = law.slid[point]
-            elastic = start[row] - law.slid[point]
-            energy[1] += 0.5 * law.shear[point] * (elastic**2 - start[row] ** 2)
+            point.slid += pressed[k].slides
+            memory[k] = point.slid
+            elastic = start[row] - point.slid
+            energy[1] += 0.5 * point.elastic * (elastic**2 - start[row] ** 2)
     energy[1] += law.stored
 
 
 @numba.njit(cache=True)
 def _lagged(law, gap):  # type: ignore
     """What the lag of damping takes on openings, less that if joints were closed."""
-    work, start, lost = law.work, law.start, 0.0
-    for stretch in range(len(law.near)):
-        near, far = law.near[stretch], law.far[stretch]
-        first = start[near], start[far]
-        moved = law.gain * (gap[near] - first[0]), law.gain * (gap[far] - first[1])
+    start, points, carried, lost = law.start, law.points, law.work.stretches, 0.0
+    stretches = law.stretches
+    for number in range(len(stretches)):
+        part = stretches[number]
+        first = start[part.near], start[part.far]
+        moved = law.gain * (gap[part.near] - first[0]), law.gain * (gap[part.far] - first[1])
         last = first[0] + moved[0], first[1] + moved[1]
-        lost -= moved[0] * work.ends[stretch, 0] + moved[1] * work.ends[stretch, 1]
+        lost -= moved[0] * carried[number].near + moved[1] * carried[number].far
         if max(first[0], first[1], last[0], last[1]) <= 0.0:
             continue
-        for point in range(law.begin[stretch], law.begin[stretch + 1]):
-            stiffness, share = law.still.stiffness[point], law.share[point]
+        for point in range(part.begin, part.end):
+            stiffness, share = points[point].stiffness, points[point].share
             a, b, way = between(first, share), between(last, share), between(moved, share)
             if not law.still.facets:
                 lost += way * stiffness * point_means(a, b, 0.0, 0.0)[1]
             elif point % 2 == 0:
-                other = law.share[point + 1]
+                other = points[point + 1].share
                 ends = (a, between(first, other), b, between(last, other))
                 taken = facet_means(ends, 0.0, 0.0)[1]
                 lost += stiffness * (way * taken[0] + between(moved, other) * taken[1])

@@ -19,49 +19,52 @@ def press(law, gap, stretches):  # type: ignore
         gap: z, of all rows (r,) [m].
         stretches: their numbers (k,).
     """
-    half, facets, work = 0.5 * law.gain, law.still.facets, law.work
-    for stretch in stretches:
-        near, far = law.near[stretch], law.far[stretch]
-        moved = half * (gap[near] - law.start[near]), half * (gap[far] - law.start[far])
-        before = gap[near] - moved[0], gap[far] - moved[1]
-        after = gap[near] + moved[0], gap[far] + moved[1]
-        for point in range(law.begin[stretch], law.begin[stretch + 1], 2 if facets else 1):
-            other = point + 1 if facets else point
-            a, b = law.share[point], law.share[other]
+    half, facets, start, points = 0.5 * law.gain, law.still.facets, law.start, law.points
+    parts, pressed, carried = law.stretches, law.work.points, law.work.stretches
+    step, area = (2, 0.5) if facets else (1, 1.0)
+    for number in stretches:
+        part, found = parts[number], carried[number]
+        near, far = gap[part.near], gap[part.far]
+        moved = half * (near - start[part.near]), half * (far - start[part.far])
+        before, after = (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
+        found.near = found.far = found.first = found.mixed = found.last = 0.0
+        if max(before[0], before[1], after[0], after[1]) <= 0.0:
+            for k in range(part.begin, part.end):
+                point, passed = points[k], pressed[k]
+                passed.normal = point.near * near + point.far * far
+                passed.area = area * point.whole
+                passed.near = passed.far = 0.0
+            continue
+        for first in range(part.begin, part.end, step):
+            a, b = points[first].share, points[first + step - 1].share
             ends = between(before, a), between(before, b), between(after, a), between(after, b)
-            normal, taken, rate, time = _means(ends, (1.0 - half, 1.0 + half), facets)
-            stiffness, area = law.still.stiffness[point], law.area[point]
-            for k in range(other - point + 1):
-                work.normal[point + k] = stiffness * normal[k]
-                work.taken[point + k] = stiffness * taken[k]
-                work.area[point + k] = area * time[k]
-                by = stiffness * rate[k], stiffness * rate[k + 1]
-                work.rate[point + k, 0] = by[0] * (1.0 - a) + by[1] * (1.0 - b)
-                work.rate[point + k, 1] = by[0] * a + by[1] * b
-    _sum_up(law, stretches)
+            means = _means(ends, (1.0 - half, 1.0 + half), facets)
+            for end in range(step):
+                point, passed = points[first + end], pressed[first + end]
+                _open_point(point, passed, means, end, (a, b))
+                taken, share = point.stiffness * means[1][end], point.share
+                found.near += (1.0 - share) * taken
+                found.far += share * taken
+                found.first += (1.0 - share) * passed.near
+                found.mixed += (1.0 - share) * passed.far
+                found.last += share * passed.far
 
 
 @numba.njit(cache=True)
-def _sum_up(law, stretches):  # type: ignore
-    """λ of stretches and its derivatives, from those of their points."""
-    work = law.work
-    for stretch in stretches:
-        near = far = first = mixed = last = 0.0
-        for point in range(law.begin[stretch], law.begin[stretch + 1]):
-            share, taken = law.share[point], work.taken[point]
-            near += (1.0 - share) * taken
-            far += share * taken
-            first += (1.0 - share) * work.rate[point, 0]
-            mixed += (1.0 - share) * work.rate[point, 1]
-            last += share * work.rate[point, 1]
-        work.ends[stretch, 0], work.ends[stretch, 1] = near, far
-        work.rates[stretch, 0], work.rates[stretch, 1] = first, mixed
-        work.rates[stretch, 2] = last
+def _open_point(point, passed, means, end, shares):  # type: ignore
+    """What a point carries of a facet, or a spring, that opens or closes on its path."""
+    (normal, _, rate, time), (a, b), stiffness = means, shares, point.stiffness
+    passed.normal = stiffness * normal[end]
+    passed.area = point.whole * time[end]
+    passed.near = stiffness * (rate[end] * (1.0 - a) + rate[end + 1] * (1.0 - b))
+    passed.far = stiffness * (rate[end] * a + rate[end + 1] * b)
 
 
 @numba.njit(cache=True)
 def _means(ends, rates, facets):  # type: ignore
     """What `facet_means` gives of a facet, or with zeros `point_means` of a spring."""
+    if facets and (max(ends) <= 0.0 or min(ends) > 0.0):
+        return _whole_means(ends, 0.5 * (rates[0] + rates[1]))
     if facets:
         return facet_means(ends, rates[0], rates[1])
     normal, taken, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
@@ -80,6 +83,17 @@ def between(ends, share):  # type: ignore
 
 
 @numba.njit(cache=True)
+def _whole_means(ends, rate):  # type: ignore
+    """The same of a facet that is closed, or open, everywhere and all the way."""
+    a, c, b, d = ends
+    near, far = (a + b) / 12.0, (c + d) / 12.0
+    means, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
+    if max(ends) <= 0.0:
+        return means, none, (0.0, 0.0, 0.0), (0.5, 0.5)
+    return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
+
+
+@numba.njit(cache=True)
 def slide(law, gap, rows):  # type: ignore
     """Find what the points of rows of slips carry along the joints over the step.
 
@@ -88,27 +102,25 @@ def slide(law, gap, rows):  # type: ignore
         gap: z, of all rows (r,) [m].
         rows: of slips (k,).
     """
-    work, late, openings = law.work, law.late, len(law.stiffness)
+    known, found, along, members = law.points, law.work.points, law.work.along, law.members
+    first, start, gain, late = law.first, law.start, law.gain, law.late
     for row in rows:
-        slip, taken, rate = law.gain * (gap[row] - law.start[row]), 0.0, 0.0
-        group = row - openings
-        for place in range(law.first[group], law.first[group + 1]):
-            point = law.members[place]
-            stiffness, limit = law.shear[point], np.inf
-            first = stiffness * (law.start[row] - law.slid[point])
-            if law.friction[point] < np.inf:
-                limit = law.cohesion[point] * work.area[point]
-                limit = max(limit - law.friction[point] * work.normal[point], 0.0)
-            change = stiffness * slip
-            trial = first + (0.5 + late) * change
-            work.lost[point] = late * change * slip
-            work.held[point, 0], work.held[point, 1] = 0.5 + late, 0.0
-            work.shear[point], work.slid[point] = trial, 0.0
-            if max(abs(first), abs(first + change), abs(trial)) > limit:
-                shear, slid, by_change, by_limit, rubbing = shear_means(first, change, late, limit)
-                work.shear[point], work.slid[point] = shear, slid / stiffness
-                work.held[point, 0], work.held[point, 1] = by_change, by_limit
-                work.lost[point] = rubbing / stiffness
+        slip, taken, rate = gain * (gap[row] - start[row]), 0.0, 0.0
+        group = row - len(law.stiffness)
+        for place in range(first[group], first[group + 1]):
+            point, passed = known[members[place]], found[members[place]]
+            held, change = point.elastic * (start[row] - point.slid), point.elastic * slip
+            limit = np.inf
+            if point.friction < np.inf:
+                limit = max(point.cohesion * passed.area - point.friction * passed.normal, 0.0)
+            trial = held + (0.5 + late) * change
+            passed.lost, passed.shear, passed.slides = late * change * slip, trial, 0.0
+            passed.by_change, passed.by_limit = 0.5 + late, 0.0
+            if max(abs(held), abs(held + change), abs(trial)) > limit:
+                shear, slid, by_change, by_limit, rubbing = shear_means(held, change, late, limit)
+                passed.shear, passed.slides = shear, slid / point.elastic
+                passed.by_change, passed.by_limit = by_change, by_limit
+                passed.lost = rubbing / point.elastic
                 taken += trial - shear
-                rate += stiffness * (1.0 - law.gain * by_change)
-        work.along[group, 0], work.along[group, 1] = taken, rate
+                rate += point.elastic * (1.0 - gain * by_change)
+        along[group, 0], along[group, 1] = taken, rate

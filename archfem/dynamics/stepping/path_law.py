@@ -20,38 +20,78 @@ from archfem.dynamics.stepping.joint_law import Law, law_of
 from archfem.dynamics.stepping.newmark import Numbers
 from archfem.joints.operator import JointOperator
 
+POINT = np.dtype(
+    [
+        ("stretch", np.int64),  # to which it belongs
+        ("group", np.int64),  # row of its slip, -1 where slips are not followed
+        ("share", float),  # of the far end in its opening, as in `gap_rows` [-]
+        ("stiffness", float),  # across the joint; of a facet, that of the whole [N/m]
+        ("near", float),  # its normal force if closed, by the openings at the near end of its
+        ("far", float),  # stretch and at the far end [N/m]
+        ("whole", float),  # its area; of a facet, that of the whole [m²]
+        ("friction", float),  # μ [-]
+        ("cohesion", float),  # c [Pa]
+        ("elastic", float),  # shear force per slip [N/m]
+        ("slid", float),  # how far it has slid for good before the step [m]
+    ],
+    align=True,
+)
+"""What is known of a point of a joint."""
+
+PRESSED = np.dtype(
+    [
+        ("normal", float),  # mean normal force, positive where it pulls [N]
+        ("area", float),  # mean closed area [m²]
+        ("near", float),  # derivative of λ by z at the near end of its stretch
+        ("far", float),  # and at the far end [N/m]
+        ("shear", float),  # mean shear force [N]
+        ("slides", float),  # over the step [m]
+        ("by_change", float),  # derivative of the mean shear by its elastic change [-]
+        ("by_limit", float),  # and by the limit [-]
+        ("lost", float),  # energy that friction and damping take along it [J]
+    ],
+    align=True,
+)
+"""What a point does over a step."""
+
+STRETCH = np.dtype(
+    [
+        ("begin", np.int64),  # its first point
+        ("end", np.int64),  # the first one that is not its own
+        ("near", np.int64),  # row of the opening at one end
+        ("far", np.int64),  # and at the other
+    ],
+    align=True,
+)
+"""Points of a joint between which gaps are linear."""
+
+CARRIED = np.dtype(
+    [
+        ("near", float),  # λ as of its near end [N]
+        ("far", float),  # and of its far end
+        ("first", float),  # derivative of the former by z there [N/m]
+        ("mixed", float),  # of each by the other
+        ("last", float),  # and of the latter
+    ],
+    align=True,
+)
+"""What a stretch does over a step."""
+
 
 class Work(NamedTuple):
     """What joints do over a step, as found last; filled anew by `press` and `slide`.
 
     Attributes:
-        normal: mean normal forces, positive where they pull (p,) [N].
-        area: mean closed area (p,) [m²].
-        taken: λ (p,) [N].
-        rate: its derivatives by z at both ends of the point's stretch (p, 2) [N/m].
-        ends: λ of each stretch as of its near and far end (s, 2) [N].
-        rates: derivatives of those by z there: near by near, each by the other, far by far
-            (s, 3) [N/m].
+        points: records `PRESSED` (p,).
+        stretches: records `CARRIED` (s,).
         along: λ of each row of slips [N], and its derivative by z there [N/m] (g, 2).
-        shear: mean shear forces (p,) [N].
-        slid: what points slide (p,) [m].
-        held: derivatives of the mean shear by its elastic change and by the limit (p, 2) [-].
-        lost: energy that friction and damping take along each point (p,) [J].
         places: room for rows and columns of the derivatives of λ (m, 2).
         values: room for those derivatives (m,) [N/m].
     """
 
-    normal: Array
-    area: Array
-    taken: Array
-    rate: Array
-    ends: Array
-    rates: Array
+    points: Any
+    stretches: Any
     along: Array
-    shear: Array
-    slid: Array
-    held: Array
-    lost: Array
     places: Any
     values: Array
 
@@ -59,29 +99,21 @@ class Work(NamedTuple):
 class PathLaw(NamedTuple):
     """The joint law over steps of one length, and the joints at the start of the step at hand.
 
+    What belongs to one point or stretch is a record: compiled functions take few arrays so.
+
     Attributes:
         still: the law at an instant.
         gain: change of a gap over the step per change of z [-].
         late: lag of damping over the length of the step [-].
-        begin: first point of each stretch, and how many points there are (s + 1,).
-        near: row of the opening at one end of each stretch (s,).
-        far: of that at its other end (s,).
-        stretch: to which each point belongs (p,).
-        share: of the far end in the opening at each point, as in `gap_rows` (p,) [-].
-        closed: derivatives of the normal force at a closed point by the openings at the ends of
-            its stretch (p, 2) [N/m].
-        stiffness: of rows of openings, the largest of their points (o,) [N/m].
-        area: of each point, that of the whole facet where facets are exact (p,) [m²].
-        friction: μ (p,) [-].
-        cohesion: c (p,) [Pa].
-        shear: elastic shear force per slip (p,) [N/m].
-        group: row of each point's slip, -1 where slips are not followed (p,).
+        points: records `POINT` (p,).
+        stretches: records `STRETCH` (s,).
         first: where in `members` the points of each row of slips begin (g + 1,).
         members: points, sorted by their rows of slips (p,).
+        stiffness: of rows of openings, the largest of their points (o,) [N/m].
+        along: of rows of slips, the sum of their points (g,) [N/m].
         offset: gaps before anything moves, of all rows (r,) [m].
         start: gaps at the start of the step, of all rows (r,) [m].
         speed: change of the gaps per step at their rates there (r,) [m].
-        slid: how far points have slid for good before (p,) [m].
         guess: of z at all rows (r,) [m].
         stored: energy of joints before anything moves, if they held tension [J].
         work: room for what joints do over it.
@@ -90,24 +122,15 @@ class PathLaw(NamedTuple):
     still: Law
     gain: float
     late: float
-    begin: Any
-    near: Any
-    far: Any
-    stretch: Any
-    share: Array
-    closed: Array
-    stiffness: Array
-    area: Array
-    friction: Array
-    cohesion: Array
-    shear: Array
-    group: Any
+    points: Any
+    stretches: Any
     first: Any
     members: Any
+    stiffness: Array
+    along: Array
     offset: Array
     start: Array
     speed: Array
-    slid: Array
     guess: Array
     stored: float
     work: Work
@@ -127,33 +150,51 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
     points, still, gaps = joints.points, law_of(joints), gap_rows(joints)
     count, rows = len(points.arm), len(gaps.offset)
     offset = np.zeros((2, count)) if joints.offset is None else joints.offset
+    members = np.argsort(gaps.group, kind="stable")
     law = PathLaw(
         still,
         numbers.gain,
         numbers.lag / dt,
-        gaps.begin,
-        gaps.near,
-        gaps.far,
-        gaps.stretch,
-        gaps.share,
-        _closed(still, gaps.share),
-        _largest(gaps, still.stiffness),
-        still.stiffness / points.normal_stiffness,
-        points.friction,
-        points.cohesion,
-        points.shear,
-        gaps.group,
+        _points(joints, gaps, still),
+        _records(STRETCH, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far),
         np.append(0, np.cumsum(gaps.sizes)),
-        np.argsort(gaps.group, kind="stable"),
+        members[gaps.group[members] >= 0],
+        _largest(gaps, still.stiffness),
+        _sheared(gaps, points.shear),
         gaps.offset,
         np.zeros(rows),
         np.zeros(rows),
-        np.zeros(count),
         np.zeros(rows),
         0.5 * float(np.sum(offset * joints.bonded(offset))),
         _room(count, len(gaps.near), len(gaps.sizes)),
     )
     return law, gaps.rows
+
+
+def _records(kind: np.dtype[Any], *columns: Any) -> Any:
+    """Records from one array, or one number, for each of their fields."""
+    records = np.zeros(len(columns[0]), kind)
+    for name, column in zip(kind.names or (), columns, strict=True):
+        records[name] = column
+    return records
+
+
+def _points(joints: JointOperator, gaps: GapRows, still: Law) -> Any:
+    """What is known of the points (p,)."""
+    points = joints.points
+    return _records(
+        POINT,
+        gaps.stretch,
+        gaps.group,
+        gaps.share,
+        still.stiffness,
+        *_closed(still, gaps.share).T,
+        still.stiffness / points.normal_stiffness,
+        points.friction,
+        points.cohesion,
+        points.shear,
+        0.0,
+    )
 
 
 def _largest(gaps: GapRows, stiffness: Array) -> Array:
@@ -162,6 +203,13 @@ def _largest(gaps: GapRows, stiffness: Array) -> Array:
     for ends in (gaps.near, gaps.far):
         np.maximum.at(largest, ends[gaps.stretch], stiffness)
     return largest
+
+
+def _sheared(gaps: GapRows, shear: Array) -> Array:
+    """The stiffness of each row of slips, of all its points (g,) [N/m]."""
+    follows = gaps.group >= 0
+    group = gaps.group[follows] - gaps.openings
+    return np.bincount(group, shear[follows], minlength=len(gaps.sizes))
 
 
 def _closed(still: Law, share: Array) -> Array:
@@ -176,12 +224,11 @@ def _closed(still: Law, share: Array) -> Array:
 
 def _room(points: int, stretches: int, slips: int) -> Work:
     """Room for what joints do over a step."""
-    normal, area, taken, shear, slid, lost = np.zeros((6, points))
-    rate, held = np.zeros((2, points, 2))
-    ends, rates = np.zeros((stretches, 2)), np.zeros((stretches, 3))
     most = 4 * stretches + slips + 2 * points
-    places, values = np.zeros((most, 2), np.int64), np.zeros(most)
-    along = np.zeros((slips, 2))
     return Work(
-        normal, area, taken, rate, ends, rates, along, shear, slid, held, lost, places, values
+        np.zeros(points, PRESSED),
+        np.zeros(stretches, CARRIED),
+        np.zeros((slips, 2)),
+        np.zeros((most, 2), np.int64),
+        np.zeros(most),
     )

@@ -8,13 +8,22 @@ gradient of an energy, and the problem
 is not symmetric. It is solved by Newton's method, (1 - F λ') δ = z₀ + F λ - z, in the rows that
 open or slide and in the openings that press on those, by a dense factor where they are few and by
 stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) where
-they are many. Where the passes go round in a circle of holding and sliding they go less far.
+they are many. Where some passes have not been enough, further ones go no farther than λ errs less;
+and where those are not, λ is led from where it is known to where it is sought.
 """
 
 import numba
 import numpy as np
 
 from archfem.dynamics.stepping.loop import ITERATIONS
+from archfem.dynamics.stepping.newton_pass import (
+    FEW,
+    equations,
+    factorised,
+    newton_change,
+    rates,
+    taken_out,
+)
 from archfem.dynamics.stepping.open_points import chosen, square
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
@@ -22,6 +31,7 @@ from archfem.dynamics.stepping.small_problem import (
     AHEAD,
     EXACT,
     ROUNDED,
+    SETTLED,
     add_held,
     exact,
     expected,
@@ -32,117 +42,262 @@ from archfem.dynamics.stepping.small_problem import (
 )
 from archfem.dynamics.stepping.sparse_rows import add_rows
 
-FEW = 60
-"""Rows up to which the problem is solved directly."""
-
 WHOLE = 4
 """Passes that take whole steps anyhow."""
 
-SLOW = 0.7
-"""Error left by a pass, of that before, above which passes are taken to go in a circle."""
+TRIES = 16
+"""Passes after which λ is led to where it is sought."""
 
-CALM = 3
-"""Passes that do not, one after another, after which a whole step is tried again."""
+LEAST = 1.0 / 32.0
+"""Share of a step that is taken even if λ errs more after it."""
 
-ROUGH = 1e-3
-"""Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
+FALLS = 0.1
+"""Part by which the square of the error of λ has to fall with a whole step."""
+
+FIRST, LAST = 0.25, 1e-4
+"""Shares of its way that λ is led at first, and at least."""
+
+ROUNDING = 4.0 * np.finfo(float).eps / SETTLED
+"""Of what a slip rounds to, in the errors of λ that end the passes."""
 
 
 def _shifted(law, gap):  # type: ignore
     """Add to gaps found from displacements those before anything moves."""
+    offset = law.offset
     for row in range(len(gap)):
-        gap[row] += law.offset[row]
+        gap[row] += offset[row]
 
 
 def _held(law, opening, right):  # type: ignore
     """Add to a right side what joints would carry more had nothing slid before the step."""
-    force, openings = np.zeros(len(law.start)), len(law.stiffness)
-    for point in range(len(law.group)):
-        if law.group[point] >= 0:
-            force[law.group[point]] += law.shear[point] * law.slid[point]
-    add_rows(opening, np.arange(openings, len(force)), force, right)
+    force, points = np.zeros(len(law.start)), law.points
+    for k in range(len(points)):
+        if points[k].group >= 0:
+            force[points[k].group] += points[k].elastic * points[k].slid
+    add_rows(opening, np.flatnonzero(force), force, right)
 
 
 def _largest(law, gap):  # type: ignore
-    """Return the largest force of a point if all joints held tension."""
-    return np.max(law.stiffness * np.abs(gap[: len(law.stiffness)]))
+    """Return the largest force of a point if all joints held tension, or what rounds as that does.
+
+    What a slip rounds to, times its stiffness, is all that λ can be told to where points slide, and
+    is more than all forces where they have slid far.
+    """
+    most, openings, stiffness, along = 0.0, len(law.stiffness), law.stiffness, law.along
+    for row in range(openings):
+        most = max(most, stiffness[row] * abs(gap[row]))
+    for row in range(openings, len(gap)):
+        most = max(most, ROUNDING * along[row - openings] * abs(gap[row]))
+    return most
 
 
 def _foreseen(law, gap, before, force):  # type: ignore
     """Return which rows are at work, or will be soon if they go on as they did (r,)."""
-    works, near = force != 0.0, force != 0.0
+    works, near, openings = force != 0.0, force != 0.0, len(law.stiffness)
+    guess, start, speed, points = law.guess, law.start, law.speed, law.points
     for row in range(len(gap)):
-        law.guess[row] = law.start[row] + law.speed[row] / law.gain
-        if row < len(law.stiffness) and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
+        guess[row] = start[row] + speed[row] / law.gain
+        if row < openings and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
             works[row] = True
-    for stretch in range(len(law.near)):
-        a, b = law.near[stretch], law.far[stretch]
-        if works[a] or works[b]:
-            near[a] = near[b] = True
-            for point in range(law.begin[stretch], law.begin[stretch + 1]):
-                if law.group[point] >= 0:
-                    near[law.group[point]] = True
-    _involve(law, near)
+    for part in law.stretches:
+        if works[part.near] or works[part.far]:
+            near[part.near] = near[part.far] = True
+            for k in range(part.begin, part.end):
+                if points[k].group >= 0:
+                    near[points[k].group] = True
+    _work_at(law, guess, near, True)
     return near
 
 
 @numba.njit(cache=True)
 def _involve(law, near):  # type: ignore
     """Add to rows of slips at work the openings that press on their points."""
-    for point in range(len(law.group)):
-        if law.group[point] >= 0 and near[law.group[point]]:
-            stretch = law.stretch[point]
-            near[law.near[stretch]] = near[law.far[stretch]] = True
+    points, stretches = law.points, law.stretches
+    for k in range(len(points)):
+        if points[k].group >= 0 and near[points[k].group]:
+            stretch = stretches[points[k].stretch]
+            near[stretch.near] = near[stretch.far] = True
 
 
 def _fits(law, gap, force, near):  # type: ignore
-    """Return whether the gaps ask for the λ they were found with; adds rows at work to near."""
-    openings, wanted = len(law.stiffness), np.zeros(len(gap))
-    law.guess[:] = gap
-    press(law, gap, np.arange(len(law.near)))
-    slide(law, gap, np.arange(openings, len(gap)))
-    for stretch in range(len(law.near)):
-        a, b = law.near[stretch], law.far[stretch]
-        wanted[a] += law.work.ends[stretch, 0]
-        wanted[b] += law.work.ends[stretch, 1]
-        if law.work.ends[stretch, 0] != 0.0 or law.work.ends[stretch, 1] != 0.0:
-            near[a] = near[b] = True
-    for row in range(openings, len(gap)):
-        wanted[row] = law.work.along[row - openings, 0]
-        near[row] = near[row] or wanted[row] != 0.0
+    """Return whether the gaps ask for the λ they were found with; adds rows at work to near.
+
+    Of rows that are near, λ is known to fit the guess, so that the gaps need but be that.
+    """
+    across, along, guess, off = law.stiffness, law.along, law.guess, 0.0
+    for row in range(len(gap)):
+        if near[row]:
+            stiffness = across[row] if row < len(across) else along[row - len(across)]
+            off = max(off, stiffness * abs(gap[row] - guess[row]))
+        guess[row] = gap[row]
+    whole = off > EXACT * largest(law, gap)
+    if _work_at(law, gap, near, whole):
+        return not whole
+    return False
+
+
+@numba.njit(cache=True)
+def _work_at(law, gap, near, whole):  # type: ignore
+    """Add to near what further rows are at work at some gaps.
+
+    Looks at all rows if it is to, else at those that are not near.
+
+    Returns:
+        Whether there are none.
+    """
+    openings, more = len(law.stiffness), False
+    stretches, slips = _others(law, near, whole)
+    press(law, gap, stretches)
+    slide(law, gap, slips)
+    parts, found, along = law.stretches, law.work.stretches, law.work.along
+    for number in stretches:
+        part, carried = parts[number], found[number]
+        if carried.near != 0.0 or carried.far != 0.0:
+            more = more or not (near[part.near] and near[part.far])
+            near[part.near] = near[part.far] = True
+    for row in slips:
+        if along[row - openings, 0] != 0.0:
+            more = more or not near[row]
+            near[row] = True
     _involve(law, near)
-    return np.max(np.abs(wanted - force)) <= EXACT * largest(law, gap)
+    return not more
+
+
+@numba.njit(cache=True)
+def _others(law, near, whole):  # type: ignore
+    """Numbers of stretches of which not both ends are near, and of slips that are not."""
+    openings, stretches = len(law.stiffness), law.stretches
+    wanted = np.empty(len(stretches), dtype=np.bool_)
+    for number in range(len(stretches)):
+        part = stretches[number]
+        wanted[number] = whole or not (near[part.near] and near[part.far])
+    far = np.ones(len(near) - openings, dtype=np.bool_)
+    for row in range(openings, len(near)):
+        far[row - openings] = whole or not near[row]
+    return np.flatnonzero(wanted), openings + np.flatnonzero(far)
 
 
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
-    """Find λ where it may differ from zero; passes, or -1 if it does not settle."""
-    size, local = len(rows), np.full(len(start), -1)
-    for k in range(size):
+    """Find λ where it may differ from zero, from the guess on, at which what joints carry is known.
+
+    Returns:
+        Passes; -1 if it does not settle.
+    """
+    local = np.full(len(start), -1)
+    for k in range(len(rows)):
         local[rows[k]] = k
-    slips = rows[np.searchsorted(rows, len(law.stiffness)) :]
-    known = local, np.flatnonzero((local[law.near] >= 0) & (local[law.far] >= 0)), slips
-    matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
-    gap, z, last = law.guess.copy(), chosen(law.guess, rows), np.inf
-    wanted, share, calm = np.empty(size), 1.0, 0
-    entries = (law.work.places, law.work.values)
-    count = _taken(law, gap, known, wanted)
-    for passes in range(1, ITERATIONS + 1):
-        wanted += _newton(matrix, free + matrix @ wanted - z, entries, count)
+    known = local, _within(law.stretches, local), rows[np.searchsorted(rows, len(law.stiffness)) :]
+    matrix, own, z = square(compliance, rows), np.zeros(len(rows)), chosen(law.guess, rows)
+    problem, free = (matrix, rows, known), chosen(start, rows)
+    passes = _settled(law, problem, free, own, enough)
+    if passes < 0:
+        passes = _led(law, problem, (free, z), own, enough)
+    for k in range(len(rows)):
+        force[rows[k]] = own[k]
+    return passes
+
+
+@numba.njit(cache=True)
+def _led(law, problem, ends, own, enough):  # type: ignore
+    """Lead λ from where it fits a guess to where it is sought, as far at once as it settles.
+
+    What is added to z₀ so that the guess fits is taken away bit by bit.
+
+    Args:
+        law: `PathLaw`.
+        problem: F (k, k), its rows, and what is known of them.
+        ends: z₀ (k,) and the guess of z (k,).
+        own: filled with λ (k,).
+        enough: error of λ that is left [N].
+
+    Returns:
+        Passes; -1 if it does not settle.
+    """
+    (matrix, rows, known), (free, z) = problem, ends
+    _go(law, (rows, known), z, own)
+    added, done, share, passes = z - matrix @ own - free, 0.0, FIRST, ITERATIONS
+    while done < 1.0:
+        goal = min(done + share, 1.0)
+        taken = _settled(law, problem, free + (1.0 - goal) * added, own, enough)
+        passes += abs(taken)
+        if taken > 0:
+            done, share, z = goal, 2.0 * share, chosen(law.guess, rows)
+        else:
+            share *= 0.25
+            if share < LAST:
+                return -1
+            _go(law, (rows, known), z, own)
+    return passes
+
+
+@numba.njit(cache=True)
+def _settled(law, problem, free, own, enough):  # type: ignore
+    """Find λ by Newton's method from the guess on.
+
+    A factor is used again where the last pass promises that it is enough for the next, its error
+    falling as much as before.
+
+    Returns:
+        Passes; -1 if it does not settle.
+    """
+    (matrix, rows, known), size = problem, len(free)
+    wanted, factor, rest = np.empty(size), np.empty((size, size)), np.empty(size)
+    changes, places = np.empty(0, np.int64), np.empty(0, np.int64)
+    entries, count, off, last = (law.work.places, law.work.values), 0, np.inf, np.inf
+    taken_out(law, known, wanted)
+    own[:] = wanted
+    for passes in range(1, TRIES + 1):
+        if passes <= 2 or off**2 > last * enough:
+            count = rates(law, known)
+            changes = equations(matrix, entries, count, factor)
+            places = factorised(factor, len(changes)) if len(changes) <= FEW else places
         for k in range(size):
-            own[k] += share * (wanted[k] - own[k])
-        z = free + matrix @ own
-        for k in range(size):
-            gap[rows[k]] = z[k]
-        count = _taken(law, gap, known, wanted)
-        off = np.max(np.abs(wanted - own))
+            rest[k] = free[k] - law.guess[rows[k]]
+        rest += matrix @ wanted
+        change = newton_change(rest, (entries, count), (factor, changes, places))
+        last, off = off, _moved(law, problem, free, (own, wanted, change), passes >= WHOLE)
         if off <= enough or last <= off <= ROUNDED * enough:
-            for k in range(size):
-                force[rows[k]] = own[k]
             return passes
-        calm = calm + 1 if off <= SLOW * last else 0
-        share = 1.0 if passes < WHOLE or calm >= CALM else 0.5
-        last = off
+        if not off < np.inf:
+            return -1
     return -1
+
+
+@numba.njit(cache=True)
+def _moved(law, problem, free, forces, careful):  # type: ignore
+    """Move λ as Newton's method says, or so far that it errs less.
+
+    Args:
+        law: `PathLaw`.
+        problem: F (k, k), its rows, and what is known of them.
+        free: z₀ (k,).
+        forces: λ and what is wanted there, both changed, and the change of that (k,).
+        careful: whether to go less far where λ errs more than it did.
+
+    Returns:
+        Its error [N].
+    """
+    (matrix, rows, known), (own, wanted, change) = problem, forces
+    move, before, share = wanted + change - own, np.sum((wanted - own) ** 2), 1.0
+    while True:
+        trial = own + share * move
+        _go(law, (rows, known), free + matrix @ trial, wanted)
+        error = wanted - trial
+        if not careful or share <= LEAST or np.sum(error**2) <= (1.0 - FALLS * share) * before:
+            own[:] = trial
+            return np.max(np.abs(error))
+        share *= 0.5
+
+
+@numba.njit(cache=True)
+def _go(law, known, z, wanted):  # type: ignore
+    """Take gaps of the rows as the guess, and find λ that they ask for."""
+    (rows, among), guess = known, law.guess
+    for k in range(len(rows)):
+        guess[rows[k]] = z[k]
+    press(law, guess, among[1])
+    slide(law, guess, among[2])
+    taken_out(law, among, wanted)
 
 
 solved_by(
@@ -157,102 +312,10 @@ solved_by(
 
 
 @numba.njit(cache=True)
-def _taken(law, gap, known, wanted):  # type: ignore
-    """λ of the rows, and its derivatives as entries of a matrix; returns how many those are."""
-    (local, stretches, slips), openings, work = known, len(law.stiffness), law.work
-    press(law, gap, stretches)
-    slide(law, gap, slips)
-    count, entries = 0, (work.places, work.values)
-    wanted[:] = 0.0
-    for stretch in stretches:
-        a, b = local[law.near[stretch]], local[law.far[stretch]]
-        wanted[a] += work.ends[stretch, 0]
-        wanted[b] += work.ends[stretch, 1]
-        if work.rates[stretch, 0] != 0.0 or work.rates[stretch, 2] != 0.0:
-            count = _enter(entries, count, a, a, work.rates[stretch, 0])
-            count = _enter(entries, count, a, b, work.rates[stretch, 1])
-            count = _enter(entries, count, b, a, work.rates[stretch, 1])
-            count = _enter(entries, count, b, b, work.rates[stretch, 2])
-    for row in slips:
-        k, group, last = local[row], row - openings, -1
-        wanted[k] = work.along[group, 0]
-        if work.along[group, 1] == 0.0 and wanted[k] == 0.0:
-            continue
-        count = _enter(entries, count, k, k, work.along[group, 1])
-        for place in range(law.first[group], law.first[group + 1]):
-            point = law.members[place]
-            if work.held[point, 1] == 0.0 or law.friction[point] == 0.0:
-                continue
-            factor, stretch = work.held[point, 1] * law.friction[point], law.stretch[point]
-            if stretch != last:
-                count = _enter(entries, count, k, local[law.near[stretch]], 0.0)
-                count = _enter(entries, count, k, local[law.far[stretch]], 0.0)
-                last = stretch
-            for end in range(2):
-                value = factor * (law.closed[point, end] - work.rate[point, end])
-                work.values[count - 2 + end] += value
-    return count
-
-
-@numba.njit(cache=True)
-def _enter(entries, count, row, column, value):  # type: ignore
-    """Add an entry; returns how many there are."""
-    entries[0][count, 0], entries[0][count, 1] = row, column
-    entries[1][count] = value
-    return count + 1
-
-
-@numba.njit(cache=True)
-def _newton(matrix, rest, entries, count):  # type: ignore
-    """Solve (1 - λ' F) μ = λ' rest for the change μ of λ, which is 0 where no row of λ' is."""
-    (places, values), changes = entries, np.zeros(len(rest), dtype=np.bool_)
-    change = np.zeros(len(rest))
-    for entry in range(count):
-        row, column = places[entry, 0], places[entry, 1]
-        changes[row] = True
-        change[row] += values[entry] * rest[column]
-    rows = np.flatnonzero(changes)
-    if len(rows) > FEW:
-        return _gradients(matrix, change, entries, count)
-    whole = np.eye(len(rest))
-    for entry in range(count):
-        row, column, value = places[entry, 0], places[entry, 1], values[entry]
-        for k in range(len(rest)):
-            whole[row, k] -= value * matrix[column, k]
-    change[rows] = np.linalg.solve(square(whole, rows), chosen(change, rows))
-    return change
-
-
-@numba.njit(cache=True)
-def _applied(matrix, vector, entries, count):  # type: ignore
-    """(1 - λ' F) times a vector."""
-    (places, values), image, result = entries, matrix @ vector, vector.copy()
-    for entry in range(count):
-        result[places[entry, 0]] -= values[entry] * image[places[entry, 1]]
-    return result
-
-
-@numba.njit(cache=True)
-def _gradients(matrix, right, entries, count):  # type: ignore
-    """Solve (1 - λ' F) μ = right by stabilised biconjugate gradients from zero."""
-    solution, left = np.zeros(len(right)), right.copy()
-    direction, rho = right.copy(), right @ right
-    end = (ROUGH**2) * rho
-    for _ in range(2 * len(right)):
-        image = _applied(matrix, direction, entries, count)
-        seen = right @ image
-        if left @ left <= end or seen == 0.0:
-            break
-        length = rho / seen
-        half = left - length * image
-        other = _applied(matrix, half, entries, count)
-        square_of = other @ other
-        weight = (other @ half) / square_of if square_of > 0.0 else 0.0
-        solution += length * direction + weight * half
-        left = half - weight * other
-        new = right @ left
-        if new == 0.0 or weight == 0.0:
-            break
-        direction = left + (new / rho) * (length / weight) * (direction - weight * image)
-        rho = new
-    return solution
+def _within(stretches, local):  # type: ignore
+    """Numbers of the stretches of which both ends are among the rows."""
+    inside = np.empty(len(stretches), dtype=np.bool_)
+    for number in range(len(stretches)):
+        part = stretches[number]
+        inside[number] = local[part.near] >= 0 and local[part.far] >= 0
+    return np.flatnonzero(inside)

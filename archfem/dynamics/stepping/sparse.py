@@ -130,7 +130,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
     forward(factor, vector, room)
     half = vector.copy()
     passes, fresh = 1, True
-    while passes < ITERATIONS:
+    for _ in range(ITERATIONS):
         rows = np.flatnonzero(near)
         if len(rows) > 0:
             _know(rows, system, room)

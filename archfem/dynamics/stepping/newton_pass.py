@@ -1,0 +1,222 @@
+"""One pass of Newton's method at the rows of a small problem: its equations, and their solution.
+
+Of (1 - λ' F) μ = λ' (z₀ + F λ - z) for the change μ of λ the rows matter where λ' has any entry.
+"""
+
+import numba
+import numpy as np
+
+from archfem.dynamics.stepping.open_points import chosen
+
+FEW = 60
+"""Rows up to which the problem is solved directly."""
+
+ROUGH = 1e-3
+"""Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
+
+
+@numba.njit(cache=True)
+def taken_out(law, known, wanted):  # type: ignore
+    """Sum up λ of the rows.
+
+    Args:
+        law: `PathLaw`, which knows what joints carry.
+        known: numbers of rows among them, their stretches, and their slips.
+        wanted: filled with λ (k,).
+    """
+    (local, stretches, slips), openings = known, len(law.stiffness)
+    parts, found, along = law.stretches, law.work.stretches, law.work.along
+    wanted[:] = 0.0
+    for number in stretches:
+        part, carried = parts[number], found[number]
+        wanted[local[part.near]] += carried.near
+        wanted[local[part.far]] += carried.far
+    for row in slips:
+        wanted[local[row]] = along[row - openings, 0]
+
+
+@numba.njit(cache=True)
+def rates(law, known):  # type: ignore
+    """Find derivatives of λ of the rows, as entries of a matrix in the room of the law.
+
+    Args:
+        law: `PathLaw`, which knows what joints carry.
+        known: numbers of rows among them, their stretches, and their slips.
+
+    Returns:
+        How many there are.
+    """
+    local, stretches, slips = known
+    count, entries = 0, (law.work.places, law.work.values)
+    parts, found, openings = law.stretches, law.work.stretches, len(law.stiffness)
+    for number in stretches:
+        part, carried = parts[number], found[number]
+        if carried.first != 0.0 or carried.last != 0.0:
+            a, b = local[part.near], local[part.far]
+            _enter(entries, count, (a, a, carried.first))
+            _enter(entries, count + 1, (a, b, carried.mixed))
+            _enter(entries, count + 2, (b, a, carried.mixed))
+            _enter(entries, count + 3, (b, b, carried.last))
+            count += 4
+    points, pressed, members = law.points, law.work.points, law.members
+    first, along = law.first, law.work.along
+    for row in slips:
+        k, group, last = local[row], row - openings, -1
+        if along[group, 1] == 0.0 and along[group, 0] == 0.0:
+            continue
+        _enter(entries, count, (k, k, along[group, 1]))
+        count += 1
+        for place in range(first[group], first[group + 1]):
+            point, found_there = points[members[place]], pressed[members[place]]
+            factor = found_there.by_limit * point.friction
+            if found_there.by_limit == 0.0 or point.friction == 0.0:
+                continue
+            if point.stretch != last:
+                part, last = parts[point.stretch], point.stretch
+                _enter(entries, count, (k, local[part.near], 0.0))
+                _enter(entries, count + 1, (k, local[part.far], 0.0))
+                count += 2
+            entries[1][count - 2] += factor * (point.near - found_there.near)
+            entries[1][count - 1] += factor * (point.far - found_there.far)
+    return count
+
+
+@numba.njit(cache=True, inline="always")
+def _enter(entries, number, entry):  # type: ignore
+    """Set an entry: its row, column and value."""
+    entries[0][number, 0], entries[0][number, 1] = entry[0], entry[1]
+    entries[1][number] = entry[2]
+
+
+@numba.njit(cache=True, fastmath={"contract"})
+def equations(matrix, entries, count, factor):  # type: ignore
+    """Fill 1 - λ' F at rows and columns of λ' that are not zero, at the top left.
+
+    Args:
+        matrix: F (k, k).
+        entries: rows and columns of λ', and its values there.
+        count: how many of them there are.
+        factor: filled (k, k).
+
+    Returns:
+        Which rows they are.
+    """
+    (places, values), changes = entries, np.zeros(len(matrix), dtype=np.bool_)
+    whole, size = np.eye(len(matrix)), len(matrix)
+    for entry in range(count):
+        row, column, value = places[entry, 0], places[entry, 1], values[entry]
+        changes[row] = True
+        for k in range(size):
+            whole[row, k] -= value * matrix[column, k]
+    rows = np.flatnonzero(changes)
+    for i in range(len(rows)):
+        for k in range(len(rows)):
+            factor[i, k] = whole[rows[i], rows[k]]
+    return rows
+
+
+@numba.njit(cache=True)
+def newton_change(rest, entered, system):  # type: ignore
+    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no row of λ' is.
+
+    Args:
+        rest: r (k,).
+        entered: rows and columns of λ' with its values, and how many those are.
+        system: factor of 1 - λ' F or, of more than `FEW` rows, that itself; its rows; and with
+            which each was exchanged.
+
+    Returns:
+        μ (k,).
+    """
+    ((places, values), count), (factor, rows, exchanges) = entered, system
+    change, size = np.zeros(len(rest)), len(rows)
+    for k in range(count):
+        change[places[k, 0]] += values[k] * rest[places[k, 1]]
+    own = chosen(change, rows)
+    if size > FEW:
+        own = _gradients(np.ascontiguousarray(factor[:size, :size]), own)
+    else:
+        _substitute(factor, exchanges, own)
+    for k in range(size):
+        change[rows[k]] = own[k]
+    return change
+
+
+@numba.njit(cache=True, fastmath={"contract"})
+def factorised(matrix, size):  # type: ignore
+    """Factorise the top left of a matrix in place.
+
+    Faster than LAPACK's where there are but some tens of rows. Of a matrix that is singular,
+    solutions are not numbers.
+
+    Args:
+        matrix: of which only that part is changed.
+        size: of the part that is factorised.
+
+    Returns:
+        With which row each was exchanged.
+    """
+    exchanges = np.empty(size, np.int64)
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        exchanges[k] = best
+        if best != k:
+            for j in range(size):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        scale = 1.0 / matrix[k, k] if matrix[k, k] != 0.0 else np.nan
+        top = matrix[k, k + 1 : size]
+        for i in range(k + 1, size):
+            factor, row = scale * matrix[i, k], matrix[i, k + 1 : size]
+            matrix[i, k] = factor
+            for j in range(len(top)):
+                row[j] -= factor * top[j]
+        matrix[k, k] = scale
+    return exchanges
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc"})
+def _substitute(matrix, exchanges, right):  # type: ignore
+    """Solve a system in place by its factor."""
+    size = len(right)
+    for k in range(size):
+        best = exchanges[k]
+        right[k], right[best] = right[best], right[k]
+    for k in range(size):
+        total = right[k]
+        for j in range(k):
+            total -= matrix[k, j] * right[j]
+        right[k] = total
+    for k in range(size - 1, -1, -1):
+        total = right[k]
+        for j in range(k + 1, size):
+            total -= matrix[k, j] * right[j]
+        right[k] = total * matrix[k, k]
+
+
+@numba.njit(cache=True)
+def _gradients(matrix, right):  # type: ignore
+    """Solve a system by stabilised biconjugate gradients from zero."""
+    solution, left = np.zeros(len(right)), right.copy()
+    direction, rho = right.copy(), right @ right
+    end = (ROUGH**2) * rho
+    for _ in range(2 * len(right)):
+        image = matrix @ direction
+        seen = right @ image
+        if left @ left <= end or seen == 0.0:
+            break
+        length = rho / seen
+        half = left - length * image
+        other = matrix @ half
+        square_of = other @ other
+        weight = (other @ half) / square_of if square_of > 0.0 else 0.0
+        solution += length * direction + weight * half
+        left = half - weight * other
+        new = right @ left
+        if new == 0.0 or weight == 0.0:
+            break
+        direction = left + (new / rho) * (length / weight) * (direction - weight * image)
+        rho = new
+    return solution
