@@ -209,7 +209,8 @@ def _sheared(gaps: GapRows, shear: Array) -> Array:
     """The stiffness of each row of slips, of all its points (g,) [N/m]."""
     follows = gaps.group >= 0
     group = gaps.group[follows] - gaps.openings
-    return np.bincount(group, shear[follows], minlength=len(gaps.sizes))
+    sheared: Array = np.bincount(group, shear[follows], len(gaps.sizes)).astype(float)
+    return sheared
 
 
 def _closed(still: Law, share: Array) -> Array:
