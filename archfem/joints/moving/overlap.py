@@ -122,7 +122,7 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks
     total = moment = lost = 0.0
-    total_by, moment_by = np.zeros(3), np.zeros(3)
+    rate[:] = 0.0  # in its first and last row, derivatives of total and moment at first
     stride = 2 if faces.facets else 1
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
         x0 = faces.place[point]
@@ -144,8 +144,8 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         for k in range(3):
             by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            total_by[k] += share * (near + far)
-            moment_by[k] += share * (x0 * near + x1 * far)
+            rate[0, k] += share * (near + far)
+            rate[2, k] += share * (x0 * near + x1 * far)
             wider = widens if k == 1 else 0.0
             normals[point, 1 + k] = scale * (mean * near + wider * n0)
             if faces.facets:
@@ -159,11 +159,11 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     force[2] = -stiff * mean * mean * moment
     by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
     for k in range(3):
-        wider, turns = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0
-        rate[0, k] = stiff * (mean * total_by[k] + wider * total)
-        rate[2, k] = -stiff * mean * (mean * moment_by[k] + 2.0 * wider * moment)
+        wider, turns, by_moment = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0, rate[2, k]
+        rate[0, k] = stiff * (mean * rate[0, k] + wider * total)
+        rate[2, k] = -stiff * mean * (mean * by_moment + 2.0 * wider * moment)
         change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
-        change -= mean * turn * moment_by[k]
+        change -= mean * turn * by_moment
         rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
     return stiff * mean * lost
 
@@ -218,36 +218,34 @@ def _slope(before, after, depth):  # type: ignore
 
 
 @numba.njit(cache=True)
-def rub(first, change, late, limit, found):  # type: ignore
-    """Find the mean shear of a point over a step, as `law.shear_over_step`.
+def rub(first, change, late, limit):  # type: ignore
+    """Return what the shear of a point does over a step, as `law.shear_over_step`.
 
     Args:
         first: elastic shear at the start [N].
         change: of it, if the point did not slide [N].
         late: lag of damping over the length of the step [-].
         limit: Coulomb's [N].
-        found: mean shear [N], what friction has not held at the end [N], derivatives of the mean
-            by the change and by the limit [-], and loss times the stiffness [N²], filled (5,).
+
+    Returns:
+        Mean shear [N], what friction has not held at the end [N], derivatives of the mean by the
+        change and by the limit [-], and loss times the stiffness [N²].
     """
     trial = first + (0.5 + late) * change
     if max(abs(first), abs(first + change), abs(trial)) <= limit:
-        found[0], found[1], found[2], found[3] = trial, 0.0, 0.5 + late, 0.0
-        found[4] = late * change * change
-        return
+        return trial, 0.0, 0.5 + late, 0.0, late * change * change
     start = min(max(first, -limit), limit)
     last = min(max(start + change, -limit), limit)
     over = start + change - last
     slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
     mean = start + 0.5 * change - 0.5 * over * slid
     shear = min(max(mean + late * change, -limit), limit)
-    found[0], found[1] = shear, first + change - last
+    taken = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
     if abs(mean + late * change) > limit or (change == 0.0 and abs(first) > limit):
-        found[2], found[3] = 0.0, np.sign(shear)
-    else:
-        lost = np.sign(first) if abs(first) > limit else 0.0
-        found[2] = 0.5 * (1.0 - slid) ** 2 + late
-        found[3] = (1.0 - slid) * lost + slid * np.sign(change)
-    found[4] = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
+        return shear, first + change - last, 0.0, np.sign(shear), taken
+    lost = np.sign(first) if abs(first) > limit else 0.0
+    by_limit = (1.0 - slid) * lost + slid * np.sign(change)
+    return shear, first + change - last, 0.5 * (1.0 - slid) ** 2 + late, by_limit, taken
 
 
 @numba.njit(cache=True)
@@ -267,20 +265,20 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    (force, rate, after), friction, own = found, faces.friction[joint], np.empty(5)
+    (force, rate, after), friction = found, faces.friction[joint]
     total = lost = 0.0
     for point in range(faces.first[joint], faces.first[joint + 1]):
         stiff = faces.shear[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
-        rub(first, change, late, limit, own)
-        total += own[0]
-        lost += own[4] / stiff
-        rate[1, 1] += stiff * own[2]
-        after[point] = slid[point] + own[1] / stiff
-        if own[3] != 0.0:
+        shear, unheld, by_change, by_limit, taken = rub(first, change, late, limit)
+        total += shear
+        lost += taken / stiff
+        rate[1, 1] += stiff * by_change
+        after[point] = slid[point] + unheld / stiff
+        if by_limit != 0.0:
             for k in range(3):
-                rate[1, k] += own[3] * friction * normals[point, 1 + k]
+                rate[1, k] += by_limit * friction * normals[point, 1 + k]
     force[1] += total
     return total, lost
