@@ -138,7 +138,8 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
-    sides, size, still = joints.sides, found.force.shape[2], ((1.0, 0.0), (0.0, 0.0), (1.0,) * 4)
+    sides, faces, size = joints.sides, joints.faces, found.force.shape[2]
+    remembered, still = found.slid, ((1.0, 0.0), (0.0, 0.0), (1.0,) * 4)
     poses, moves, ends = np.empty((2, 2, 3)), np.zeros((2, 2, 3, size)), np.empty((2, 3))
     by_faces = np.empty((2, 3, 4))
     force, rate, normals = np.empty(3), np.empty((3, 3)), np.empty((len(slid), 4))
@@ -154,10 +155,8 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         else:
             poses[:, 1] = sides.held[joint, 1]
         step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
-        lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
-        shear, rubbing = rub_faces(
-            joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
-        )
+        lagging = press_faces(faces, joint, ends, late, force, rate, normals)
+        shear, rubbing = rub_faces(faces, joint, ends, late, normals, slid, force, rate, remembered)
         found.resultants[joint, 0] = -force[0]
         found.resultants[joint, 1] = joints.hand[joint] * shear
         found.resultants[joint, 2] = joints.hand[joint] * force[2]

@@ -123,14 +123,13 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     widens = 0.5 * shrinks
     total = moment = lost = 0.0
     rate[:] = 0.0  # in its first and last row, derivatives of total and moment at first
-    stride = 2 if faces.facets else 1
+    stride, places, shares = 2 if faces.facets else 1, faces.place, faces.share
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
-        x0 = faces.place[point]
-        x1 = faces.place[point + stride - 1]
+        x0, x1 = places[point], places[point + stride - 1]
         a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
         b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
         lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        share = faces.share[point]
+        share = shares[point]
         (n0, n1), (k00, k01, k11) = _carried(lagged, late, 1.0 + late, faces.facets)
         if late > 0.0:
             p0, p1 = _carried((a, c, b, d), 0.0, 1.0, faces.facets)[0]
@@ -249,7 +248,9 @@ def rub(first, change, late, limit):  # type: ignore
 
 
 @numba.njit(cache=True)
-def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
+def rub_faces(  # type: ignore  # noqa: PLR0913  (arrays in a tuple would be counted at each call)
+    faces, joint, ends, late, normals, slid, force, rate, after
+):
     """Add the shear of a joint over a step, and what its points remember at the end.
 
     Args:
@@ -259,16 +260,17 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
         late: lag of damping over the length of the step [-].
         normals: as `press_faces` fills them (p, 4) [N].
         slid: how far each point has slid for good before (p,) [m].
-        found: force on opening, slip and turn (3,) [N, N, N m], and its derivative by the measures
-            at the end (3, 3), both added to; `slid` at the end, filled for this joint (p,) [m].
+        force: on opening, slip and turn, added to (3,) [N, N, N m].
+        rate: its derivative by the measures at the end, added to (3, 3).
+        after: `slid` at the end, filled for this joint (p,) [m].
 
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    (force, rate, after), friction = found, faces.friction[joint]
+    friction, shears = faces.friction[joint], faces.shear
     total = lost = 0.0
     for point in range(faces.first[joint], faces.first[joint + 1]):
-        stiff = faces.shear[point]
+        stiff = shears[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)

@@ -63,16 +63,8 @@ def pose(sides, joint, side, q, found):  # type: ignore
     if start < 0:
         found[:] = sides.held[joint, side]
         return
-    x, y = _reach(sides, joint, side, q)
-    c, s = np.cos(q[start + 2]), np.sin(q[start + 2])
-    less = -2.0 * np.sin(0.5 * q[start + 2]) ** 2  # cos θ - 1
-    dx, dy = x - sides.arm[joint, side, 0], y - sides.arm[joint, side, 1]
-    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
-    found[0] = q[start] + less * rx - s * ry + c * dx - s * dy
-    found[1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
-    found[2] = q[start + 2]
-    for k in range(sides.size[joint, side] - 3):
-        found[2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
+    half = 0.5 * q[start + 2]
+    _place(sides, joint, side, q, (np.cos(half), np.sin(half)), found)
 
 
 @numba.njit(cache=True)
@@ -92,33 +84,34 @@ def swing(sides, joint, side, before, after, poses, rates):  # type: ignore
     Returns:
         What `swing_bend` needs to know of the step.
     """
-    start, size = sides.start[joint, side], sides.size[joint, side]
-    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    start = sides.start[joint, side]
     half = 0.5 * (after[start + 2] - before[start + 2])
     mean, shrunk, falls = small_turn(half)
     ch, sh = np.cos(0.5 * before[start + 2]), np.sin(0.5 * before[start + 2])
-    turns = (ch, sh), (ch * mean - sh * half * shrunk, sh * mean + ch * half * shrunk)
-    x = y = 0.0
-    for end in range(2):
-        q = after if end else before
-        ch, sh = turns[end]
-        less, s = -2.0 * sh * sh, 2.0 * sh * ch  # cos θ - 1, sin θ
-        c = 1.0 + less
-        px, py = _reach(sides, joint, side, q)
-        dx, dy = px - rx, py - ry
-        poses[end, side, 0] = q[start] + less * rx - s * ry + c * dx - s * dy
-        poses[end, side, 1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
-        poses[end, side, 2] = q[start + 2]
-        for k in range(size - 3):
-            poses[end, side, 2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
-        x, y = x + 0.5 * px, y + 0.5 * py
-        if end:
-            _turning(sides, joint, side, (c, s, 1.0, 1.0), (px, py), rates[1, side])
-        else:
-            middle = (c * mean - s * half * shrunk, s * mean + c * half * shrunk)
-    (c, s) = middle
-    _turning(sides, joint, side, (c, s, mean, shrunk), (x, y), rates[0, side])
-    return middle, (x, y), (mean, half * shrunk, shrunk, falls)
+    c, s, x0, y0 = _place(sides, joint, side, before, (ch, sh), poses[0, side])
+    ch, sh = ch * mean - sh * half * shrunk, sh * mean + ch * half * shrunk
+    c1, s1, x1, y1 = _place(sides, joint, side, after, (ch, sh), poses[1, side])
+    _turning(sides, joint, side, (c1, s1, 1.0, 1.0), (x1, y1), rates[1, side])
+    middle, reach = (c * mean - s * half * shrunk, s * mean + c * half * shrunk), (x0 + x1, y0 + y1)
+    reach = 0.5 * reach[0], 0.5 * reach[1]
+    _turning(sides, joint, side, (middle[0], middle[1], mean, shrunk), reach, rates[0, side])
+    return middle, reach, (mean, half * shrunk, shrunk, falls)
+
+
+@numba.njit(cache=True)
+def _place(sides, joint, side, q, half, found):  # type: ignore
+    """Find a pose from cosine and sine of half the turn; cosine, sine and reach are returned."""
+    start = sides.start[joint, side]
+    less, s = -2.0 * half[1] * half[1], 2.0 * half[1] * half[0]  # cos θ - 1, sin θ
+    c, (x, y) = 1.0 + less, _reach(sides, joint, side, q)
+    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    dx, dy = x - rx, y - ry
+    found[0] = q[start] + less * rx - s * ry + c * dx - s * dy
+    found[1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
+    found[2] = q[start + 2]
+    for k in range(sides.size[joint, side] - 3):
+        found[2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
+    return c, s, x, y
 
 
 @numba.njit(cache=True)
