@@ -266,7 +266,7 @@ def least(falls, length, low, precision):
 static = af.collapse_factor(stones.structure, live=af.BodyForce(1.0, 0.0), friction=None).factor
 lengths = [0.3] if quick else np.geomspace(0.12, 2.0, 10)
 boundary = {
-    name: [least(falls, length, static, 0.5 if quick else 0.01) for length in lengths]
+    name: [least(falls, length, 0.8 * static, 0.5 if quick else 0.01) for length in lengths]
     for name, falls in (("joints", falls_by_joints), ("rigid stones", falls_by_stones))
 }
 
@@ -315,8 +315,8 @@ def overturns(ratio, peak):
     return any(abs(frame.poses[-1, 2]) > 0.8 for frame in frames)
 
 
-ratios = [3.0] if quick else np.linspace(0.5, 6.0, 45)
-peaks = [0.34, 0.6] if quick else np.linspace(0.26, 2.5, 113)
+ratios = [3.0] if quick else np.linspace(0.5, 6.0, 34)
+peaks = [0.34, 0.6] if quick else np.linspace(0.26, 2.5, 57)
 over = np.array([[overturns(ratio, peak) for ratio in ratios] for peak in peaks])
 
 # %%

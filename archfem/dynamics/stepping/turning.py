@@ -28,7 +28,7 @@ from archfem.joints.moving.poses import Sides
 from archfem.models.moving import Moving
 
 ENOUGH = 1e-9
-"""Force left out of balance, relative to the weight: energy drifts by some 1e-8 of that exchanged."""
+"""Force left out of balance, relative to the weight: energy drifts by 1e-8 of what is exchanged."""
 
 ROUNDED = 1e-13
 """Correction, relative to the size of the structure, below which more passes change nothing."""
@@ -211,9 +211,8 @@ def _started(system, state, memory):  # type: ignore
 
 def _settled(system, kept, step, states, ground):  # type: ignore
     """Take a step by Newton's method."""
-    old, new = states
+    (old, new), looks = states, 0
     _load(system, kept, old, ground)
-    looks = 0
     for whole in WHOLE:
         kept.move[:] = system.step[0] * old[1]
         found, done = _sought(system, kept, old[0], new[0], whole)
@@ -228,13 +227,12 @@ def _settled(system, kept, step, states, ground):  # type: ignore
 @numba.njit(cache=True)
 def _sought(system, kept, before, after, whole):  # type: ignore
     """Find the end of a step; returns looks at what is out of balance, and whether it was found."""
-    move, rest, along, last, looks = kept.move, kept.rest, kept.along, np.inf, 1
+    move, rest, along, (enough, rounded) = kept.move, kept.rest, kept.along, system.enough
+    last, looks = np.inf, 1
     after[:] = before + move
     left = _left(system, kept, before, after)
     for turn in range(TURNS):
-        if left <= system.enough[0] or (
-            last <= system.enough[1] and left <= 1e4 * system.enough[0]
-        ):
+        if left <= enough or (last <= rounded and left <= 1e4 * enough):
             return looks, True
         _assemble(system, kept)
         if looks > LOOKS or not eliminate(kept.band, rest):
@@ -252,7 +250,7 @@ def _sought(system, kept, before, after, whole):  # type: ignore
                 break
             share *= 0.5
             move -= share * along
-        last, left = share * last, found
+        left, last = found, share * last
     return looks, False
 
 
