@@ -315,8 +315,8 @@ def overturns(ratio, peak):
     return any(abs(frame.poses[-1, 2]) > 0.8 for frame in frames)
 
 
-ratios = [3.0] if quick else np.linspace(0.5, 6.0, 34)
-peaks = [0.34, 0.6] if quick else np.linspace(0.26, 2.5, 57)
+ratios = [3.0] if quick else np.linspace(1.0, 6.0, 41)
+peaks = [0.34, 0.6] if quick else np.linspace(0.26, 2.5, 85)
 over = np.array([[overturns(ratio, peak) for ratio in ratios] for peak in peaks])
 
 # %%
@@ -327,7 +327,7 @@ if not quick:
         ratios, peaks, over, levels=(-0.5, 0.5, 1.5), colors=("white", "tab:red"), alpha=0.4
     )
 axes.axhline(0.25, color="black", ls="--", lw=1.0)
-axes.text(0.6, 0.1, "below this line it does not even rock", fontsize=8)
+axes.text(1.1, 0.1, "below this line it does not even rock", fontsize=8)
 axes.set(xlabel=r"frequency of the sine over that of the block, $\omega / p$", ylabel="peak [g]")
 axes.set(ylim=(0.0, None))
 figure
