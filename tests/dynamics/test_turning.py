@@ -1,6 +1,7 @@
 """Time histories of blocks that move as far as they like, and what they leave."""
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ import archfem as af
 from archfem.dynamics.collapse_scale import collapse_scale
 from archfem.dynamics.steps import State
 from archfem.errors import InvalidInput
+
+RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
 
 SHAKE = af.Motion.synthetic(duration=1.5, pga=4.0, seed=4)
 
@@ -88,6 +91,18 @@ def test_an_undamped_run_keeps_its_energy(friction, dt):
     run = af.time_history(model(friction=friction), SHAKE.scaled(1.5), dt=dt)
     assert run.dataset.attrs["energy_drift"] == pytest.approx(0.0, abs=1e-6)
     assert float(np.abs(run.joints["rotation"]).max()) > 3e-3
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="records are not shipped")
+@pytest.mark.parametrize("friction", [0.6, None])
+def test_an_undamped_run_keeps_its_energy_through_a_record(friction):
+    """To 1e-6 of the largest exchanged, through the 10 s of Erzincan's worst; joints turn far."""
+    motion = af.Motion.read(
+        RECORDS / "plain_columns" / "erzikan.txt", column=2, units="cm/s2", dt=0.005
+    ).cut(0.0, 10.0)
+    run = af.time_history(model(friction=friction), motion, dt=0.005)
+    assert run.dataset.attrs["energy_drift"] == pytest.approx(0.0, abs=1e-6)
+    assert float(np.abs(run.joints["rotation"]).max()) > 0.01
 
 
 def test_a_block_let_go_swings_for_its_period():

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import bend, discrete, gradient, measures
+from archfem.joints.moving.frames import bend, follow, measures
 from archfem.joints.moving.overlap import (
     Faces,
     overlap,
@@ -19,7 +19,7 @@ from archfem.joints.moving.overlap import (
     rub_faces,
     stored,
 )
-from archfem.joints.moving.poses import Sides, pose, pose_bend, pose_gradient
+from archfem.joints.moving.poses import Sides, pose, swing, swing_bend
 
 
 class Moved(NamedTuple):
@@ -138,65 +138,102 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
-    sides, size = joints.sides, found.force.shape[2]
-    poses, ends = np.empty((2, 2, 3)), np.empty((2, 3))
-    rates, now, curved = np.empty((3, 6)), np.empty((3, 6)), np.empty((6, 6))
-    own, last = np.empty((2, 3, size)), np.empty((2, 3, size))
-    turned, force, rate = np.empty((size, size)), np.empty(3), np.empty((3, 3))
-    pushed = np.empty(6)
-    normals = np.empty((len(slid), 4))
+    sides, faces, size = joints.sides, joints.faces, found.force.shape[2]
+    remembered, still = found.slid, ((1.0, 0.0), (0.0, 0.0), (1.0,) * 4)
+    poses, moves, ends = np.empty((2, 2, 3)), np.zeros((2, 2, 3, size)), np.empty((2, 3))
+    by_faces = np.empty((2, 3, 4))
+    force, rate, normals = np.empty(3), np.empty((3, 3)), np.empty((len(slid), 4))
+    pushed, curved = np.empty((2, 3)), np.empty((4, 4))
     for joint in range(len(joints.angle)):
-        for side in range(2):
-            pose(sides, joint, side, before, poses[0, side])
-            pose(sides, joint, side, after, poses[1, side])
-            pose_gradient(sides, joint, side, before, after, own[side])
-            pose_gradient(sides, joint, side, after, after, last[side])
-        angle = joints.angle[joint]
-        for end in range(2):
-            measures(poses[end, 0], poses[end, 1], angle, ends[end])
-        discrete(poses[0], poses[1], angle, rates)
-        gradient(poses[1], angle, now)
-        lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
-        shear, rubbing = rub_faces(
-            joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
-        )
+        swings = still, still
+        if sides.start[joint, 0] >= 0:
+            swings = swing(sides, joint, 0, before, after, poses, moves), still
+        else:
+            poses[:, 0] = sides.held[joint, 0]
+        if sides.start[joint, 1] >= 0:
+            swings = swings[0], swing(sides, joint, 1, before, after, poses, moves)
+        else:
+            poses[:, 1] = sides.held[joint, 1]
+        step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
+        lagging = press_faces(faces, joint, ends, late, force, rate, normals)
+        shear, rubbing = rub_faces(faces, joint, ends, late, normals, slid, force, rate, remembered)
         found.resultants[joint, 0] = -force[0]
         found.resultants[joint, 1] = joints.hand[joint] * shear
         found.resultants[joint, 2] = joints.hand[joint] * force[2]
         found.lost[joint] = lagging + rubbing
-        bend(poses[0], poses[1], angle, force, curved)
-        _between(rates, rate, now, curved)
-        _pushed(rates, force, pushed)
+        _between(by_faces, rate, curved)
+        bend(step, force, curved)
         for side in range(2):
-            pushing = pushed[3 * side : 3 * side + 3]
-            _pushed(own[side], pushing, found.force[joint, side])
-            pose_bend(sides, joint, side, before, after, pushing, turned)
+            _push(by_faces[0], force, side, pushed[side])
+            _gather(sides, joint, side, moves[0], pushed[side], found.force)
             for other in range(2):
-                block = found.rate[joint, side, :, other, :]
-                block[:] = 0.0
-                if other == side:
-                    block[:] = turned
-                part = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3]
-                _between(own[side], part, last[other], block)
+                _spread(sides, (joint, side, other), moves, curved, found.rate)
+            if sides.start[joint, side] >= 0:
+                swing_bend(sides, joint, side, swings[side], pushed[side], found.rate)
 
 
 @numba.njit(cache=True)
-def _pushed(rates, force, found):  # type: ignore
-    """Ratesᵀ force, filled."""
-    for column in range(len(found)):
-        found[column] = 0.0
-        for row in range(3):
-            found[column] += rates[row, column] * force[row]
-
-
-@numba.njit(cache=True)
-def _between(left, middle, right, found):  # type: ignore
-    """Leftᵀ middle right, added."""
-    for column in range(left.shape[1]):
+def _between(by_faces, rate, found):  # type: ignore
+    """Dᵀ rate B, of all faces can do to the joint (4, 4)."""
+    for column in range(4):
+        for row in range(4):
+            found[row, column] = 0.0
         for k in range(3):
             value = 0.0
-            for row in range(3):
-                value += left[row, column] * middle[row, k]
-            if value != 0.0:
-                for other in range(right.shape[1]):
-                    found[column, other] += value * right[k, other]
+            for j in range(3):
+                value += rate[k, j] * by_faces[1, j, column]
+            for row in range(4):
+                found[row, column] += by_faces[0, k, row] * value
+
+
+@numba.njit(cache=True)
+def _push(by_faces, force, side, found):  # type: ignore
+    """Forces on the pose of a face (3,)."""
+    sign = 2.0 * side - 1.0
+    found[0] = sign * (by_faces[0, 0] * force[0] + by_faces[1, 0] * force[1])
+    found[1] = sign * (by_faces[0, 1] * force[0] + by_faces[1, 1] * force[1])
+    found[2] = 0.0
+    for row in range(3):
+        found[2] += by_faces[row, 2 + side] * force[row]
+
+
+@numba.njit(cache=True)
+def _gather(sides, joint, side, moves, pushed, found):  # type: ignore
+    """Forces on the coordinates of a block."""
+    if sides.start[joint, side] < 0:
+        return
+    found[joint, side, 0], found[joint, side, 1] = pushed[0], pushed[1]
+    x, y = moves[side, 0, 2] * pushed[0], moves[side, 1, 2] * pushed[1]
+    found[joint, side, 2] = x + y + pushed[2]
+    for k in range(3, sides.size[joint, side]):
+        value = 0.0
+        for row in range(3):
+            value += moves[side, row, k] * pushed[row]
+        found[joint, side, k] = value
+
+
+@numba.njit(cache=True)
+def _spread(sides, where, moves, curved, found):  # type: ignore
+    """Derivative of the forces on a block by the coordinates of one."""
+    joint, side, other = where
+    sign = 1.0 if side == other else -1.0
+    toward, against = 2.0 * side - 1.0, 2.0 * other - 1.0
+    for column in range(sides.size[joint, other]):
+        if column < 2:
+            x, y = sign * curved[0, column], sign * curved[1, column]
+            turn = against * curved[2 + side, column]
+        else:
+            a, b = against * moves[1, other, 0, column], against * moves[1, other, 1, column]
+            c = 1.0 if column == 2 else moves[1, other, 2, column]
+            last = 2 + other
+            x = toward * (curved[0, 0] * a + curved[0, 1] * b + curved[0, last] * c)
+            y = toward * (curved[1, 0] * a + curved[1, 1] * b + curved[1, last] * c)
+            row = 2 + side
+            turn = curved[row, 0] * a + curved[row, 1] * b + curved[row, last] * c
+        for k in range(sides.size[joint, side]):
+            if k < 2:
+                value = y if k else x
+            else:
+                by_turn = 1.0 if k == 2 else moves[0, side, 2, k]
+                value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y + by_turn * turn
+            found[joint, side, k, other, column] = value

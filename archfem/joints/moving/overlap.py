@@ -122,15 +122,14 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks
     total = moment = lost = 0.0
-    total_by, moment_by = np.zeros(3), np.zeros(3)
-    stride = 2 if faces.facets else 1
+    rate[:] = 0.0  # in its first and last row, derivatives of total and moment at first
+    stride, places, shares = 2 if faces.facets else 1, faces.place, faces.share
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
-        x0 = faces.place[point]
-        x1 = faces.place[point + stride - 1]
+        x0, x1 = places[point], places[point + stride - 1]
         a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
         b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
         lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        share = faces.share[point]
+        share = shares[point]
         (n0, n1), (k00, k01, k11) = _carried(lagged, late, 1.0 + late, faces.facets)
         if late > 0.0:
             p0, p1 = _carried((a, c, b, d), 0.0, 1.0, faces.facets)[0]
@@ -144,8 +143,8 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         for k in range(3):
             by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            total_by[k] += share * (near + far)
-            moment_by[k] += share * (x0 * near + x1 * far)
+            rate[0, k] += share * (near + far)
+            rate[2, k] += share * (x0 * near + x1 * far)
             wider = widens if k == 1 else 0.0
             normals[point, 1 + k] = scale * (mean * near + wider * n0)
             if faces.facets:
@@ -159,11 +158,11 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     force[2] = -stiff * mean * mean * moment
     by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
     for k in range(3):
-        wider, turns = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0
-        rate[0, k] = stiff * (mean * total_by[k] + wider * total)
-        rate[2, k] = -stiff * mean * (mean * moment_by[k] + 2.0 * wider * moment)
+        wider, turns, by_moment = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0, rate[2, k]
+        rate[0, k] = stiff * (mean * rate[0, k] + wider * total)
+        rate[2, k] = -stiff * mean * (mean * by_moment + 2.0 * wider * moment)
         change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
-        change -= mean * turn * moment_by[k]
+        change -= mean * turn * by_moment
         rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
     return stiff * mean * lost
 
@@ -230,7 +229,9 @@ def _rubbed(first, change, late, limit):  # type: ignore
 
 
 @numba.njit(cache=True)
-def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
+def rub_faces(  # type: ignore  # noqa: PLR0913  (arrays in a tuple would be counted at each call)
+    faces, joint, ends, late, normals, slid, force, rate, after
+):
     """Add the shear of a joint over a step, and what its points remember at the end.
 
     Args:
@@ -240,24 +241,25 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
         late: lag of damping over the length of the step [-].
         normals: as `press_faces` fills them (p, 4) [N].
         slid: how far each point has slid for good before (p,) [m].
-        found: force on opening, slip and turn (3,) [N, N, N m], and its derivative by the measures
-            at the end (3, 3), both added to; `slid` at the end, filled for this joint (p,) [m].
+        force: on opening, slip and turn, added to (3,) [N, N, N m].
+        rate: its derivative by the measures at the end, added to (3, 3).
+        after: `slid` at the end, filled for this joint (p,) [m].
 
     Returns:
         The mean shear [N], and the energy that friction and the lag take [J].
     """
-    (force, rate, after), friction = found, faces.friction[joint]
+    friction, shears = faces.friction[joint], faces.shear
     total = lost = 0.0
     for point in range(faces.first[joint], faces.first[joint + 1]):
-        stiff = faces.shear[point]
+        stiff = shears[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
         limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
-        shear, over, by_change, by_limit, rubbing = _rubbed(first, change, late, limit)
+        shear, unheld, by_change, by_limit, taken = _rubbed(first, change, late, limit)
         total += shear
-        lost += rubbing / stiff
+        lost += taken / stiff
         rate[1, 1] += stiff * by_change
-        after[point] = slid[point] + over / stiff
+        after[point] = slid[point] + unheld / stiff
         if by_limit != 0.0:
             for k in range(3):
                 rate[1, k] += by_limit * friction * normals[point, 1 + k]

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import sinc, sinc_rate
+from archfem.joints.moving.frames import small_turn
 
 
 class Sides(NamedTuple):
@@ -49,16 +49,6 @@ def _reach(sides, joint, side, q):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _midway(sides, joint, side, before, after):  # type: ignore
-    """Half-way through a step: r + U ξ on the mean, half the turn, and cosine and sine there."""
-    turn = sides.start[joint, side] + 2
-    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
-    half = 0.5 * (after[turn] - before[turn])
-    middle = before[turn] + half
-    return (0.5 * (x0 + x1), 0.5 * (y0 + y1)), half, (np.cos(middle), np.sin(middle))
-
-
-@numba.njit(cache=True)
 def pose(sides, joint, side, q, found):  # type: ignore
     """Find the pose of a face.
 
@@ -73,71 +63,88 @@ def pose(sides, joint, side, q, found):  # type: ignore
     if start < 0:
         found[:] = sides.held[joint, side]
         return
-    x, y = _reach(sides, joint, side, q)
-    c, s = np.cos(q[start + 2]), np.sin(q[start + 2])
-    less = -2.0 * np.sin(0.5 * q[start + 2]) ** 2  # cos θ - 1
-    dx, dy = x - sides.arm[joint, side, 0], y - sides.arm[joint, side, 1]
+    half = 0.5 * q[start + 2]
+    _place(sides, joint, side, q, (np.cos(half), np.sin(half)), found)
+
+
+@numba.njit(cache=True)
+def swing(sides, joint, side, before, after, poses, rates):  # type: ignore
+    """Find the poses of a face at both ends of a step, and their derivatives.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher, of one that moves.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
+        poses: at the start and at the end, of both sides, filled for this one (2, 2, 3).
+        rates: what takes the change of coordinates over the step to that of the pose, and the
+            derivative at the end, filled for this side (2, 2, 3, s).
+
+    Returns:
+        What `swing_bend` needs to know of the step.
+    """
+    start = sides.start[joint, side]
+    half = 0.5 * (after[start + 2] - before[start + 2])
+    mean, shrunk, falls = small_turn(half)
+    ch, sh = np.cos(0.5 * before[start + 2]), np.sin(0.5 * before[start + 2])
+    c, s, x0, y0 = _place(sides, joint, side, before, (ch, sh), poses[0, side])
+    ch, sh = ch * mean - sh * half * shrunk, sh * mean + ch * half * shrunk
+    c1, s1, x1, y1 = _place(sides, joint, side, after, (ch, sh), poses[1, side])
+    _turning(sides, joint, side, (c1, s1, 1.0, 1.0), (x1, y1), rates[1, side])
+    middle, reach = (c * mean - s * half * shrunk, s * mean + c * half * shrunk), (x0 + x1, y0 + y1)
+    reach = 0.5 * reach[0], 0.5 * reach[1]
+    _turning(sides, joint, side, (middle[0], middle[1], mean, shrunk), reach, rates[0, side])
+    return middle, reach, (mean, half * shrunk, shrunk, falls)
+
+
+@numba.njit(cache=True)
+def _place(sides, joint, side, q, half, found):  # type: ignore
+    """Find a pose from cosine and sine of half the turn; cosine, sine and reach are returned."""
+    start = sides.start[joint, side]
+    less, s = -2.0 * half[1] * half[1], 2.0 * half[1] * half[0]  # cos θ - 1, sin θ
+    c, (x, y) = 1.0 + less, _reach(sides, joint, side, q)
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    dx, dy = x - rx, y - ry
     found[0] = q[start] + less * rx - s * ry + c * dx - s * dy
     found[1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
     found[2] = q[start + 2]
     for k in range(sides.size[joint, side] - 3):
         found[2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
+    return c, s, x, y
 
 
 @numba.njit(cache=True)
-def pose_gradient(sides, joint, side, before, after, rates):  # type: ignore
-    """Find what takes the change of coordinates over a step to that of the pose of a face.
-
-    With both ends the same it is the derivative there.
-
-    Args:
-        sides: `Sides`.
-        joint: its number.
-        side: 0 of the lower block, 1 of the higher.
-        before: coordinates at the start (n,).
-        after: coordinates at the end (n,).
-        rates: filled in its first columns (3, s).
-    """
-    start, size = sides.start[joint, side], sides.size[joint, side]
-    rates[:] = 0.0
-    if start < 0:
-        return
-    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
-    shrunk, mean = sinc(half), np.cos(half)
-    rates[0, 0] = rates[1, 1] = rates[2, 2] = 1.0
+def _turning(sides, joint, side, turn, reach, rates):  # type: ignore
+    """Write down a derivative of a pose by the turn and by the shapes."""
+    (c, s, mean, shrunk), (x, y) = turn, reach
     rates[0, 2], rates[1, 2] = -shrunk * (s * x + c * y), shrunk * (c * x - s * y)
-    for k in range(size - 3):
+    for k in range(sides.size[joint, side] - 3):
         u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
         rates[0, 3 + k], rates[1, 3 + k] = mean * (c * u - s * v), mean * (s * u + c * v)
         rates[2, 3 + k] = sides.shapes[joint, side, 2, k]
 
 
 @numba.njit(cache=True)
-def pose_bend(sides, joint, side, before, after, force, rates):  # type: ignore
-    """Find the derivative of generalised forces on a face by the coordinates at the end.
+def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
+    """Add the derivative of generalised forces on a face by the coordinates at the end.
 
     Args:
         sides: `Sides`.
         joint: its number.
-        side: 0 of the lower block, 1 of the higher.
-        before: coordinates at the start (n,).
-        after: coordinates at the end (n,).
+        side: 0 of the lower block, 1 of the higher, of one that moves.
+        step: as `swing` returned it.
         force: on the pose, which is held (3,) [N, N, N m].
-        rates: filled in its first rows and columns (s, s).
+        rates: of all joints, added to (j, 2, s, 2, s).
     """
-    start, size = sides.start[joint, side], sides.size[joint, side]
-    rates[:] = 0.0
-    if start < 0:
-        return
-    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
-    shrunk, mean = sinc(half), np.cos(half)
-    along = force[0] * (c * x - s * y) + force[1] * (s * x + c * y)  # F·R x
-    across = -force[0] * (s * x + c * y) + force[1] * (c * x - s * y)  # F·J R x
-    rates[2, 2] = 0.5 * (sinc_rate(half) * across - shrunk * along)
-    for k in range(size - 3):
+    (c, s), (x, y), (mean, sine, shrunk, falls) = step
+    fx, fy = force[0], force[1]
+    along = fx * (c * x - s * y) + fy * (s * x + c * y)  # F·R x
+    across = -fx * (s * x + c * y) + fy * (c * x - s * y)  # F·J R x
+    rates[joint, side, 2, side, 2] += 0.5 * (falls * across - shrunk * along)
+    for k in range(sides.size[joint, side] - 3):
         u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
-        straight = force[0] * (c * u - s * v) + force[1] * (s * u + c * v)
-        turned = -force[0] * (s * u + c * v) + force[1] * (c * u - s * v)
-        rates[3 + k, 2] = 0.5 * (mean * turned - np.sin(half) * straight)
-        rates[2, 3 + k] = 0.5 * shrunk * turned
+        straight = fx * (c * u - s * v) + fy * (s * u + c * v)
+        turned = -fx * (s * u + c * v) + fy * (c * u - s * v)
+        rates[joint, side, 3 + k, side, 2] += 0.5 * (mean * turned - sine * straight)
+        rates[joint, side, 2, side, 3 + k] += 0.5 * shrunk * turned
