@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.dynamics.falling.engine import STILL, Falling
 from archfem.dynamics.falling.handover import Handover, released
 from archfem.dynamics.falling.state import Loose
 from archfem.dynamics.falling.verdict import Fall, fall_of
 from archfem.dynamics.steps import Batch, State
+from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.gauges import Gauges
 from archfem.models.moving import Moving
@@ -38,6 +41,10 @@ SPACING = 0.02
 class Parting:
     """Says in which step of a run a joint lets its blocks go.
 
+    A joint between stones does once it has turned far or slid off its face. Fill fits itself to
+    what it lies on, and its pieces tumble on the spot: it is loose once it has moved by the size of
+    what it touches.
+
     Attributes:
         model: whose joints.
     """
@@ -51,8 +58,10 @@ class Parting:
             batch: steps of a run.
         """
         gauges, structure = Gauges.on(self.model), self.model.structure
-        _, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
-        loose = (np.abs(turn) > TURNED) | (np.abs(slip) >= structure.depths)
+        gap, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
+        size, stones = _sizes(structure)
+        loose = stones & ((np.abs(turn) > TURNED) | (np.abs(slip) >= size))
+        loose |= ~stones & (np.hypot(gap, slip) >= size)
         if not loose.any():
             return None
         k = int(np.argmax(loose.any(axis=1)))
@@ -61,6 +70,13 @@ class Parting:
         if abs(turn[k, joint]) > TURNED:
             return k, f"'{name}' had turned by {abs(turn[k, joint]):.2g} rad"
         return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
+
+
+def _sizes(structure: Structure) -> tuple[Array, NDArray[np.bool_]]:
+    """How far the blocks at each joint part (j,) [m], and whether neither is fill."""
+    root = np.sqrt([block.area for block in structure.blocks])[structure.pairs].min(axis=1)
+    stones = ~np.isin(structure.pairs, yielding_blocks(structure)).any(axis=1)
+    return np.where(stones, structure.depths, root), stones
 
 
 FRICTION = 0.6
@@ -134,11 +150,10 @@ def left_standing(model: Moving, state: State) -> Fall:
 
 
 def _rubbing(structure: Structure) -> Structure:
-    """The structure with joints that can all slide."""
-    joints = [
-        joint
-        if joint.contact.slides
-        else replace(joint, contact=replace(joint.contact, friction=FRICTION))
-        for joint in structure.joints
-    ]
+    """The structure with joints that can all slide, and whose cohesion is broken."""
+    joints = []
+    for joint in structure.joints:
+        friction = joint.contact.coefficient if joint.contact.slides else FRICTION
+        contact = replace(joint.contact, friction=friction, cohesion=0.0)
+        joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))

@@ -146,6 +146,7 @@ def _faces(model: Jointed) -> Faces:
         np.repeat(share[0::2] + share[1::2], 2) if facets else share,
         points.shear,
         facets,
+        structure.width * np.array([each.cohesion for each in contacts]),
     )
 
 
@@ -222,9 +223,9 @@ def plane(small: Model) -> Jointed:
             f"large displacements are not known on the rung '{small.fidelity}': use one of {PLANE}"
         )
     points = small.operator.points
-    if points.cohesion.any() or not points.plain:
+    if not points.plain:
         raise InvalidInput(
-            "joints with cohesion, dilatancy or tension are not known with large displacements: "
-            f"leave them out (the largest cohesion is {points.cohesion.max():.4g} Pa)"
+            "joints with dilatancy or tension are not known with large displacements: leave them "
+            "out"
         )
     return small

@@ -71,6 +71,7 @@ def two_joints(shapes, friction, facets, rng):
         np.full(2 * points, 1.0 / count),
         np.repeat([3e4, 2e4], points) / points,
         facets,
+        np.array([0.0, 2e3]),
     )
     return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2))
 

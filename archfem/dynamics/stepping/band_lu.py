@@ -20,16 +20,20 @@ def eliminate(band, vector):  # type: ignore
         Whether the matrix is regular.
     """
     size, half = len(vector), (band.shape[1] - 1) // 3
+    far = min(half, size - 1)  # last column that any row so far has an entry in
     for k in range(size):
-        below, last = min(k + half, size - 1), min(k + 2 * half, size - 1)
-        if not _exchange(band, vector, k, half):
+        pivot = _exchange(band, vector, k, half)
+        if pivot < 0:
             return False
-        for i in range(k + 1, below + 1):
-            factor = band[i, half + k - i] / band[k, half]
+        far = min(max(far, pivot + half), size - 1)
+        upper = band[k, half + 1 : half + 1 + far - k]
+        for i in range(k + 1, min(k + half, size - 1) + 1):
+            place = half + k - i
+            factor = band[i, place] / band[k, half]
             if factor != 0.0:
-                shift = k - i
-                for j in range(k + 1, last + 1):
-                    band[i, half + j - k + shift] -= factor * band[k, half + j - k]
+                lower = band[i, place + 1 : place + 1 + far - k]
+                for j in range(len(upper)):
+                    lower[j] -= factor * upper[j]
                 vector[i] -= factor * vector[k]
     for k in range(size - 1, -1, -1):
         total = vector[k]
@@ -41,7 +45,7 @@ def eliminate(band, vector):  # type: ignore
 
 @numba.njit(cache=True)
 def _exchange(band, vector, k, half):  # type: ignore
-    """Bring the largest entry of a column into row k; returns whether there is one."""
+    """Bring the largest entry of a column into row k; returns the row it was in, -1 if none is."""
     size, pivot, largest = len(vector), k, abs(band[k, half])
     for i in range(k + 1, min(k + half, size - 1) + 1):
         if abs(band[i, half + k - i]) > largest:
@@ -53,7 +57,7 @@ def _exchange(band, vector, k, half):  # type: ignore
             band[k, half + j - k] = band[pivot, half + j - k + shift]
             band[pivot, half + j - k + shift] = upper
         vector[k], vector[pivot] = vector[pivot], vector[k]
-    return largest > 0.0
+    return pivot if largest > 0.0 else -1
 
 
 def half_width(matrix) -> int:  # type: ignore

@@ -14,6 +14,7 @@ from archfem.arrays import Array
 from archfem.joints.moving.frames import bend, discrete, gradient, measures
 from archfem.joints.moving.overlap import (
     Faces,
+    limit_faces,
     overlap,
     press_faces,
     rub_faces,
@@ -157,6 +158,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         discrete(poses[0], poses[1], angle, rates)
         gradient(poses[1], angle, now)
         lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
+        limit_faces(joints.faces, joint, ends, late, normals)
         shear, rubbing = rub_faces(
             joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
         )

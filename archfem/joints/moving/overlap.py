@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.means import facet_means, point_means
+from archfem.joints.moving.means import closed_means, facet_means, point_means
 
 
 class Faces(NamedTuple):
@@ -33,6 +33,7 @@ class Faces(NamedTuple):
         share: of the depth that a point stands for, or the whole facet it is on (p,) [-].
         shear: k_s times the area of each point (p,) [N/m].
         facets: whether points are ends of facets, not springs.
+        cohesion: c w, which adds to friction where a joint is closed (j,) [N/m].
     """
 
     depth: Array
@@ -43,6 +44,7 @@ class Faces(NamedTuple):
     share: Array
     shear: Array
     facets: bool
+    cohesion: Array
 
 
 @numba.njit(cache=True)
@@ -218,6 +220,51 @@ def _slope(before, after, depth):  # type: ignore
 
 
 @numba.njit(cache=True)
+def limit_faces(faces, joint, ends, late, limits):  # type: ignore
+    """Turn the pressing forces of a joint over a step into Coulomb's limits, μ N + c A.
+
+    A is the mean area on which a facet is closed, shared among its ends.
+
+    Args:
+        faces: `Faces`.
+        joint: its number.
+        ends: measures at the start and at the end of the step (2, 3).
+        late: lag of damping over the length of the step [-].
+        limits: pressing forces as `press_faces` fills them, made limits (p, 4) [N].
+    """
+    friction, cohesion = faces.friction[joint], faces.cohesion[joint]
+    if friction == np.inf:
+        return
+    for point in range(faces.first[joint], faces.first[joint + 1]):
+        limits[point] *= friction
+        limits[point, 0] = max(limits[point, 0], 0.0)
+    if cohesion == 0.0:
+        return
+    l0, (l1, shrinks) = (
+        overlap(faces.depth[joint], ends[0, 1])[0],
+        overlap(faces.depth[joint], ends[1, 1]),
+    )
+    mean, stride = 0.5 * (l0 + l1), 2 if faces.facets else 1
+    for point in range(faces.first[joint], faces.first[joint + 1], stride):
+        x0, x1 = faces.place[point], faces.place[point + stride - 1]
+        a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
+        b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
+        lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
+        (near, far), (k00, k01, k11) = closed_means(lagged, late, 1.0 + late, faces.facets)
+        scale = cohesion * faces.share[point]
+        limits[point, 0] += scale * mean * near
+        if faces.facets:
+            limits[point + 1, 0] += scale * mean * far
+        for k in range(3):
+            by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
+            wider = 0.5 * shrinks if k == 1 else 0.0
+            limits[point, 1 + k] += scale * (mean * (k00 * by_b + k01 * by_d) + wider * near)
+            if faces.facets:
+                closing = mean * (k01 * by_b + k11 * by_d) + wider * far
+                limits[point + 1, 1 + k] += scale * closing
+
+
+@numba.njit(cache=True)
 def rub(first, change, late, limit, found):  # type: ignore
     """Find the mean shear of a point over a step, as `law.shear_over_step`.
 
@@ -259,7 +306,7 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
         joint: its number.
         ends: measures at the start and at the end of the step (2, 3).
         late: lag of damping over the length of the step [-].
-        normals: as `press_faces` fills them (p, 4) [N].
+        normals: Coulomb's limits, as `limit_faces` leaves them (p, 4) [N].
         slid: how far each point has slid for good before (p,) [m].
         found: force on opening, slip and turn (3,) [N, N, N m], and its derivative by the measures
             at the end (3, 3), both added to; `slid` at the end, filled for this joint (p,) [m].
@@ -273,7 +320,7 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
         stiff = faces.shear[point]
         change = stiff * (ends[1, 1] - ends[0, 1])
         first = stiff * (ends[0, 1] - slid[point])
-        limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
+        limit = np.inf if friction == np.inf else normals[point, 0]
         rub(first, change, late, limit, own)
         total += own[0]
         lost += own[4] / stiff
@@ -281,6 +328,6 @@ def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
         after[point] = slid[point] + own[1] / stiff
         if own[3] != 0.0:
             for k in range(3):
-                rate[1, k] += own[3] * friction * normals[point, 1 + k]
+                rate[1, k] += own[3] * normals[point, 1 + k]
     force[1] += total
     return total, lost
