@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from archfem.arrays import Array
 from archfem.dynamics.falling.engine import STILL, Falling
 from archfem.dynamics.falling.handover import Handover, released
 from archfem.dynamics.falling.state import Loose
@@ -42,8 +41,7 @@ class Parting:
     """Says in which step of a run a joint lets its blocks go.
 
     A joint between stones does once it has turned far or slid off its face. Fill fits itself to
-    what it lies on, and its pieces tumble on the spot: it is loose once it has moved by the size of
-    what it touches.
+    what it lies on, and its pieces tumble on the spot or crumble off its ends: that is no fall.
 
     Attributes:
         model: whose joints.
@@ -58,10 +56,9 @@ class Parting:
             batch: steps of a run.
         """
         gauges, structure = Gauges.on(self.model), self.model.structure
-        gap, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
-        size, stones = _sizes(structure)
-        loose = stones & ((np.abs(turn) > TURNED) | (np.abs(slip) >= size))
-        loose |= ~stones & (np.hypot(gap, slip) >= size)
+        _, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
+        loose = (np.abs(turn) > TURNED) | (np.abs(slip) >= structure.depths)
+        loose &= _between_stones(structure)
         if not loose.any():
             return None
         k = int(np.argmax(loose.any(axis=1)))
@@ -72,11 +69,10 @@ class Parting:
         return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
 
 
-def _sizes(structure: Structure) -> tuple[Array, NDArray[np.bool_]]:
-    """How far the blocks at each joint part (j,) [m], and whether neither is fill."""
-    root = np.sqrt([block.area for block in structure.blocks])[structure.pairs].min(axis=1)
-    stones = ~np.isin(structure.pairs, yielding_blocks(structure)).any(axis=1)
-    return np.where(stones, structure.depths, root), stones
+def _between_stones(structure: Structure) -> NDArray[np.bool_]:
+    """Whether joints have no fill on either side (j,)."""
+    found: NDArray[np.bool_] = ~np.isin(structure.pairs, yielding_blocks(structure)).any(axis=1)
+    return found
 
 
 FRICTION = 0.6
@@ -90,7 +86,8 @@ def tilting(model: Moving, state: State) -> bool:
         model: that has not parted.
         state: at the end of its motion.
     """
-    turned = float(np.abs(model.measures(state.q)[:, 2]).max())
+    stones = _between_stones(model.structure)
+    turned = float(np.abs(model.measures(state.q)[stones, 2]).max(initial=0.0))
     return turned > TILTED and not left_standing(model, state).resting
 
 

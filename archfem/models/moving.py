@@ -26,31 +26,43 @@ from archfem.models.cells import Cells
 from archfem.models.model import Model, Passage, Prediction
 from archfem.models.moving_passage import MovingPassage
 from archfem.models.reduced import projected
-from archfem.models.turning_blocks import OwnCoordinates, held_poses, plane, slots_of
-from archfem.models.turning_places import TurningCells, TurningPoint
+from archfem.models.turning_blocks import OwnCoordinates, jointed, slots_of
+from archfem.models.turning_joints import Pieces, joints_of
+from archfem.models.turning_places import StillPoint, TurningCells, TurningPoint
 
 
 class Moving:
     """A model whose blocks move as far as they like; `Model` says what its members mean.
 
     Args:
-        small: the same structure with small displacements, "rigid" or "faces", with exact facets.
+        small: the same structure with small displacements, on a rung that has matrices; with exact
+            facets where faces bend.
+
+    Attributes:
+        starts: where the coordinates of each block that moves begin, and the number of all.
+        turning: whether each of those blocks has a frame that turns; a fill has none.
+        centres: about which blocks turn (n_blocks, 2) [m].
+        pieces: of the joints.
 
     Raises:
-        InvalidInput: faces bend, or the joints obey a law that is not known for large motion.
+        InvalidInput: the joints obey a law that is not known for large motion, or faces bend
+            between springs.
     """
 
     operator = None
 
     def __init__(self, small: Model) -> None:
-        small = plane(small)
+        small = jointed(small)
         blocks = OwnCoordinates.of(small)
         self.at_rest = projected(small, blocks.basis, small.fidelity)
         self.structure = small.structure
         self.fidelity = small.fidelity
         self.size = self.at_rest.size
-        self.starts = np.append(sorted(blocks.starts.values()), self.size)
-        self.joints = blocks.joints(self.at_rest)
+        self.starts = blocks.starts
+        self.turning = np.array([turns for _, turns in blocks.blocks.values()])
+        self.centres = blocks.centres
+        self.pieces = Pieces.of(self.at_rest)
+        self.joints = joints_of(self.at_rest, self.pieces, blocks.blocks, blocks.centres)
         self._slots, coupled = slots_of(self.joints.sides, self.size)
         pattern = Pattern.of(self.at_rest.mass, self.at_rest.blocks, coupled)
         self.mass = pattern.spread(self.at_rest.mass)
@@ -58,7 +70,7 @@ class Moving:
         self._pattern = pattern
         self._entries = pattern.places(*self._slots.pairs)
         self.body = self.at_rest.body
-        self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.starts)
+        self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.blocks)
         self.supports = self.at_rest.supports
         self.prediction: Prediction | None = None
         self._points: dict[PointLoad, TurningPoint] = {}
@@ -81,7 +93,7 @@ class Moving:
         other = copy(self)
         other.supports = supports
         sides = self.joints.sides
-        held = held_poses(self.structure, supports)
+        held = self.pieces.held(supports)
         other.joints = self.joints._replace(sides=sides._replace(held=held))
         return other
 
@@ -256,7 +268,7 @@ class Moving:
             return float(self.load(action) @ q)
         return float(self._place(action).displacement(q) @ np.array(action.force))
 
-    def _place(self, action: PointLoad) -> TurningPoint:
+    def _place(self, action: PointLoad) -> TurningPoint | StillPoint:
         """Where a point load acts."""
         if action in self._points:
             return self._points[action]
@@ -264,6 +276,8 @@ class Moving:
         rows = self.at_rest.cells.at(block, point)
         number = self.structure.free.index(block)
         first, end = self.starts[number], self.starts[number + 1]
+        if not self.turning[number]:
+            return StillPoint(rows)
         local = rows[:, first:end].toarray()
         found = TurningPoint(int(first), np.array([local[1, 2], -local[0, 2]]), local[:, 3:])
         self._points[action] = found

@@ -48,12 +48,17 @@ def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
 
 def two_joints(shapes, friction, facets, rng):
     """Block 0 on block 1 on the ground, with modes or without."""
-    count = 4
+    count, size = 4, 3 + shapes
+    moves, stretch = np.zeros((2, 2, 3, size)), np.zeros((2, 2, size))
+    moves[..., 3:] = 0.1 * rng.normal(size=(2, 2, 3, shapes))
+    stretch[..., 3:] = 0.1 * rng.normal(size=(2, 2, shapes))
     sides = Sides(
-        np.array([[0, 3 + shapes], [3 + shapes, -1]]),
-        np.array([[3 + shapes, 3 + shapes], [3 + shapes, 0]]),
+        np.array([[0, size], [size, 0]])[..., None] + np.arange(size),
+        np.array([[size, size], [size, 0]]),
+        np.array([[True, True], [True, False]]),
         rng.normal(size=(2, 2, 2)),
-        0.1 * rng.normal(size=(2, 2, 3, shapes)),
+        moves,
+        stretch if shapes else stretch[..., :0],
         np.zeros((2, 2, 3)),
     )
     edges = np.linspace(-0.5, 0.5, count + 1)
@@ -72,8 +77,10 @@ def two_joints(shapes, friction, facets, rng):
         np.repeat([3e4, 2e4], points) / points,
         facets,
         np.array([0.0, 2e3]),
+        np.array([False, shapes > 0]),
     )
-    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2))
+    whole = np.arange(2)
+    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2), whole, np.zeros(2), 2)
 
 
 def gathered(joints, before, after, late, slid):
@@ -81,18 +88,15 @@ def gathered(joints, before, after, late, slid):
     found, size = answer(joints), len(before)
     pass_joints(joints, before, after, late, slid, found)
     force, rate = np.zeros(size), np.zeros((size, size))
-    start, sizes = joints.sides.start, joints.sides.size
+    index, sizes = joints.sides.index, joints.sides.size
     for joint in range(2):
         for side in range(2):
-            if start[joint, side] < 0:
-                continue
-            own = start[joint, side] + np.arange(sizes[joint, side])
+            own = index[joint, side, : sizes[joint, side]]
             force[own] += found.force[joint, side, : len(own)]
             for other in range(2):
-                if start[joint, other] >= 0:
-                    theirs = start[joint, other] + np.arange(sizes[joint, other])
-                    block = found.rate[joint, side, : len(own), other, : len(theirs)]
-                    rate[np.ix_(own, theirs)] += block
+                theirs = index[joint, other, : sizes[joint, other]]
+                block = found.rate[joint, side, : len(own), other, : len(theirs)]
+                rate[np.ix_(own, theirs)] += block
     return force, rate, found
 
 

@@ -133,11 +133,8 @@ class Turning(Reordered):
 
     def _sides(self) -> Sides:
         """The joints' faces, with coordinates in the order of the band."""
-        sides, starts = self._model.joints.sides, self._model.starts
-        sizes = np.diff(starts)[self._blocks]
-        moved = np.full(starts[-1] + 1, -1)
-        moved[starts[self._blocks]] = np.cumsum(sizes) - sizes
-        return sides._replace(start=np.where(sides.start < 0, -1, moved[sides.start]))
+        sides = self._model.joints.sides
+        return sides._replace(index=self._place[sides.index])
 
 
 def _narrow(model: Moving) -> Any:
@@ -257,12 +254,11 @@ def _left(system, kept, before, after):  # type: ignore
         for j in range(max(0, i - half), min(size, i + half + 1)):
             total += band[i, half + j - i] * kept.move[j]
         rest[i] -= total
-    start, sizes, force = joints.sides.start, joints.sides.size, system.room.force
-    for joint in range(len(start)):
+    index, sizes, force = joints.sides.index, joints.sides.size, system.room.force
+    for joint in range(len(index)):
         for side in range(2):
-            first = start[joint, side]
             for k in range(sizes[joint, side]):
-                rest[first + k] -= force[joint, side, k]
+                rest[index[joint, side, k]] -= force[joint, side, k]
     return np.sqrt(np.sum(rest * rest))
 
 
@@ -270,17 +266,17 @@ def _left(system, kept, before, after):  # type: ignore
 def _assemble(system, kept):  # type: ignore
     """The derivative of the forces by the end of the step."""
     band, rate = kept.band, system.room.rate
-    start, sizes = system.turning.sides.start, system.turning.sides.size
+    index, sizes = system.turning.sides.index, system.turning.sides.size
     half = (band.shape[1] - 1) // 3
     band[:] = system.band
-    for joint in range(len(start)):
+    for joint in range(len(index)):
         for side in range(2):
             for k in range(sizes[joint, side]):
-                row = start[joint, side] + k
+                row = index[joint, side, k]
                 for other in range(2):
-                    first = half + start[joint, other] - row
                     for m in range(sizes[joint, other]):
-                        band[row, first + m] += rate[joint, side, k, other, m]
+                        column = half + index[joint, other, m] - row
+                        band[row, column] += rate[joint, side, k, other, m]
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore

@@ -98,9 +98,7 @@ def closed_means(ends, first, second, facet):  # type: ignore
         for k in range(3):
             place = breaks[piece] + PLACES[k] * length
             near, far = 1.0 - place, place
-            time, rate = _closed_rate(
-                near * a + far * c, near * b + far * d, first, second
-            )
+            time, rate = _closed_rate(near * a + far * c, near * b + far * d, first, second)
             weight = SHARES[k] * length
             s0 += weight * near * time
             s1 += weight * far * time

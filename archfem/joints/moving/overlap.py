@@ -9,7 +9,7 @@ over a step are those whose work is the change of that:
     F_s = k_n w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i f̄_i) + Σ τ̄_i,
 
 f̄_i the means of ∫φ_i <gap>₋ dx, or of W_i <gap>₋, while the gap goes straight, bars means of both
-ends. At each point a spring in series with a stop holds the shear, as `law.shear_over_step`.
+ends; `rubbing` gives the shear τ̄.
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.means import closed_means, facet_means, point_means
+from archfem.joints.moving.means import facet_means, point_means
 
 
 class Faces(NamedTuple):
@@ -34,6 +34,8 @@ class Faces(NamedTuple):
         shear: k_s times the area of each point (p,) [N/m].
         facets: whether points are ends of facets, not springs.
         cohesion: c w, which adds to friction where a joint is closed (j,) [N/m].
+        paired: whether places that touched at the start stay opposite, as nodes of a mesh do, so
+            that the overlap is h (j,).
     """
 
     depth: Array
@@ -45,6 +47,7 @@ class Faces(NamedTuple):
     shear: Array
     facets: bool
     cohesion: Array
+    paired: Any
 
 
 @numba.njit(cache=True)
@@ -59,6 +62,20 @@ def overlap(depth, slip):  # type: ignore
     if length <= 0.0:
         return 0.0, 0.0
     return length, -np.sign(slip)
+
+
+@numba.njit(cache=True)
+def lap(faces, joint, slip):  # type: ignore
+    """Return the length on which the law of a joint acts, and its derivative by the slip.
+
+    Args:
+        faces: `Faces`.
+        joint: its number.
+        slip: between the faces [m].
+    """
+    if faces.paired[joint]:
+        return faces.depth[joint], 0.0
+    return overlap(faces.depth[joint], slip)
 
 
 @numba.njit(cache=True)
@@ -107,10 +124,10 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     Args:
         faces: `Faces`.
         joint: its number.
-        ends: measures at the start and at the end of the step (2, 3).
+        ends: measures at the start and at the end of the step (2, 4).
         late: lag of damping over the length of the step [-].
-        force: on opening, slip and turn, filled (3,) [N, N, N m].
-        rate: filled (3, 3).
+        force: on opening, slip, turn and stretch, filled (4,) [N, N, N m, N].
+        rate: filled (4, 4).
         normals: of each point mean pressing force, not negative, and its derivative by opening,
             slip and turn at the end, filled for those of this joint (p, 4) [N].
 
@@ -118,8 +135,8 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         Energy that the lag takes [J].
     """
     (l0, _), (l1, shrinks) = (
-        overlap(faces.depth[joint], ends[0, 1]),
-        overlap(faces.depth[joint], ends[1, 1]),
+        lap(faces, joint, ends[0, 1]),
+        lap(faces, joint, ends[1, 1]),
     )
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks
@@ -144,7 +161,7 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         if faces.facets:
             normals[point + 1, 0] = scale * mean * n1
         for k in range(3):
-            by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
+            by_b, by_d = gap_rate(k, x0, l1, shrinks, ends), gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
             total_by[k] += share * (near + far)
             moment_by[k] += share * (x0 * near + x1 * far)
@@ -154,8 +171,11 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
                 normals[point + 1, 1 + k] = scale * (mean * far + wider * n1)
     before = stored(faces, joint, l0, ends[0, 0], ends[0, 2])[0]
     after, whole, tilted = stored(faces, joint, l1, ends[1, 0], ends[1, 2])
-    slope, bends = _slope(ends[0, 1], ends[1, 1], faces.depth[joint])
+    slope, bends = _slope(
+        ends[0, 1], ends[1, 1], lap(faces, joint, ends[0, 1]), lap(faces, joint, ends[1, 1])
+    )
     push = 0.5 * (before + after) - mean * turn * moment
+    rate[3, :], rate[:, 3], force[3] = 0.0, 0.0, 0.0
     force[0] = stiff * mean * total
     force[1] = stiff * slope * push
     force[2] = -stiff * mean * mean * moment
@@ -171,8 +191,16 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _gap_rate(measure, place, length, shrinks, ends):  # type: ignore
-    """Derivative of the gap at a place by a measure at the end of the step."""
+def gap_rate(measure, place, length, shrinks, ends):  # type: ignore
+    """Return the derivative of the gap at a place by a measure at the end of the step.
+
+    Args:
+        measure: 0 opening, 1 slip, 2 turn.
+        place: x [-].
+        length: of the overlap at the end [m].
+        shrinks: its derivative by the slip [-].
+        ends: measures at the start and at the end of the step (2, 3).
+    """
     if measure == 0:
         return 1.0
     return -place * (shrinks * ends[1, 2] if measure == 1 else length)
@@ -208,126 +236,12 @@ def _carried(ends, first, second, facet):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _slope(before, after, depth):  # type: ignore
-    """Δℓ/Δs over a step, and its derivative by the slip at the end."""
-    (l0, r0), (l1, r1) = overlap(depth, before), overlap(depth, after)
+def _slope(before, after, first, last):  # type: ignore
+    """Δℓ/Δs over a step, and its derivative by the slip at the end, from ℓ and its derivatives."""
+    (l0, r0), (l1, r1) = first, last
     moved = after - before
     same = r0 == r1 and l0 > 0.0 and l1 > 0.0 and before * after > 0.0
     if same or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
         return r1, 0.0
     slope = (l1 - l0) / moved
     return slope, (r1 - slope) / moved
-
-
-@numba.njit(cache=True)
-def limit_faces(faces, joint, ends, late, limits):  # type: ignore
-    """Turn the pressing forces of a joint over a step into Coulomb's limits, μ N + c A.
-
-    A is the mean area on which a facet is closed, shared among its ends.
-
-    Args:
-        faces: `Faces`.
-        joint: its number.
-        ends: measures at the start and at the end of the step (2, 3).
-        late: lag of damping over the length of the step [-].
-        limits: pressing forces as `press_faces` fills them, made limits (p, 4) [N].
-    """
-    friction, cohesion = faces.friction[joint], faces.cohesion[joint]
-    if friction == np.inf:
-        return
-    for point in range(faces.first[joint], faces.first[joint + 1]):
-        limits[point] *= friction
-        limits[point, 0] = max(limits[point, 0], 0.0)
-    if cohesion == 0.0:
-        return
-    l0, (l1, shrinks) = (
-        overlap(faces.depth[joint], ends[0, 1])[0],
-        overlap(faces.depth[joint], ends[1, 1]),
-    )
-    mean, stride = 0.5 * (l0 + l1), 2 if faces.facets else 1
-    for point in range(faces.first[joint], faces.first[joint + 1], stride):
-        x0, x1 = faces.place[point], faces.place[point + stride - 1]
-        a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
-        b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
-        lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        (near, far), (k00, k01, k11) = closed_means(lagged, late, 1.0 + late, faces.facets)
-        scale = cohesion * faces.share[point]
-        limits[point, 0] += scale * mean * near
-        if faces.facets:
-            limits[point + 1, 0] += scale * mean * far
-        for k in range(3):
-            by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
-            wider = 0.5 * shrinks if k == 1 else 0.0
-            limits[point, 1 + k] += scale * (mean * (k00 * by_b + k01 * by_d) + wider * near)
-            if faces.facets:
-                closing = mean * (k01 * by_b + k11 * by_d) + wider * far
-                limits[point + 1, 1 + k] += scale * closing
-
-
-@numba.njit(cache=True)
-def rub(first, change, late, limit, found):  # type: ignore
-    """Find the mean shear of a point over a step, as `law.shear_over_step`.
-
-    Args:
-        first: elastic shear at the start [N].
-        change: of it, if the point did not slide [N].
-        late: lag of damping over the length of the step [-].
-        limit: Coulomb's [N].
-        found: mean shear [N], what friction has not held at the end [N], derivatives of the mean
-            by the change and by the limit [-], and loss times the stiffness [N²], filled (5,).
-    """
-    trial = first + (0.5 + late) * change
-    if max(abs(first), abs(first + change), abs(trial)) <= limit:
-        found[0], found[1], found[2], found[3] = trial, 0.0, 0.5 + late, 0.0
-        found[4] = late * change * change
-        return
-    start = min(max(first, -limit), limit)
-    last = min(max(start + change, -limit), limit)
-    over = start + change - last
-    slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
-    mean = start + 0.5 * change - 0.5 * over * slid
-    shear = min(max(mean + late * change, -limit), limit)
-    found[0], found[1] = shear, first + change - last
-    if abs(mean + late * change) > limit or (change == 0.0 and abs(first) > limit):
-        found[2], found[3] = 0.0, np.sign(shear)
-    else:
-        lost = np.sign(first) if abs(first) > limit else 0.0
-        found[2] = 0.5 * (1.0 - slid) ** 2 + late
-        found[3] = (1.0 - slid) * lost + slid * np.sign(change)
-    found[4] = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
-
-
-@numba.njit(cache=True)
-def rub_faces(faces, joint, ends, late, normals, slid, found):  # type: ignore
-    """Add the shear of a joint over a step, and what its points remember at the end.
-
-    Args:
-        faces: `Faces`.
-        joint: its number.
-        ends: measures at the start and at the end of the step (2, 3).
-        late: lag of damping over the length of the step [-].
-        normals: Coulomb's limits, as `limit_faces` leaves them (p, 4) [N].
-        slid: how far each point has slid for good before (p,) [m].
-        found: force on opening, slip and turn (3,) [N, N, N m], and its derivative by the measures
-            at the end (3, 3), both added to; `slid` at the end, filled for this joint (p,) [m].
-
-    Returns:
-        The mean shear [N], and the energy that friction and the lag take [J].
-    """
-    (force, rate, after), friction, own = found, faces.friction[joint], np.empty(5)
-    total = lost = 0.0
-    for point in range(faces.first[joint], faces.first[joint + 1]):
-        stiff = faces.shear[point]
-        change = stiff * (ends[1, 1] - ends[0, 1])
-        first = stiff * (ends[0, 1] - slid[point])
-        limit = np.inf if friction == np.inf else normals[point, 0]
-        rub(first, change, late, limit, own)
-        total += own[0]
-        lost += own[4] / stiff
-        rate[1, 1] += stiff * own[2]
-        after[point] = slid[point] + own[1] / stiff
-        if own[3] != 0.0:
-            for k in range(3):
-                rate[1, k] += own[3] * normals[point, 1 + k]
-    force[1] += total
-    return total, lost
