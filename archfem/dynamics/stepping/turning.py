@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.band_lu import eliminate, half_width
+from archfem.dynamics.stepping.band_lu import eliminate, factorised, half_width, solved
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import ITERATIONS, begin, measure, settle
 from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
@@ -36,6 +36,15 @@ ROUNDED = 1e-13
 WHOLE = 7
 """Passes that take whole steps."""
 
+WIDE = 40
+"""Half-width of the band from which factors are kept while they serve."""
+
+SLOWLY = 0.3
+"""Part of what is out of balance that a pass by kept factors may leave; else they are renewed."""
+
+PASSES = 200
+"""Passes with factors kept or renewed before a step is given up."""
+
 SETUP = 0.05
 """Estimate of the time until the first step can be taken [s]."""
 
@@ -50,11 +59,13 @@ class TurningSystem(NamedTuple):
         mass: M.
         blocks: K, of the blocks alone.
         viscous: C.
-        band: 2 M/Δt² + C/Δt + (½ + β/Δt) K (n, 3 b + 1).
+        effective: 2 M/Δt² + C/Δt + (½ + β/Δt) K.
+        band: the same as a band (n, 3 b + 1).
         weight: forces of gravity (n,).
         body: forces per unit ground acceleration (2, n).
         step: Δt, and β/Δt.
         enough: force left out of balance that ends the passes [N], and correction [m].
+        wide: whether factors are kept.
     """
 
     turning: Moved
@@ -63,11 +74,13 @@ class TurningSystem(NamedTuple):
     mass: Rows
     blocks: Rows
     viscous: Rows
+    effective: Rows
     band: Array
     weight: Array
     body: Array
     step: tuple[float, float]
     enough: tuple[float, float]
+    wide: bool
 
 
 class Turning(Reordered):
@@ -84,9 +97,7 @@ class Turning(Reordered):
         assert isinstance(model, Moving)
         self._equation: Equation = equation
         self._model: Moving = model
-        self._blocks: Any = _narrow(model)
-        pieces = [np.arange(*model.starts[k : k + 2]) for k in self._blocks]
-        super().__init__(np.concatenate(pieces))
+        super().__init__(_narrow(model))
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
@@ -116,7 +127,8 @@ class Turning(Reordered):
             for each in (model.mass, model.blocks, equation.viscous, model.closed())
         )
         effective = (2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks
-        room = answer(model.joints)
+        room, half = answer(model.joints), half_width(closed)
+        balance = ENOUGH * (100.0 if half >= WIDE else 1.0)
         return TurningSystem(
             model.joints._replace(sides=self._sides()),
             room,
@@ -124,11 +136,13 @@ class Turning(Reordered):
             rows_of(mass),
             rows_of(blocks),
             rows_of(viscous),
-            _banded(effective, half_width(closed)),
+            rows_of(effective.tocsr()),
+            _banded(effective, half),
             equation.weight[order],
             np.ascontiguousarray(model.body[order].T),
             (dt, late),
-            (ENOUGH * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
+            (balance * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
+            half >= WIDE,
         )
 
     def _sides(self) -> Sides:
@@ -138,13 +152,16 @@ class Turning(Reordered):
 
 
 def _narrow(model: Moving) -> Any:
-    """Free blocks in an order that keeps neighbours close."""
+    """Order coordinates so that neighbours stay close: blocks, or with a fill each by itself."""
+    if not model.turning.all():
+        return reverse_cuthill_mckee(model.closed(), symmetric_mode=True)
     free, pairs = np.array(model.structure.free), model.structure.pairs
     place = np.full(len(model.structure.blocks), -1)
     place[free] = np.arange(len(free))
     inner = place[pairs[np.all(place[pairs] >= 0, axis=1)]]
     graph = sparse.csr_matrix((np.ones(len(inner)), inner.T), 2 * (len(free),))
-    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+    blocks = reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+    return np.concatenate([np.arange(*model.starts[k : k + 2]) for k in blocks])
 
 
 def _banded(matrix: sparse.csr_matrix, half: int) -> Array:
@@ -164,6 +181,7 @@ class Turned(NamedTuple):
         image: room (n,).
         constant: what of the forces does not depend on the end of the step (n,).
         move: Δq (n,).
+        known: whether the band holds factors, of a pass before (1,).
     """
 
     band: Array
@@ -171,6 +189,7 @@ class Turned(NamedTuple):
     image: Array
     constant: Array
     move: Array
+    known: Any
 
 
 def _is_system(system: Any) -> bool:
@@ -197,7 +216,12 @@ def _started(system, state, memory):  # type: ignore
     size = state.shape[1]
     system.slid[: len(memory)] = memory
     return Turned(
-        np.empty_like(system.band), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+        np.empty_like(system.band),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(1, dtype=np.bool_),
     )
 
 
@@ -207,8 +231,8 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     old, new, move, rest = states[0], states[1], kept.move, kept.rest
     _load(system, kept, old, ground)
     move[:] = dt * old[1]
-    last = np.inf
-    for turn in range(ITERATIONS):
+    last, before, fresh = np.inf, np.inf, 0
+    for turn in range(PASSES if system.wide else ITERATIONS):
         new[0] = old[0] + move
         left = _left(system, kept, old[0], new[0])
         if left <= system.enough[0] or (
@@ -217,15 +241,30 @@ def _settled(system, kept, step, states, ground):  # type: ignore
             new[1] = (2.0 / dt) * move - old[1]
             new[2] = (new[1] - old[1]) / dt
             return turn + 1
-        _assemble(system, kept)
-        if not eliminate(kept.band, rest):
-            return -1
-        rest *= 1.0 if turn < WHOLE else 0.5
-        last = np.max(np.abs(rest))
-        if not last < np.inf:
+        if system.wide and kept.known[0] and left <= SLOWLY * before:
+            solved(kept.band, rest)
+        else:
+            _assemble(system, kept)
+            kept.known[0] = system.wide and factorised(kept.band)
+            if kept.known[0]:
+                solved(kept.band, rest)
+            elif not _exchanged(system, kept):
+                return -1
+            rest *= 1.0 if fresh < WHOLE else 0.5
+            fresh += 1
+        before, last = left, np.max(np.abs(rest))
+        if not last < np.inf or fresh > ITERATIONS:
+            kept.known[0] = False
             return -1
         move += rest
     return -1
+
+
+@numba.njit(cache=True)
+def _exchanged(system, kept):  # type: ignore
+    """Solve for the correction with exchanges of rows; returns whether the matrix is regular."""
+    _assemble(system, kept)
+    return eliminate(kept.band, kept.rest)
 
 
 @numba.njit(cache=True)
@@ -245,15 +284,10 @@ def _load(system, kept, old, ground):  # type: ignore
 @numba.njit(cache=True)
 def _left(system, kept, before, after):  # type: ignore
     """Find the forces out of balance; returns their norm."""
-    rest, band, joints = kept.rest, system.band, system.turning
-    half, size = (band.shape[1] - 1) // 3, len(rest)
+    rest, image, joints = kept.rest, kept.image, system.turning
     pass_joints(joints, before, after, system.step[1], system.slid, system.room)
-    rest[:] = kept.constant
-    for i in range(size):
-        total = 0.0
-        for j in range(max(0, i - half), min(size, i + half + 1)):
-            total += band[i, half + j - i] * kept.move[j]
-        rest[i] -= total
+    times(system.effective, kept.move, image)
+    rest[:] = kept.constant - image
     index, sizes, force = joints.sides.index, joints.sides.size, system.room.force
     for joint in range(len(index)):
         for side in range(2):

@@ -10,6 +10,7 @@ import numpy as np
 
 from archfem.joints.moving.means import closed_means
 from archfem.joints.moving.overlap import gap_rate, lap
+from archfem.joints.operator import TOUCHING
 
 
 @numba.njit(cache=True)
@@ -70,7 +71,8 @@ def rub(first, change, late, limit, found):  # type: ignore
             by the change and by the limit [-], and loss times the stiffness [N²], filled (5,).
     """
     trial = first + (0.5 + late) * change
-    if max(abs(first), abs(first + change), abs(trial)) <= limit:
+    touching = change == 0.0 and abs(first) <= (1.0 + TOUCHING) * limit
+    if touching or max(abs(first), abs(first + change), abs(trial)) <= limit:
         found[0], found[1], found[2], found[3] = trial, 0.0, 0.5 + late, 0.0
         found[4] = late * change * change
         return
