@@ -39,7 +39,7 @@ WHOLE = 7
 WIDE = 40
 """Half-width of the band from which factors are kept while they serve."""
 
-SLOWLY = 0.3
+SLOWLY = 0.05
 """Part of what is out of balance that a pass by kept factors may leave; else they are renewed."""
 
 PASSES = 200
