@@ -18,6 +18,7 @@ from archfem.joints.moving.moved import (
     all_measures,
     answer,
     joint_energy,
+    paired_slips,
     pass_joints,
 )
 from archfem.joints.sparsity import Pattern
@@ -233,6 +234,25 @@ class Moving:
         """
         found: Array = all_measures(self.joints, q)
         return found
+
+    def mismatch(self, q: Array) -> tuple[float, str]:
+        """Return how far faces have slid past the facets they are paired by, and at which joint.
+
+        Args:
+            q: coordinates (n,).
+
+        Returns:
+            The slip over the length of a facet, of a sliver over that of the usual one [-], 0 where
+            all faces are plane; and a name.
+        """
+        faces = self.joints.faces
+        if not faces.paired.any():
+            return 0.0, ""
+        depth, usual = faces.depth, np.median(faces.depth[faces.paired])
+        slips = paired_slips(self.joints, np.ascontiguousarray(q, float))
+        slips = slips * depth / np.maximum(depth, usual)
+        worst = int(np.argmax(slips))
+        return float(slips[worst]), self.structure.joints[self.joints.whole[worst]].name
 
     def load(self, action: Action, q: Array | None = None) -> Array:
         """Return the generalised forces of an action; a point load turns with nothing (n,).

@@ -57,22 +57,17 @@ class Pieces:
         """
         points, depths = model.operator.points, model.structure.depths
         bounds = np.searchsorted(points.joint, np.arange(points.count + 1))
-        joint, first, aside, depth = [], [], [], []
+        found: list[tuple[int, int, float, float]] = []
         for number, (begin, end) in enumerate(pairwise(bounds)):
             if _plane(model, begin, end):
-                pairs = [(begin, 0.0, depths[number])]
-            else:
-                _check_exact(model, number)
-                arms = points.arm[begin:end].reshape(-1, 2)
-                places = range(begin, end, 2)
-                pairs = list(
-                    zip(places, arms.mean(axis=1), np.abs(arms[:, 1] - arms[:, 0]), strict=True)
-                )
-            joint += [number] * len(pairs)
-            for kept, value in zip((first, aside, depth), zip(*pairs, strict=True), strict=True):
-                kept.extend(value)
-        starts = np.append(first, len(points.arm))
-        return cls(model.structure, np.array(joint), starts, np.array(aside), np.array(depth))
+                found.append((number, begin, 0.0, depths[number]))
+                continue
+            _check_exact(model, number)
+            for place in range(begin, end, 2):
+                low, high = points.arm[place : place + 2]
+                found.append((number, place, 0.5 * (low + high), abs(high - low)))
+        joint, first, aside, depth = map(np.array, zip(*found, strict=True))
+        return cls(model.structure, joint, np.append(first, len(points.arm)), aside, depth)
 
     @property
     def middles(self) -> Array:

@@ -108,6 +108,19 @@ def solved(band, vector):  # type: ignore
         vector[k] = (vector[k] - later) / band[k, half]
 
 
+def banded(matrix, half: int):  # type: ignore
+    """Return a sparse matrix as a band with room for its elimination (n, 3 b + 1).
+
+    Args:
+        matrix: in its order (n, n).
+        half: half-width b of the band, at least its own.
+    """
+    entries = matrix.tocoo()
+    band = np.zeros((matrix.shape[0], 3 * half + 1))
+    band[entries.row, half + entries.col - entries.row] = entries.data
+    return band
+
+
 def half_width(matrix) -> int:  # type: ignore
     """Return the half-width of a sparse matrix.
 

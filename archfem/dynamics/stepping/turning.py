@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.band_lu import eliminate, factorised, half_width, solved
+from archfem.dynamics.stepping.band_lu import banded, eliminate, factorised, half_width, solved
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import ITERATIONS, begin, measure, settle
 from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
@@ -137,7 +137,7 @@ class Turning(Reordered):
             rows_of(blocks),
             rows_of(viscous),
             rows_of(effective.tocsr()),
-            _banded(effective, half),
+            banded(effective, half),
             equation.weight[order],
             np.ascontiguousarray(model.body[order].T),
             (dt, late),
@@ -162,14 +162,6 @@ def _narrow(model: Moving) -> Any:
     graph = sparse.csr_matrix((np.ones(len(inner)), inner.T), 2 * (len(free),))
     blocks = reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
     return np.concatenate([np.arange(*model.starts[k : k + 2]) for k in blocks])
-
-
-def _banded(matrix: sparse.csr_matrix, half: int) -> Array:
-    """A matrix as a band with room for its elimination (n, 3 b + 1)."""
-    entries = matrix.tocoo()
-    band = np.zeros((matrix.shape[0], 3 * half + 1))
-    band[entries.row, half + entries.col - entries.row] = entries.data
-    return band
 
 
 class Turned(NamedTuple):

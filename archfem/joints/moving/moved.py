@@ -29,7 +29,7 @@ class Moved(NamedTuple):
         whole: which joint of the structure each is; where faces bend one is in pieces, as the nodes
             of its mesh divide it (j,).
         aside: how far its middle lies from that of the whole, toward the extrados (j,) [m].
-        count: number of joints of the structure.
+        wholes: number of joints of the structure.
     """
 
     sides: Sides
@@ -38,7 +38,7 @@ class Moved(NamedTuple):
     hand: Array
     whole: Any
     aside: Array
-    count: int
+    wholes: int
 
 
 class Answer(NamedTuple):
@@ -70,7 +70,7 @@ def answer(joints: Moved) -> Answer:
     return Answer(
         np.zeros((count, 2, size)),
         np.zeros((count, 2, size, 2, size)),
-        np.zeros((joints.count, 3)),
+        np.zeros((joints.wholes, 3)),
         np.zeros(len(joints.faces.place)),
         np.zeros(count),
     )
@@ -103,8 +103,8 @@ def all_measures(joints, q):  # type: ignore
         joints: `Moved`.
         q: coordinates (n,).
     """
-    found, own, depths = np.zeros((joints.count, 3)), np.empty(3), joints.faces.depth
-    sums = np.zeros((joints.count, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
+    found, own, depths = np.zeros((joints.wholes, 3)), np.empty(3), joints.faces.depth
+    sums = np.zeros((joints.wholes, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
     for joint in range(len(joints.angle)):
         find_measures(joints, joint, q, own)
         whole, depth, place = joints.whole[joint], depths[joint], joints.aside[joint]
@@ -115,7 +115,7 @@ def all_measures(joints, q):  # type: ignore
         sums[whole, 1] += depth * place
         sums[whole, 2] += depth * place**2 + spread
         sums[whole, 3] += depth * place * own[0] - spread * joints.hand[joint] * own[2]
-    for whole in range(joints.count):
+    for whole in range(joints.wholes):
         total, first, second, tilted = sums[whole]
         middle = first / total
         turn = middle * found[whole, 0] - tilted
@@ -123,6 +123,22 @@ def all_measures(joints, q):  # type: ignore
         found[whole, 0] = found[whole, 0] / total + turn * middle
         found[whole, 1] /= total
         found[whole, 2] = turn
+    return found
+
+
+@numba.njit(cache=True)
+def paired_slips(joints, q):  # type: ignore
+    """Return how far pieces have slid whose places stay opposite, over their length (j,) [-].
+
+    Args:
+        joints: `Moved`.
+        q: coordinates (n,).
+    """
+    found, own, faces = np.zeros(len(joints.angle)), np.empty(3), joints.faces
+    for joint in range(len(found)):
+        if faces.paired[joint]:
+            find_measures(joints, joint, q, own)
+            found[joint] = abs(own[1]) / faces.depth[joint]
     return found
 
 
