@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from archfem.dynamics.falling.engine import STILL, Falling
 from archfem.dynamics.falling.handover import Handover, released
 from archfem.dynamics.falling.state import Loose
 from archfem.dynamics.falling.verdict import Fall, fall_of
 from archfem.dynamics.steps import Batch, State
+from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.gauges import Gauges
 from archfem.models.moving import Moving
@@ -38,6 +40,9 @@ SPACING = 0.02
 class Parting:
     """Says in which step of a run a joint lets its blocks go.
 
+    A joint between stones does once it has turned far or slid off its face. Fill fits itself to
+    what it lies on, and its pieces tumble on the spot or crumble off its ends: that is no fall.
+
     Attributes:
         model: whose joints.
     """
@@ -53,6 +58,7 @@ class Parting:
         gauges, structure = Gauges.on(self.model), self.model.structure
         _, turn, slip = np.moveaxis(gauges.faces(batch.read(gauges)), -2, 0)
         loose = (np.abs(turn) > TURNED) | (np.abs(slip) >= structure.depths)
+        loose &= _between_stones(structure)
         if not loose.any():
             return None
         k = int(np.argmax(loose.any(axis=1)))
@@ -61,6 +67,12 @@ class Parting:
         if abs(turn[k, joint]) > TURNED:
             return k, f"'{name}' had turned by {abs(turn[k, joint]):.2g} rad"
         return k, f"'{name}' had slid by {abs(slip[k, joint]):.2g} m, off its face"
+
+
+def _between_stones(structure: Structure) -> NDArray[np.bool_]:
+    """Whether joints have no fill on either side (j,)."""
+    found: NDArray[np.bool_] = ~np.isin(structure.pairs, yielding_blocks(structure)).any(axis=1)
+    return found
 
 
 FRICTION = 0.6
@@ -74,7 +86,8 @@ def tilting(model: Moving, state: State) -> bool:
         model: that has not parted.
         state: at the end of its motion.
     """
-    turned = float(np.abs(model.measures(state.q)[:, 2]).max())
+    stones = _between_stones(model.structure)
+    turned = float(np.abs(model.measures(state.q)[stones, 2]).max(initial=0.0))
     return turned > TILTED and not left_standing(model, state).resting
 
 
@@ -134,11 +147,10 @@ def left_standing(model: Moving, state: State) -> Fall:
 
 
 def _rubbing(structure: Structure) -> Structure:
-    """The structure with joints that can all slide."""
-    joints = [
-        joint
-        if joint.contact.slides
-        else replace(joint, contact=replace(joint.contact, friction=FRICTION))
-        for joint in structure.joints
-    ]
+    """The structure with joints that can all slide, and whose cohesion is broken."""
+    joints = []
+    for joint in structure.joints:
+        friction = joint.contact.coefficient if joint.contact.slides else FRICTION
+        contact = replace(joint.contact, friction=friction, cohesion=0.0)
+        joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))

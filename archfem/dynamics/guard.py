@@ -28,6 +28,10 @@ of six arches and columns erred by 0.01 to 0.03 in the largest |e| [rad]."""
 LOOK = 32
 """Steps between two looks at displacements."""
 
+PAIRED = 0.1
+"""Slip over the length of a facet beyond which it is doubtful that faces are paired as meshed; by a
+whole one it is wrong."""
+
 
 class Guard:
     """Watches over a run: warns once of each doubt, and ends what is certainly wrong.
@@ -49,6 +53,7 @@ class Guard:
         self.largest_turn = 0.0
         self._balance = Balance(*start.energy[0, :2])
         self._small = not isinstance(model, Moving)
+        self._mismatch = (0.0, "")
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
@@ -80,6 +85,8 @@ class Guard:
             gauges = Gauges.on(self.model)
             turned = gauges.faces(gauges.read(state.q))[1]
             self.largest_turn = max(self.largest_turn, float(np.abs(turned).max()))
+        if isinstance(self.model, Moving):
+            self._mismatch = max(self._mismatch, self.model.mismatch(state.q))
 
     def judge(self) -> None:
         """Warn of what is doubtful in what was added.
@@ -109,6 +116,7 @@ class Guard:
                 "at its mechanism, with until=CountedMechanism(), or let displacements be large",
                 last=self._before,
             )
+        self._judge_facets(time)
         share = balance.fraction
         if abs(share) > DOUBTFUL:
             what = "came from nowhere" if share > 0.0 else "was lost to the scheme"
@@ -132,6 +140,20 @@ class Guard:
                 "displacements that this model assumes; read it as collapse, or follow it with "
                 "build(…, displacements='large')",
             )
+
+    def _judge_facets(self, time: float) -> None:
+        """Doubt joints that are in pieces once those have slid far past each other."""
+        slip, name = self._mismatch
+        if slip <= PAIRED:
+            return
+        words = (
+            f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
+            "they are paired as meshed: take fewer cells, fidelity 'faces' or 'rigid' for stones, "
+            "or cut the fill with jointed_fill"
+        )
+        if slip > 1.0:
+            raise DidNotConverge(words, last=self._before)
+        self._tell("facets", words)
 
     def _tell(self, kind: str, words: str) -> None:
         """Warn of each kind of doubt once a run."""

@@ -9,9 +9,10 @@
     unfinished      a structure of which a part stands, while it is being built
     rigid           the lowest rung: rigid blocks, no mesh
     reduced         faces and condensed, by a Galerkin basis
-    moving          rigid blocks or faces, whose displacements may be large
+    moving          blocks whose displacements may be large
     moving_passage  a step of such a model
-    turning_blocks  its blocks in coordinates of their own, and the joints between them
+    turning_blocks  its blocks in coordinates of their own
+    turning_joints  the joints between them, whole or in pieces as meshed
     turning_places  how points of its blocks move
     full            the rung with all nodes
     monolithic      the slow reference, assembled at every iteration

@@ -16,9 +16,6 @@ FIDELITIES = (*RUNGS, "monolithic")
 DISPLACEMENTS = ("small", "large")
 """What displacements may be."""
 
-PLANE = ("rigid", "faces")
-"""Rungs whose faces stay plane, on which displacements may be large."""
-
 SHAPES = ("quadrilateral", "triangle")
 """Of cells."""
 
@@ -47,7 +44,7 @@ class Discretisation:
             exact one, and Lobatto's where there is none: of degree 2, and for "monolithic".
         points: on each facet, 3 where not given.
         displacements: "small", or "large" where blocks may turn and slide as far as they like, on
-            the rungs "rigid" and "faces".
+            all rungs but "monolithic"; those of a fill with nodes stay small.
     """
 
     fidelity: str | Mapping[str, str] = "full"
@@ -71,10 +68,10 @@ class Discretisation:
             raise InvalidInput(
                 f"displacements {self.displacements!r} are not known: use one of {DISPLACEMENTS}"
             )
-        if self.displacements == "large" and self.fidelity not in PLANE:
+        if self.displacements == "large" and self.fidelity == "monolithic":
             raise InvalidInput(
-                f"displacements are large, which the rung '{self.name}' does not know: use one of "
-                f"{PLANE} for all blocks, where faces stay plane, or displacements = 'small'"
+                "displacements are large, which the rung 'monolithic' does not know: use 'full', "
+                "which is the same model, or displacements = 'small'"
             )
         if self.degree not in (1, 2):
             raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")

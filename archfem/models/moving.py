@@ -18,6 +18,7 @@ from archfem.joints.moving.moved import (
     all_measures,
     answer,
     joint_energy,
+    paired_slips,
     pass_joints,
 )
 from archfem.joints.sparsity import Pattern
@@ -26,31 +27,43 @@ from archfem.models.cells import Cells
 from archfem.models.model import Model, Passage, Prediction
 from archfem.models.moving_passage import MovingPassage
 from archfem.models.reduced import projected
-from archfem.models.turning_blocks import OwnCoordinates, held_poses, plane, slots_of
-from archfem.models.turning_places import TurningCells, TurningPoint
+from archfem.models.turning_blocks import OwnCoordinates, jointed, slots_of
+from archfem.models.turning_joints import Pieces, joints_of
+from archfem.models.turning_places import StillPoint, TurningCells, TurningPoint
 
 
 class Moving:
     """A model whose blocks move as far as they like; `Model` says what its members mean.
 
     Args:
-        small: the same structure with small displacements, "rigid" or "faces", with exact facets.
+        small: the same structure with small displacements, on a rung that has matrices; with exact
+            facets where faces bend.
+
+    Attributes:
+        starts: where the coordinates of each block that moves begin, and the number of all.
+        turning: whether each of those blocks has a frame that turns; a fill has none.
+        centres: about which blocks turn (n_blocks, 2) [m].
+        pieces: of the joints.
 
     Raises:
-        InvalidInput: faces bend, or the joints obey a law that is not known for large motion.
+        InvalidInput: the joints obey a law that is not known for large motion, or faces bend
+            between springs.
     """
 
     operator = None
 
     def __init__(self, small: Model) -> None:
-        small = plane(small)
+        small = jointed(small)
         blocks = OwnCoordinates.of(small)
         self.at_rest = projected(small, blocks.basis, small.fidelity)
         self.structure = small.structure
         self.fidelity = small.fidelity
         self.size = self.at_rest.size
-        self.starts = np.append(sorted(blocks.starts.values()), self.size)
-        self.joints = blocks.joints(self.at_rest)
+        self.starts = blocks.starts
+        self.turning = np.array([turns for _, turns in blocks.blocks.values()])
+        self.centres = blocks.centres
+        self.pieces = Pieces.of(self.at_rest)
+        self.joints = joints_of(self.at_rest, self.pieces, blocks.blocks, blocks.centres)
         self._slots, coupled = slots_of(self.joints.sides, self.size)
         pattern = Pattern.of(self.at_rest.mass, self.at_rest.blocks, coupled)
         self.mass = pattern.spread(self.at_rest.mass)
@@ -58,7 +71,7 @@ class Moving:
         self._pattern = pattern
         self._entries = pattern.places(*self._slots.pairs)
         self.body = self.at_rest.body
-        self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.starts)
+        self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.blocks)
         self.supports = self.at_rest.supports
         self.prediction: Prediction | None = None
         self._points: dict[PointLoad, TurningPoint] = {}
@@ -81,7 +94,7 @@ class Moving:
         other = copy(self)
         other.supports = supports
         sides = self.joints.sides
-        held = held_poses(self.structure, supports)
+        held = self.pieces.held(supports)
         other.joints = self.joints._replace(sides=sides._replace(held=held))
         return other
 
@@ -136,7 +149,7 @@ class Moving:
             late: lag of damping over the length of the step [-].
         """
         found = answer(self.joints)
-        pass_joints(self.joints, start, end, late, self._slid, found)
+        pass_joints(self.joints, _plain(start), _plain(end), late, self._slid, found)
         return found
 
     def _at(self, q: Array) -> Answer:
@@ -203,7 +216,7 @@ class Moving:
             q: coordinates (n,).
         """
         of_blocks = 0.5 * float(q @ (self.blocks @ q))
-        return of_blocks + float(joint_energy(self.joints, q, self._slid))
+        return of_blocks + float(joint_energy(self.joints, _plain(q), self._slid))
 
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint, about the middle of what overlaps (n_joints, 3).
@@ -219,8 +232,27 @@ class Moving:
         Args:
             q: coordinates (n,).
         """
-        found: Array = all_measures(self.joints, q)
+        found: Array = all_measures(self.joints, _plain(q))
         return found
+
+    def mismatch(self, q: Array) -> tuple[float, str]:
+        """Return how far faces have slid past the facets they are paired by, and at which joint.
+
+        Args:
+            q: coordinates (n,).
+
+        Returns:
+            The slip over the length of a facet, of a sliver over that of the usual one [-], 0 where
+            all faces are plane; and a name.
+        """
+        faces = self.joints.faces
+        if not faces.paired.any():
+            return 0.0, ""
+        depth, usual = faces.depth, np.median(faces.depth[faces.paired])
+        slips = paired_slips(self.joints, _plain(q))
+        slips = slips * depth / np.maximum(depth, usual)
+        worst = int(np.argmax(slips))
+        return float(slips[worst]), self.structure.joints[self.joints.whole[worst]].name
 
     def load(self, action: Action, q: Array | None = None) -> Array:
         """Return the generalised forces of an action; a point load turns with nothing (n,).
@@ -256,7 +288,7 @@ class Moving:
             return float(self.load(action) @ q)
         return float(self._place(action).displacement(q) @ np.array(action.force))
 
-    def _place(self, action: PointLoad) -> TurningPoint:
+    def _place(self, action: PointLoad) -> TurningPoint | StillPoint:
         """Where a point load acts."""
         if action in self._points:
             return self._points[action]
@@ -264,7 +296,15 @@ class Moving:
         rows = self.at_rest.cells.at(block, point)
         number = self.structure.free.index(block)
         first, end = self.starts[number], self.starts[number + 1]
+        if not self.turning[number]:
+            return StillPoint(rows)
         local = rows[:, first:end].toarray()
         found = TurningPoint(int(first), np.array([local[1, 2], -local[0, 2]]), local[:, 3:])
         self._points[action] = found
         return found
+
+
+def _plain(q: Array) -> Array:
+    """Coordinates in the one kind of array for which the joints are compiled, and not for more."""
+    plain: Array = np.require(q, float, ("C", "W"))
+    return plain

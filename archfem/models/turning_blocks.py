@@ -1,4 +1,4 @@
-"""Blocks that turn in coordinates of their own, and the joints between them.
+"""Blocks that turn in coordinates of their own, and where their joints go among those.
 
 The coordinates of a block are the displacement of its centroid, its turn, and its elastic modes in
 the frame that turns with it. Those neither move the centroid nor turn the block on the mean.
@@ -13,35 +13,30 @@ from scipy.linalg import eigh
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.joints.faces import face_matrix
-from archfem.joints.facets import Facets
-from archfem.joints.moving.moved import Moved
-from archfem.joints.moving.overlap import Faces
 from archfem.joints.moving.poses import Sides
 from archfem.masonry.rigid_motion import motion_of
-from archfem.masonry.structure import Structure
+from archfem.masonry.softness import yielding_blocks
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model
-
-PLANE = ("rigid", "faces")
-"""Rungs whose faces stay plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class OwnCoordinates:
     """Blocks of a model of small displacements in coordinates of their own.
 
+    A fill keeps the coordinates that it has: it deforms rather than turns, and its displacements
+    are taken as small.
+
     Attributes:
         basis: those coordinates in the model's, (n, n).
-        starts: first coordinate of each block that moves, by its number.
+        blocks: of each block that moves, by its number in their order, which coordinates are its,
+            and whether it has a frame that turns.
         centres: about which blocks turn (n_blocks, 2) [m].
-        size: number of coordinates.
     """
 
     basis: sparse.csr_matrix
-    starts: dict[int, int]
+    blocks: dict[int, tuple[range, bool]]
     centres: Array
-    size: int
 
     @classmethod
     def of(cls, small: Jointed) -> "OwnCoordinates":
@@ -54,56 +49,31 @@ class OwnCoordinates:
         moving = lift.data != 0.0
         owner = np.zeros(small.size, dtype=np.intp)
         owner[lift.col[moving]] = small.cells.block[lift.row[moving] // 2]
-        starts, pieces, order, count = {}, [], [], 0
+        fill, pieces, order, blocks, count = set(_fill(small)), [], [], {}, 0
         centres = np.array([block.centroid for block in small.structure.blocks], float)
         for number in small.structure.free:
             own = np.flatnonzero(owner == number)
-            shapes, centres[number] = _own_coordinates(small, own, number)
-            starts[number] = count
+            turns = number not in fill or len(own) == 3
+            shapes: Any = sparse.identity(len(own))
+            if turns:
+                shapes, centres[number] = _own_coordinates(small, own, number)
+            blocks[number] = range(count, count + shapes.shape[1]), turns
             count += shapes.shape[1]
             pieces.append(shapes)
             order.append(own)
         stacked = sparse.block_diag(pieces, format="csr")
-        return cls(stacked[np.argsort(np.concatenate(order))], starts, centres, count)
+        return cls(stacked[np.argsort(np.concatenate(order))], blocks, centres)
 
-    def joints(self, model: Jointed) -> Moved:
-        """Return the joints between the blocks.
-
-        Args:
-            model: in these coordinates.
-        """
-        normals = model.structure.normals
-        angle = np.arctan2(normals[:, 1], normals[:, 0])
-        return Moved(self._sides(model), _faces(model), angle, _hands(model.structure))
-
-    def _sides(self, model: Jointed) -> Sides:
-        """The faces of the blocks on both sides of the joints."""
-        structure, joints = model.structure, len(model.structure.joints)
-        ends = np.append(sorted(self.starts.values()), self.size)
-        sizes = {b: int(ends[np.searchsorted(ends, s) + 1] - s) for b, s in self.starts.items()}
-        start, size = np.full((joints, 2), -1), np.zeros((joints, 2), int)
-        arm, shapes = np.zeros((joints, 2, 2)), np.zeros((joints, 2, 3, max(sizes.values()) - 3))
-        matrix, hands = face_matrix(model.operator)[0].tocsr(), _hands(structure)
-        for joint, pair in enumerate(structure.pairs):
-            axes = np.column_stack([structure.normals[joint], structure.tangents[joint]])
-            rows = matrix[[joint, 2 * joints + joint, joints + joint]]  # gap, slip, turn
-            for side, block in enumerate(map(int, pair)):
-                arm[joint, side] = structure.middles[joint] - self.centres[block]
-                if block not in self.starts:
-                    continue
-                first, number = self.starts[block], sizes[block]
-                start[joint, side], size[joint, side] = first, number
-                moves = (2 * side - 1) * rows[:, first + 3 : first + number].toarray()
-                shapes[joint, side, :2, : number - 3] = axes @ moves[:2]
-                shapes[joint, side, 2, : number - 3] = hands[joint] * moves[2]
-        return Sides(start, size, arm, shapes, held_poses(structure, model.supports))
+    @property
+    def starts(self) -> Array:
+        """Where the coordinates of each block that moves begin, and the number of all (m + 1,)."""
+        return np.array([0, *(span.stop for span, _ in self.blocks.values())])
 
 
-def _hands(structure: Structure) -> Array:
-    """Whether the extrados is on the left of each joint's normal, 1, or on the right, -1 (j,)."""
-    (nx, ny), (tx, ty) = structure.normals.T, structure.tangents.T
-    found: Array = np.where(nx * ty - ny * tx > 0.0, 1.0, -1.0)
-    return found
+def _fill(small: Jointed) -> list[int]:
+    """Blocks that deform, and go with what they lie on rather than turn."""
+    blocks = small.structure.blocks
+    return [number for number in yielding_blocks(small.structure) if not blocks[number].grain]
 
 
 def _own_coordinates(small: Jointed, own: Any, number: int) -> tuple[Array, Array]:
@@ -131,46 +101,6 @@ def _own_coordinates(small: Jointed, own: Any, number: int) -> tuple[Array, Arra
     return np.column_stack([rigid, modes[:, 3:]]), centre
 
 
-def _faces(model: Jointed) -> Faces:
-    """What the law of the joints needs."""
-    structure, points = model.structure, model.operator.points
-    contacts = [joint.contact for joint in structure.joints]
-    depth, facets = structure.depths, isinstance(model.operator.law, Facets)
-    share = points.weight / (structure.width * depth[points.joint])
-    return Faces(
-        depth,
-        structure.width * np.array([each.normal_stiffness for each in contacts]),
-        np.array([each.coefficient for each in contacts]),
-        np.searchsorted(points.joint, np.arange(points.count + 1)),
-        points.arm / depth[points.joint],
-        np.repeat(share[0::2] + share[1::2], 2) if facets else share,
-        points.shear,
-        facets,
-    )
-
-
-def held_poses(structure: Structure, supports: Array) -> Array:
-    """Return poses of the faces of blocks that do not move by themselves (j, 2, 3) [m, m, rad].
-
-    Args:
-        structure: of the joints.
-        supports: motions of the fixed blocks (n_blocks, 3) [m, m, rad].
-    """
-    centres = np.array([block.centroid for block in structure.blocks])
-    held = np.zeros((len(structure.joints), 2, 3))
-    for joint, pair in enumerate(structure.pairs):
-        for side, block in enumerate(pair):
-            x, y, turn = supports[block]
-            rx, ry = structure.middles[joint] - centres[block]
-            less = -2.0 * np.sin(0.5 * turn) ** 2
-            held[joint, side] = (
-                x + less * rx - np.sin(turn) * ry,
-                y + np.sin(turn) * rx + less * ry,
-                turn,
-            )
-    return held
-
-
 @dataclass(frozen=True, eq=False)
 class Slots:
     """Where what joints do goes among the model's coordinates.
@@ -193,10 +123,8 @@ def slots_of(sides: Sides, size: int) -> tuple[Slots, sparse.csr_matrix]:
         sides: of the joints.
         size: number of coordinates.
     """
-    most = 3 + sides.shapes.shape[-1]
-    local = np.arange(most)
-    number = sides.start[:, :, None] + local  # (j, 2, s)
-    used = (sides.start[:, :, None] >= 0) & (local < sides.size[:, :, None])
+    number = sides.index  # (j, 2, s)
+    used = np.arange(number.shape[-1]) < sides.size[:, :, None]
     flat = number.reshape(len(number), -1)
     known = used.reshape(len(number), -1)
     both = known[:, :, None] & known[:, None, :]
@@ -208,23 +136,24 @@ def slots_of(sides: Sides, size: int) -> tuple[Slots, sparse.csr_matrix]:
     return Slots((flat.ravel()[own], own), (rows, columns), places), coupled
 
 
-def plane(small: Model) -> Jointed:
+def jointed(small: Model) -> Jointed:
     """Return a model of small displacements, if it is one that may have large ones.
 
     Args:
         small: the model.
 
     Raises:
-        InvalidInput: faces bend, or the joints obey a law that is not known for large motion.
+        InvalidInput: it has no matrices, or the joints obey a law that is not known for large
+            motion.
     """
-    if not isinstance(small, Jointed) or small.fidelity not in PLANE:
+    if not isinstance(small, Jointed):
         raise InvalidInput(
-            f"large displacements are not known on the rung '{small.fidelity}': use one of {PLANE}"
+            f"large displacements are not known on the rung '{small.fidelity}': use 'full', which "
+            "is the same model, or a lower one"
         )
-    points = small.operator.points
-    if points.cohesion.any() or not points.plain:
+    if not small.operator.points.plain:
         raise InvalidInput(
-            "joints with cohesion, dilatancy or tension are not known with large displacements: "
-            f"leave them out (the largest cohesion is {points.cohesion.max():.4g} Pa)"
+            "joints with dilatancy or tension are not known with large displacements: leave them "
+            "out"
         )
     return small

@@ -16,27 +16,31 @@ class TurningCells(Cells):
     """Cells of blocks that turn.
 
     Attributes:
-        turns: coordinate of the turn of the block that each point belongs to (m,).
+        turns: coordinate of the turn of the block that each point belongs to, -1 where it has no
+            frame that turns (m,).
     """
 
     turns: Any = ()
 
     @classmethod
-    def of(cls, cells: Cells, starts: dict[int, int]) -> "TurningCells":
+    def of(cls, cells: Cells, blocks: dict[int, tuple[range, bool]]) -> "TurningCells":
         """Return the same cells on blocks that turn.
 
         Args:
             cells: whose `lift` holds for small displacements.
-            starts: first coordinate of each block that moves.
+            blocks: coordinates of each block that moves, and whether it has a frame that turns.
         """
-        turns = np.array([starts[int(block)] + 2 for block in cells.block])
+        of_block = {
+            number: span.start + 2 if turns else -1 for number, (span, turns) in blocks.items()
+        }
+        turns = np.array([of_block[int(block)] for block in cells.block])
         return cls(cells.places, cells.block, cells.polygons, cells.lift, cells.stress, turns)
 
     @cached_property
     def _about(self) -> tuple[Array, sparse.csr_matrix]:
         """Arms of the points from the centroids (m, 2), and their elastic displacements."""
         columns = self.lift.tocsc()
-        turn = np.unique(self.turns)
+        turn = np.unique(self.turns[self.turns >= 0])
         arms = np.zeros_like(self.places)
         for column in turn:
             motion = columns[:, column].toarray().reshape(-1, 2)
@@ -53,17 +57,19 @@ class TurningCells(Cells):
             q: coordinates (n,).
         """
         arms, elastic = self._about
-        turn = q[self.turns]
+        framed = self.turns >= 0
+        turn = np.where(framed, q[self.turns], 0.0)
+        shift = np.where(framed, [q[self.turns - 2], q[self.turns - 1]], 0.0)
         strained = (elastic @ q).reshape(-1, 2)
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
         return np.column_stack(
             [
-                q[self.turns - 2]
+                shift[0]
                 + less * arms[:, 0]
                 - s * arms[:, 1]
                 + c * strained[:, 0]
                 - s * strained[:, 1],
-                q[self.turns - 1]
+                shift[1]
                 + s * arms[:, 0]
                 + less * arms[:, 1]
                 + s * strained[:, 0]
@@ -114,3 +120,26 @@ class TurningPoint:
         found[theta, theta] = -force @ (turn @ place)
         found[theta, modes] = found[modes, theta] = force @ (rate @ self.shapes)
         return found.tocsr()
+
+
+@dataclass(frozen=True, eq=False)
+class StillPoint:
+    """A point of a block that has no frame that turns.
+
+    Attributes:
+        rows: its displacement from coordinates (2, n).
+    """
+
+    rows: sparse.csr_matrix
+
+    def displacement(self, q: Array) -> Array:
+        """Displacement from coordinates (2,) [m]."""
+        return np.asarray(self.rows @ q)
+
+    def gradient(self, q: Array, size: int) -> sparse.csr_matrix:
+        """Its derivative (2, n)."""
+        return self.rows
+
+    def bend(self, q: Array, force: Array, size: int) -> sparse.csr_matrix:
+        """Derivative of the generalised forces of a force: none (n, n)."""
+        return sparse.csr_matrix((size, size))

@@ -42,10 +42,13 @@ def carrier(model: Model) -> Callable[[Array], Array]:
 def _overlaps(model: Moving, q: Array) -> Array:
     """Displacements of the ends of what overlaps (n_joints, 2, 2) [m]."""
     structure, q = model.structure, np.ascontiguousarray(q, float)
-    poses = np.zeros((len(structure.joints), 2, 3))
-    for joint in range(len(poses)):
+    joints, poses = model.joints, np.zeros((len(structure.joints), 2, 3))
+    share = joints.faces.depth / np.bincount(joints.whole, joints.faces.depth)[joints.whole]
+    own = np.empty(3)
+    for piece, joint in enumerate(joints.whole):
         for side in range(2):
-            pose(model.joints.sides, joint, side, q, poses[joint, side])
+            pose(joints.sides, piece, side, q, own)
+            poses[joint, side] += share[piece] * own
     mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
     along = turned(structure.tangents, mean[:, 2])
     slip = np.sum(along * apart[:, :2], axis=1)

@@ -40,7 +40,7 @@ def test_displacements_reach_the_model(path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ("model.fidelity=full", "the rung 'full' does not know: use one of"),
+        ("model.fidelity=monolithic", "the rung 'monolithic' does not know: use 'full'"),
         ("model.fidelity=auto", "'auto' chooses among models of small displacements: .*'faces'"),
         ("model.displacements=far", "displacements 'far' are not known"),
         ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),

@@ -177,8 +177,8 @@ def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_f
 
 
 def test_what_is_not_known_for_large_displacements_is_refused():
-    with pytest.raises(InvalidInput, match="which the rung 'full' does not know"):
-        af.build(ring(), fidelity="full", cells=(1, 1), displacements="large")
+    with pytest.raises(InvalidInput, match="which the rung 'monolithic' does not know"):
+        af.build(ring(), fidelity="monolithic", cells=(1, 1), displacements="large")
     with pytest.raises(InvalidInput, match="name a rung"):
         af.build(ring(), fidelity="auto", displacements="large")
     with pytest.raises(InvalidInput, match="use one of"):
@@ -188,9 +188,9 @@ def test_what_is_not_known_for_large_displacements_is_refused():
         thickness=0.55,
         embrace=159.0,
         voussoirs=5,
-        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4),
+        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4, tension=1e4),
     )
-    with pytest.raises(InvalidInput, match="cohesion"):
+    with pytest.raises(InvalidInput, match="tension"):
         af.build(glued, fidelity="rigid", displacements="large")
     with pytest.raises(InvalidInput, match="displacements='large'"):
         collapse_scale(model(displacements="small"), SHAKE)

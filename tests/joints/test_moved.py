@@ -6,7 +6,7 @@ import pytest
 from archfem.joints.moving import frames
 from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
 from archfem.joints.moving.overlap import Faces
-from archfem.joints.moving.poses import Sides, pose, swing
+from archfem.joints.moving.poses import Sides, pose, pose_gradient
 
 SEEDS = range(12)
 
@@ -27,21 +27,10 @@ def measured(poses, angle):
 def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
-    ends, rates, now = np.empty((2, 3)), np.empty((3, 4)), np.empty((3, 4))
-    frames.follow(before, after, angle, ends, rates, now)
-    for end, poses in zip(ends, (before, after), strict=True):
-        assert end == pytest.approx(measured(poses, angle), abs=2e-15)
-    lower, higher = after - before
-    moved = np.array([*(higher - lower)[:2], lower[2], higher[2]])
-    assert np.abs(rates @ moved - (ends[1] - ends[0])).max() < 4e-15
-
-
-@pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
-def test_small_turns(x):
-    """Against NumPy, and the derivative of sin x / x against differences of it."""
-    assert frames.small_turn(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
-    there, back = (frames.small_turn(x + d)[1] for d in (1e-4, -1e-4))
-    assert frames.small_turn(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
+    rates = np.empty((3, 6))
+    frames.discrete(before, after, angle, rates)
+    change = measured(after, angle) - measured(before, angle)
+    assert np.abs(rates @ (after - before).ravel() - change).max() < 4e-15
 
 
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
@@ -59,12 +48,17 @@ def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
 
 def two_joints(shapes, friction, facets, rng):
     """Block 0 on block 1 on the ground, with modes or without."""
-    count = 4
+    count, size = 4, 3 + shapes
+    moves, stretch = np.zeros((2, 2, 3, size)), np.zeros((2, 2, size))
+    moves[..., 3:] = 0.1 * rng.normal(size=(2, 2, 3, shapes))
+    stretch[..., 3:] = 0.1 * rng.normal(size=(2, 2, shapes))
     sides = Sides(
-        np.array([[0, 3 + shapes], [3 + shapes, -1]]),
-        np.array([[3 + shapes, 3 + shapes], [3 + shapes, 0]]),
+        np.array([[0, size], [size, 0]])[..., None] + np.arange(size),
+        np.array([[size, size], [size, 0]]),
+        np.array([[True, True], [True, False]]),
         rng.normal(size=(2, 2, 2)),
-        0.1 * rng.normal(size=(2, 2, 3, shapes)),
+        moves,
+        stretch if shapes else stretch[..., :0],
         np.zeros((2, 2, 3)),
     )
     edges = np.linspace(-0.5, 0.5, count + 1)
@@ -82,8 +76,11 @@ def two_joints(shapes, friction, facets, rng):
         np.full(2 * points, 1.0 / count),
         np.repeat([3e4, 2e4], points) / points,
         facets,
+        np.array([0.0, 2e3]),
+        np.array([False, shapes > 0]),
     )
-    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2))
+    whole = np.arange(2)
+    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2), whole, np.zeros(2), 2)
 
 
 def gathered(joints, before, after, late, slid):
@@ -91,18 +88,15 @@ def gathered(joints, before, after, late, slid):
     found, size = answer(joints), len(before)
     pass_joints(joints, before, after, late, slid, found)
     force, rate = np.zeros(size), np.zeros((size, size))
-    start, sizes = joints.sides.start, joints.sides.size
+    index, sizes = joints.sides.index, joints.sides.size
     for joint in range(2):
         for side in range(2):
-            if start[joint, side] < 0:
-                continue
-            own = start[joint, side] + np.arange(sizes[joint, side])
+            own = index[joint, side, : sizes[joint, side]]
             force[own] += found.force[joint, side, : len(own)]
             for other in range(2):
-                if start[joint, other] >= 0:
-                    theirs = start[joint, other] + np.arange(sizes[joint, other])
-                    block = found.rate[joint, side, : len(own), other, : len(theirs)]
-                    rate[np.ix_(own, theirs)] += block
+                theirs = index[joint, other, : sizes[joint, other]]
+                block = found.rate[joint, side, : len(own), other, : len(theirs)]
+                rate[np.ix_(own, theirs)] += block
     return force, rate, found
 
 
@@ -155,10 +149,8 @@ def test_the_pose_follows_its_discrete_derivative(seed):
     rng = np.random.default_rng(seed)
     sides = two_joints(3, 0.5, True, rng).sides
     before, after = rng.normal(size=(2, 12))
-    poses, moves, found = np.empty((2, 2, 3)), np.zeros((2, 2, 3, 6)), np.empty(3)
-    swing(sides, 0, 1, before, after, poses, moves)
-    moves[..., :3] += np.eye(3) * (moves[..., :3] == 0.0)  # which go without saying
-    for row, q in zip(poses[:, 1], (before, after), strict=True):
-        pose(sides, 0, 1, q, found)
-        assert row == pytest.approx(found, abs=4e-15)
-    assert np.abs(moves[0, 1] @ (after - before)[6:] - (poses[1] - poses[0])[1]).max() < 1e-14
+    poses, rates = np.empty((2, 3)), np.empty((3, 6))
+    for row, q in zip(poses, (before, after), strict=True):
+        pose(sides, 0, 1, q, row)
+    pose_gradient(sides, 0, 1, before, after, rates)
+    assert np.abs(rates @ (after - before)[6:] - (poses[1] - poses[0])).max() < 1e-14

@@ -9,6 +9,7 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.bodies import bodies_of
 from archfem.dynamics.falling.state import Loose
 from archfem.dynamics.steps import State
+from archfem.masonry.rigid_motion import motion_of
 from archfem.models.moving import Moving
 
 
@@ -42,10 +43,14 @@ def released(model: Moving, state: State) -> Handover:
     instance(model, Moving, "model", "give a Moving, one of large displacements")
     structure = model.structure
     poses, velocities = np.array(model.supports, dtype=float), np.zeros((len(structure.blocks), 3))
-    centres = _centres(model)
-    for block, first in zip(structure.free, model.starts[:-1], strict=True):
-        pose, speed = state.q[first : first + 3], state.velocity[first : first + 3]
-        arm = structure.blocks[block].centroid - centres[block]
+    for number, block in enumerate(structure.free):
+        own = slice(*model.starts[number : number + 2])
+        pose, speed = state.q[own], state.velocity[own]
+        centre = model.centres[block]
+        if not model.turning[number]:
+            mean = _as_rigid(model, block, own)
+            pose, speed = mean @ pose, mean @ speed
+        arm = structure.blocks[block].centroid - centre
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turned = np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
         poses[block] = *(pose[:2] + turned - arm), pose[2]
@@ -61,12 +66,14 @@ def released(model: Moving, state: State) -> Handover:
     )
 
 
-def _centres(model: Moving) -> dict[int, Array]:
-    """About which point the turn of each free block is written, before it moves (2,) [m]."""
-    structure, sides = model.structure, model.joints.sides
-    return {
-        int(block): structure.middles[joint] - sides.arm[joint, side]
-        for joint, pair in enumerate(structure.pairs)
-        for side, block in enumerate(pair)
-        if sides.start[joint, side] >= 0
-    }
+def _as_rigid(model: Moving, block: int, own: slice) -> Array:
+    """What gives the rigid motion of a fill that has its momentum, about its centre (3, s)."""
+    cells = model.at_rest.cells
+    nodes = np.flatnonzero(cells.block == block)
+    rows = (2 * nodes[:, None] + np.arange(2)).ravel()
+    lift = cells.lift[rows][:, own].toarray()
+    motion = motion_of(cells.places[nodes], model.centres[block]).reshape(-1, 3)
+    rigid = np.linalg.lstsq(lift, motion, rcond=None)[0]
+    mass = rigid.T @ model.mass[own, own]
+    found: Array = np.linalg.solve(mass @ rigid, mass)
+    return found

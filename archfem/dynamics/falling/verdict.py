@@ -10,6 +10,7 @@ from archfem.dynamics.falling.bodies import Bodies, bodies_of
 from archfem.dynamics.falling.state import Loose
 from archfem.errors import InvalidInput
 from archfem.masonry.naming import listed
+from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import Structure
 
 KINDS = ("stands", "dislocated", "partly fallen", "fallen")
@@ -33,7 +34,7 @@ class Fall:
     """What a run has left of a structure.
 
     A block is *lost* once its centroid has sunk by more than half the root of its area, or once it
-    has turned by more than 45°, whatever it then lies on. The structure
+    has turned by more than 45°, whatever it then lies on. Fill does not count. The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the depth of the
       shallowest judged joint;
@@ -83,7 +84,8 @@ def fall_of(structure: Structure, frames: Iterable[Loose]) -> Fall:
     Raises:
         InvalidInput: there is no frame.
     """
-    free = list(structure.free)
+    fill = yielding_blocks(structure)
+    free = [number for number in structure.free if number not in fill] or list(structure.free)
     sizes = np.sqrt([structure.blocks[number].area for number in free])
     lost, time, last = np.zeros(len(free), dtype=bool), None, None
     for last in frames:

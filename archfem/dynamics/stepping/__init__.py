@@ -28,6 +28,7 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     sparse           the strategy for large structures, with one sparse factor
     panels           that factor, dense block by dense block
     turning          the strategy for blocks that move as far as they like
+    turning_newton   Newton's method for a step of theirs
     band_lu          its elimination, with row exchanges
     elimination      the order in which its unknowns are eliminated
     sparse_rows      compiled products of matrices and vectors

@@ -18,12 +18,13 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.band_lu import eliminate, half_width
+from archfem.dynamics.stepping.band_lu import banded, half_width
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
 from archfem.dynamics.stepping.strategy import Reordered
-from archfem.joints.moving.moved import Answer, Moved, answer, joint_energy, pass_joints
+from archfem.dynamics.stepping.turning_newton import sought
+from archfem.joints.moving.moved import Answer, Moved, answer, joint_energy
 from archfem.joints.moving.poses import Sides
 from archfem.models.moving import Moving
 
@@ -37,8 +38,8 @@ WHOLE = (3, 0)
 """Passes that go all the way, before those that must leave less out of balance; at a second try
 none does."""
 
-TURNS, LOOKS, SHORTEST = 60, 150, 1.0 / 64.0
-"""Passes at most, looks at what is out of balance, and the shortest part of a pass."""
+WIDE = 40
+"""Half-width of the band from which factors are kept while they serve."""
 
 SETUP = 0.05
 """Estimate of the time until the first step can be taken [s]."""
@@ -54,11 +55,13 @@ class TurningSystem(NamedTuple):
         mass: M.
         blocks: K, of the blocks alone.
         viscous: C.
-        band: 2 M/Δt² + C/Δt + (½ + β/Δt) K (n, 3 b + 1).
+        effective: 2 M/Δt² + C/Δt + (½ + β/Δt) K.
+        band: the same as a band (n, 3 b + 1).
         weight: forces of gravity (n,).
         body: forces per unit ground acceleration (2, n).
         step: Δt, and β/Δt.
         enough: force left out of balance that ends the passes [N], and correction [m].
+        wide: whether factors are kept.
     """
 
     turning: Moved
@@ -67,11 +70,13 @@ class TurningSystem(NamedTuple):
     mass: Rows
     blocks: Rows
     viscous: Rows
+    effective: Rows
     band: Array
     weight: Array
     body: Array
     step: tuple[float, float]
     enough: tuple[float, float]
+    wide: bool
 
 
 class Turning(Reordered):
@@ -88,9 +93,7 @@ class Turning(Reordered):
         assert isinstance(model, Moving)
         self._equation: Equation = equation
         self._model: Moving = model
-        self._blocks: Any = _narrow(model)
-        pieces = [np.arange(*model.starts[k : k + 2]) for k in self._blocks]
-        super().__init__(np.concatenate(pieces))
+        super().__init__(_narrow(model))
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
@@ -120,7 +123,8 @@ class Turning(Reordered):
             for each in (model.mass, model.blocks, equation.viscous, model.closed())
         )
         effective = (2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks
-        room = answer(model.joints)
+        room, half = answer(model.joints), half_width(closed)
+        balance = ENOUGH * (10.0 if half >= WIDE else 1.0)
         return TurningSystem(
             model.joints._replace(sides=self._sides()),
             room,
@@ -128,38 +132,32 @@ class Turning(Reordered):
             rows_of(mass),
             rows_of(blocks),
             rows_of(viscous),
-            _banded(effective, half_width(closed)),
+            rows_of(effective.tocsr()),
+            banded(effective, half),
             equation.weight[order],
             np.ascontiguousarray(model.body[order].T),
             (dt, late),
-            (ENOUGH * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
+            (balance * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
+            half >= WIDE,
         )
 
     def _sides(self) -> Sides:
         """The joints' faces, with coordinates in the order of the band."""
-        sides, starts = self._model.joints.sides, self._model.starts
-        sizes = np.diff(starts)[self._blocks]
-        moved = np.full(starts[-1] + 1, -1)
-        moved[starts[self._blocks]] = np.cumsum(sizes) - sizes
-        return sides._replace(start=np.where(sides.start < 0, -1, moved[sides.start]))
+        sides = self._model.joints.sides
+        return sides._replace(index=self._place[sides.index])
 
 
 def _narrow(model: Moving) -> Any:
-    """Free blocks in an order that keeps neighbours close."""
+    """Order coordinates so that neighbours stay close: blocks, or with a fill each by itself."""
+    if not model.turning.all():
+        return reverse_cuthill_mckee(model.closed(), symmetric_mode=True)
     free, pairs = np.array(model.structure.free), model.structure.pairs
     place = np.full(len(model.structure.blocks), -1)
     place[free] = np.arange(len(free))
     inner = place[pairs[np.all(place[pairs] >= 0, axis=1)]]
     graph = sparse.csr_matrix((np.ones(len(inner)), inner.T), 2 * (len(free),))
-    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
-
-
-def _banded(matrix: sparse.csr_matrix, half: int) -> Array:
-    """A matrix as a band with room for its elimination (n, 3 b + 1)."""
-    entries = matrix.tocoo()
-    band = np.zeros((matrix.shape[0], 3 * half + 1))
-    band[entries.row, half + entries.col - entries.row] = entries.data
-    return band
+    blocks = reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+    return np.concatenate([np.arange(*model.starts[k : k + 2]) for k in blocks])
 
 
 class Turned(NamedTuple):
@@ -172,6 +170,7 @@ class Turned(NamedTuple):
         constant: what of the forces does not depend on the end of the step (n,).
         move: Δq (n,).
         along: the correction (n,).
+        known: whether the band holds factors, of a pass before (1,).
     """
 
     band: Array
@@ -180,6 +179,7 @@ class Turned(NamedTuple):
     constant: Array
     move: Array
     along: Array
+    known: Any
 
 
 def _is_system(system: Any) -> bool:
@@ -205,8 +205,15 @@ def _started(system, state, memory):  # type: ignore
     """Room for the steps, and what joints remember."""
     size = state.shape[1]
     system.slid[: len(memory)] = memory
-    rest, image, constant, move, along = np.zeros((5, size))
-    return Turned(np.empty_like(system.band), rest, image, constant, move, along)
+    return Turned(
+        np.empty_like(system.band),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(1, dtype=np.bool_),
+    )
 
 
 def _settled(system, kept, step, states, ground):  # type: ignore
@@ -215,43 +222,13 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     _load(system, kept, old, ground)
     for whole in WHOLE:
         kept.move[:] = system.step[0] * old[1]
-        found, done = _sought(system, kept, old[0], new[0], whole)
+        found, done = sought(system, kept, old[0], new[0], whole)
         looks += found
         if done:
             new[1] = (2.0 / system.step[0]) * kept.move - old[1]
             new[2] = (new[1] - old[1]) / system.step[0]
             return looks
     return -1
-
-
-@numba.njit(cache=True)
-def _sought(system, kept, before, after, whole):  # type: ignore
-    """Find the end of a step; returns looks at what is out of balance, and whether it was found."""
-    move, rest, along, (enough, rounded) = kept.move, kept.rest, kept.along, system.enough
-    last, looks = np.inf, 1
-    after[:] = before + move
-    left = _left(system, kept, before, after)
-    for turn in range(TURNS):
-        if left <= enough or (last <= rounded and left <= 1e4 * enough):
-            return looks, True
-        _assemble(system, kept)
-        if looks > LOOKS or not eliminate(kept.band, rest):
-            return looks, False
-        along[:] = rest
-        last, share = np.max(np.abs(along)), 1.0
-        if not last < np.inf:
-            return looks, False
-        move += along
-        while True:
-            after[:] = before + move
-            found = _left(system, kept, before, after)
-            looks += 1
-            if found < left or turn < whole or share <= SHORTEST:
-                break
-            share *= 0.5
-            move -= share * along
-        left, last = found, share * last
-    return looks, False
 
 
 @numba.njit(cache=True)
@@ -266,44 +243,6 @@ def _load(system, kept, old, ground):  # type: ignore
     if stored(system.blocks) > 0:
         times(system.blocks, old[0], image)
         constant -= image
-
-
-@numba.njit(cache=True)
-def _left(system, kept, before, after):  # type: ignore
-    """Find the forces out of balance; returns their norm."""
-    rest, band, joints = kept.rest, system.band, system.turning
-    half, size = (band.shape[1] - 1) // 3, len(rest)
-    pass_joints(joints, before, after, system.step[1], system.slid, system.room)
-    rest[:] = kept.constant
-    for i in range(size):
-        total = 0.0
-        for j in range(max(0, i - half), min(size, i + half + 1)):
-            total += band[i, half + j - i] * kept.move[j]
-        rest[i] -= total
-    start, sizes, force = joints.sides.start, joints.sides.size, system.room.force
-    for joint in range(len(start)):
-        for side in range(2):
-            first = start[joint, side]
-            for k in range(sizes[joint, side]):
-                rest[first + k] -= force[joint, side, k]
-    return np.sqrt(np.sum(rest * rest))
-
-
-@numba.njit(cache=True)
-def _assemble(system, kept):  # type: ignore
-    """The derivative of the forces by the end of the step."""
-    band, rate = kept.band, system.room.rate
-    start, sizes = system.turning.sides.start, system.turning.sides.size
-    half = (band.shape[1] - 1) // 3
-    band[:] = system.band
-    for joint in range(len(start)):
-        for side in range(2):
-            for k in range(sizes[joint, side]):
-                row = start[joint, side] + k
-                for other in range(2):
-                    first = half + start[joint, other] - row
-                    for m in range(sizes[joint, other]):
-                        band[row, first + m] += rate[joint, side, k, other, m]
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore

@@ -4,6 +4,7 @@
     frames   opening, slip and turn of faces that have moved far
     poses    where the faces of blocks are that turn as far as they like
     overlap  the law over the overlap of faces that have slid far
+    rubbing  the shear of a joint, with friction and cohesion
     moved    a step of the joints: forces, memory, and their derivatives
 
 Start reading at `moved`.

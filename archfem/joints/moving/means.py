@@ -71,6 +71,62 @@ def facet_means(ends, first, second):  # type: ignore
 
 
 @numba.njit(cache=True)
+def closed_means(ends, first, second, facet):  # type: ignore
+    """Return the mean time for which a facet of unit length is closed, or a place, and its rate.
+
+    Args:
+        ends: gaps of both ends at the start, and of both at the end, of their paths [m].
+        first: change of the start with a parameter [-].
+        second: change of the end with it [-].
+        facet: whether it is one; else only its first end counts.
+
+    Returns:
+        Integrated with the two linear functions of the facet, and their derivatives by the first
+        and by the second gap, and of the second by the second [-, 1/m].
+    """
+    a, c, b, d = ends
+    if not facet:
+        time, rate = _closed_rate(a, b, first, second)
+        return (time, 0.0), (rate, 0.0, 0.0)
+    low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
+    high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
+    breaks = (0.0, min(low, high), max(low, high), 1.0)
+    s0 = s1 = r00 = r01 = r11 = 0.0
+    for piece in range(3):
+        length = breaks[piece + 1] - breaks[piece]
+        if length <= 0.0:
+            continue
+        for k in range(3):
+            place = breaks[piece] + PLACES[k] * length
+            near, far = 1.0 - place, place
+            time, rate = _closed_rate(near * a + far * c, near * b + far * d, first, second)
+            weight = SHARES[k] * length
+            s0 += weight * near * time
+            s1 += weight * far * time
+            r00 += weight * near * near * rate
+            r01 += weight * near * far * rate
+            r11 += weight * far * far * rate
+    if low == high and 0.0 < low < 1.0:  # the end of what is closed moves, at an instant
+        moves = -0.5 * (first + second) / abs(a - c)
+        r00 += (1.0 - low) ** 2 * moves
+        r01 += (1.0 - low) * low * moves
+        r11 += low**2 * moves
+    return (s0, s1), (r00, r01, r11)
+
+
+@numba.njit(cache=True)
+def _closed_rate(a, b, first, second):  # type: ignore
+    """Part of a step for which a place is closed, and its derivative."""
+    if (a <= 0.0) == (b <= 0.0):
+        return 1.0 if a <= 0.0 else 0.0, 0.0
+    whole = abs(a) + abs(b)
+    time = -min(a, b) / whole
+    by_first = 1.0 - time if a <= 0.0 else time
+    by_second = 1.0 - time if b <= 0.0 else time
+    return time, -(first * by_first + second * by_second) / whole
+
+
+@numba.njit(cache=True)
 def shear_means(first, change, late, limit):  # type: ignore
     """Return what a point that slides during a step carries, as `joints.law.shear_over_step`.
 

@@ -5,21 +5,16 @@ there: faces' poses by `poses`, measures by `frames`, the law by `overlap`. At a
 over a step that goes nowhere, forces are those of statics and twice the derivative is the tangent.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import bend, follow, measures
-from archfem.joints.moving.overlap import (
-    Faces,
-    overlap,
-    press_faces,
-    rub_faces,
-    stored,
-)
-from archfem.joints.moving.poses import Sides, pose, swing, swing_bend
+from archfem.joints.moving.frames import bend, discrete, gradient, measures
+from archfem.joints.moving.overlap import Faces, lap, press_faces, stored
+from archfem.joints.moving.poses import Sides, pose, pose_bend, pose_gradient, stretched
+from archfem.joints.moving.rubbing import limit_faces, rub_faces
 
 
 class Moved(NamedTuple):
@@ -31,12 +26,19 @@ class Moved(NamedTuple):
         angle: direction of the normals before anything moved (j,) [rad].
         hand: 1 where the extrados is on the left of the normal, -1 where it is on the right: slip,
             turn, V and M are told as positive toward the extrados (j,).
+        whole: which joint of the structure each is; where faces bend one is in pieces, as the nodes
+            of its mesh divide it (j,).
+        aside: how far its middle lies from that of the whole, toward the extrados (j,) [m].
+        wholes: number of joints of the structure.
     """
 
     sides: Sides
     faces: Faces
     angle: Array
     hand: Array
+    whole: Any
+    aside: Array
+    wholes: int
 
 
 class Answer(NamedTuple):
@@ -46,7 +48,7 @@ class Answer(NamedTuple):
         force: mean generalised forces of each joint, of the lower block's coordinates and of the
             higher's (j, 2, s).
         rate: derivative by the coordinates at the end (j, 2, s, 2, s).
-        resultants: mean N, V, M (j, 3) [N, N, N m].
+        resultants: mean N, V, M of the joints of the structure (n_joints, 3) [N, N, N m].
         slid: how far each point has slid for good at the end (p,) [m].
         lost: energy that friction and the lag take (j,) [J].
     """
@@ -64,11 +66,11 @@ def answer(joints: Moved) -> Answer:
     Args:
         joints: of which.
     """
-    count, size = len(joints.angle), 3 + joints.sides.shapes.shape[-1]
+    count, size = len(joints.angle), joints.sides.shapes.shape[-1]
     return Answer(
         np.zeros((count, 2, size)),
         np.zeros((count, 2, size, 2, size)),
-        np.zeros((count, 3)),
+        np.zeros((joints.wholes, 3)),
         np.zeros(len(joints.faces.place)),
         np.zeros(count),
     )
@@ -92,17 +94,51 @@ def find_measures(joints, joint, q, found):  # type: ignore
 
 @numba.njit(cache=True)
 def all_measures(joints, q):  # type: ignore
-    """Return opening, slip and turn of all joints, with their signs (j, 3) [m, m, -].
+    """Return opening, slip and turn of the joints of the structure (n_joints, 3) [m, m, -].
+
+    Slip and turn with their signs. Of a joint in pieces, the plane nearest to the openings, and the
+    mean slip, as `faces.face_matrix` has them.
 
     Args:
         joints: `Moved`.
         q: coordinates (n,).
     """
-    found = np.empty((len(joints.angle), 3))
+    found, own, depths = np.zeros((joints.wholes, 3)), np.empty(3), joints.faces.depth
+    sums = np.zeros((joints.wholes, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
+    for joint in range(len(joints.angle)):
+        find_measures(joints, joint, q, own)
+        whole, depth, place = joints.whole[joint], depths[joint], joints.aside[joint]
+        spread = 0.25 * depth**3
+        found[whole, 0] += depth * own[0]
+        found[whole, 1] += depth * joints.hand[joint] * own[1]
+        sums[whole, 0] += depth
+        sums[whole, 1] += depth * place
+        sums[whole, 2] += depth * place**2 + spread
+        sums[whole, 3] += depth * place * own[0] - spread * joints.hand[joint] * own[2]
+    for whole in range(joints.wholes):
+        total, first, second, tilted = sums[whole]
+        middle = first / total
+        turn = middle * found[whole, 0] - tilted
+        turn /= second - middle * first
+        found[whole, 0] = found[whole, 0] / total + turn * middle
+        found[whole, 1] /= total
+        found[whole, 2] = turn
+    return found
+
+
+@numba.njit(cache=True)
+def paired_slips(joints, q):  # type: ignore
+    """Return how far pieces have slid whose places stay opposite, over their length (j,) [-].
+
+    Args:
+        joints: `Moved`.
+        q: coordinates (n,).
+    """
+    found, own, faces = np.zeros(len(joints.angle)), np.empty(3), joints.faces
     for joint in range(len(found)):
-        find_measures(joints, joint, q, found[joint])
-        found[joint, 1] *= joints.hand[joint]
-        found[joint, 2] *= joints.hand[joint]
+        if faces.paired[joint]:
+            find_measures(joints, joint, q, own)
+            found[joint] = abs(own[1]) / faces.depth[joint]
     return found
 
 
@@ -118,11 +154,13 @@ def joint_energy(joints, q, slid):  # type: ignore
     found, total, faces = np.empty(3), 0.0, joints.faces
     for joint in range(len(joints.angle)):
         find_measures(joints, joint, q, found)
-        length = overlap(faces.depth[joint], found[1])[0]
+        longer = stretched(joints.sides, joint, q)
+        length = lap(faces, joint, found[1])[0]
         phi = stored(faces, joint, length, found[0], found[2])[0]
         total += faces.normal[joint] * length * phi
         for point in range(faces.first[joint], faces.first[joint + 1]):
-            total += 0.5 * faces.shear[point] * (found[1] - slid[point]) ** 2
+            elastic = found[1] + faces.place[point] * longer - slid[point]
+            total += 0.5 * faces.shear[point] * elastic**2
     return total
 
 
@@ -138,102 +176,104 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
-    sides, faces, size = joints.sides, joints.faces, found.force.shape[2]
-    remembered, still = found.slid, ((1.0, 0.0), (0.0, 0.0), (1.0,) * 4)
-    poses, moves, ends = np.empty((2, 2, 3)), np.zeros((2, 2, 3, size)), np.empty((2, 3))
-    by_faces = np.empty((2, 3, 4))
-    force, rate, normals = np.empty(3), np.empty((3, 3)), np.empty((len(slid), 4))
-    pushed, curved = np.empty((2, 3)), np.empty((4, 4))
+    sides, size = joints.sides, found.force.shape[2]
+    poses, ends = np.empty((2, 2, 3)), np.empty((2, 4))
+    rates, now, curved = np.empty((3, 6)), np.empty((3, 6)), np.empty((6, 6))
+    own, last = np.empty((2, 3, size)), np.empty((2, 3, size))
+    turned, force, rate = np.empty((size, size)), np.empty(4), np.empty((4, 4))
+    pushed = np.empty(6)
+    normals = np.empty((len(slid), 4))
+    found.resultants[:] = 0.0
     for joint in range(len(joints.angle)):
-        swings = still, still
-        if sides.start[joint, 0] >= 0:
-            swings = swing(sides, joint, 0, before, after, poses, moves), still
-        else:
-            poses[:, 0] = sides.held[joint, 0]
-        if sides.start[joint, 1] >= 0:
-            swings = swings[0], swing(sides, joint, 1, before, after, poses, moves)
-        else:
-            poses[:, 1] = sides.held[joint, 1]
-        step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
-        lagging = press_faces(faces, joint, ends, late, force, rate, normals)
-        shear, rubbing = rub_faces(faces, joint, ends, late, normals, slid, force, rate, remembered)
-        found.resultants[joint, 0] = -force[0]
-        found.resultants[joint, 1] = joints.hand[joint] * shear
-        found.resultants[joint, 2] = joints.hand[joint] * force[2]
-        found.lost[joint] = lagging + rubbing
-        _between(by_faces, rate, curved)
-        bend(step, force, curved)
         for side in range(2):
-            _push(by_faces[0], force, side, pushed[side])
-            _gather(sides, joint, side, moves[0], pushed[side], found.force)
+            pose(sides, joint, side, before, poses[0, side])
+            pose(sides, joint, side, after, poses[1, side])
+            pose_gradient(sides, joint, side, before, after, own[side])
+            pose_gradient(sides, joint, side, after, after, last[side])
+        angle = joints.angle[joint]
+        for end in range(2):
+            measures(poses[end, 0], poses[end, 1], angle, ends[end])
+        ends[0, 3], ends[1, 3] = stretched(sides, joint, before), stretched(sides, joint, after)
+        discrete(poses[0], poses[1], angle, rates)
+        gradient(poses[1], angle, now)
+        lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
+        limit_faces(joints.faces, joint, ends, late, normals)
+        shear, rubbing = rub_faces(
+            joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
+        )
+        found.lost[joint] = lagging + rubbing
+        _sum_up(joints, joint, force, shear, found.resultants)
+        bend(poses[0], poses[1], angle, force, curved)
+        _between(rates, rate, now, curved)
+        _pushed(rates, force, pushed)
+        for side in range(2):
+            pushing = pushed[3 * side : 3 * side + 3]
+            _pushed(own[side], pushing, found.force[joint, side])
+            pose_bend(sides, joint, side, before, after, pushing, turned)
             for other in range(2):
-                _spread(sides, (joint, side, other), moves, curved, found.rate)
-            if sides.start[joint, side] >= 0:
-                swing_bend(sides, joint, side, swings[side], pushed[side], found.rate)
+                block = found.rate[joint, side, :, other, :]
+                block[:] = 0.0
+                if other == side:
+                    block[:] = turned
+                part = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3]
+                _between(own[side], part, last[other], block)
+        if sides.stretch.shape[2] > 0:
+            _stretch(sides, joint, (force, rate), (rates, now), (own, last), found)
 
 
 @numba.njit(cache=True)
-def _between(by_faces, rate, found):  # type: ignore
-    """Dᵀ rate B, of all faces can do to the joint (4, 4)."""
-    for column in range(4):
-        for row in range(4):
-            found[row, column] = 0.0
+def _sum_up(joints, joint, force, shear, resultants):  # type: ignore
+    """Add a joint's, or a piece's, forces to N, V, M of the whole."""
+    whole, hand = joints.whole[joint], joints.hand[joint]
+    resultants[whole, 0] -= force[0]
+    resultants[whole, 1] += hand * shear
+    resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
+
+
+@numba.njit(cache=True)
+def _stretch(sides, joint, law, frame, poses, found):  # type: ignore
+    """Add what the stretch of the faces does: its force, and how all forces change with it."""
+    (force, rate), (rates, now), (own, last) = law, frame, poses
+    size = own.shape[2]
+    by_after, by_first = np.zeros((2, size)), np.zeros((2, size))
+    for side in range(2):
+        for pose_part in range(3):
+            column = 3 * side + pose_part
+            by_now = rate[3, 0] * now[0, column] + rate[3, 1] * now[1, column]
+            by_now += rate[3, 2] * now[2, column]
+            for k in range(sides.size[joint, side]):
+                by_after[side, k] += by_now * last[side, pose_part, k]
+                by_first[side, k] += rates[1, column] * rate[1, 3] * own[side, pose_part, k]
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        for k in range(sides.size[joint, side]):
+            pulled = sign * sides.stretch[joint, side, k]
+            found.force[joint, side, k] += force[3] * pulled
+            for other, against in ((0, -1.0), (1, 1.0)):
+                for m in range(sides.size[joint, other]):
+                    longer = against * sides.stretch[joint, other, m]
+                    found.rate[joint, side, k, other, m] += (
+                        pulled * (by_after[other, m] + rate[3, 3] * longer)
+                        + by_first[side, k] * longer
+                    )
+
+
+@numba.njit(cache=True)
+def _pushed(rates, force, found):  # type: ignore
+    """Ratesᵀ force, filled."""
+    for column in range(len(found)):
+        found[column] = 0.0
+        for row in range(3):
+            found[column] += rates[row, column] * force[row]
+
+
+@numba.njit(cache=True)
+def _between(left, middle, right, found):  # type: ignore
+    """Leftᵀ middle right, added."""
+    for column in range(left.shape[1]):
         for k in range(3):
             value = 0.0
-            for j in range(3):
-                value += rate[k, j] * by_faces[1, j, column]
-            for row in range(4):
-                found[row, column] += by_faces[0, k, row] * value
-
-
-@numba.njit(cache=True)
-def _push(by_faces, force, side, found):  # type: ignore
-    """Forces on the pose of a face (3,)."""
-    sign = 2.0 * side - 1.0
-    found[0] = sign * (by_faces[0, 0] * force[0] + by_faces[1, 0] * force[1])
-    found[1] = sign * (by_faces[0, 1] * force[0] + by_faces[1, 1] * force[1])
-    found[2] = 0.0
-    for row in range(3):
-        found[2] += by_faces[row, 2 + side] * force[row]
-
-
-@numba.njit(cache=True)
-def _gather(sides, joint, side, moves, pushed, found):  # type: ignore
-    """Forces on the coordinates of a block."""
-    if sides.start[joint, side] < 0:
-        return
-    found[joint, side, 0], found[joint, side, 1] = pushed[0], pushed[1]
-    x, y = moves[side, 0, 2] * pushed[0], moves[side, 1, 2] * pushed[1]
-    found[joint, side, 2] = x + y + pushed[2]
-    for k in range(3, sides.size[joint, side]):
-        value = 0.0
-        for row in range(3):
-            value += moves[side, row, k] * pushed[row]
-        found[joint, side, k] = value
-
-
-@numba.njit(cache=True)
-def _spread(sides, where, moves, curved, found):  # type: ignore
-    """Derivative of the forces on a block by the coordinates of one."""
-    joint, side, other = where
-    sign = 1.0 if side == other else -1.0
-    toward, against = 2.0 * side - 1.0, 2.0 * other - 1.0
-    for column in range(sides.size[joint, other]):
-        if column < 2:
-            x, y = sign * curved[0, column], sign * curved[1, column]
-            turn = against * curved[2 + side, column]
-        else:
-            a, b = against * moves[1, other, 0, column], against * moves[1, other, 1, column]
-            c = 1.0 if column == 2 else moves[1, other, 2, column]
-            last = 2 + other
-            x = toward * (curved[0, 0] * a + curved[0, 1] * b + curved[0, last] * c)
-            y = toward * (curved[1, 0] * a + curved[1, 1] * b + curved[1, last] * c)
-            row = 2 + side
-            turn = curved[row, 0] * a + curved[row, 1] * b + curved[row, last] * c
-        for k in range(sides.size[joint, side]):
-            if k < 2:
-                value = y if k else x
-            else:
-                by_turn = 1.0 if k == 2 else moves[0, side, 2, k]
-                value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y + by_turn * turn
-            found[joint, side, k, other, column] = value
+            for row in range(3):
+                value += left[row, column] * middle[row, k]
+            if value != 0.0:
+                for other in range(right.shape[1]):
+                    found[column, other] += value * right[k, other]

@@ -9,7 +9,7 @@ over a step are those whose work is the change of that:
     F_s = k_n w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i f̄_i) + Σ τ̄_i,
 
 f̄_i the means of ∫φ_i <gap>₋ dx, or of W_i <gap>₋, while the gap goes straight, bars means of both
-ends. At each point a spring in series with a stop holds the shear, as `law.shear_over_step`.
+ends; `rubbing` gives the shear τ̄.
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.means import facet_means, point_means, shear_means
+from archfem.joints.moving.means import facet_means, point_means
 
 
 class Faces(NamedTuple):
@@ -33,6 +33,9 @@ class Faces(NamedTuple):
         share: of the depth that a point stands for, or the whole facet it is on (p,) [-].
         shear: k_s times the area of each point (p,) [N/m].
         facets: whether points are ends of facets, not springs.
+        cohesion: c w, which adds to friction where a joint is closed (j,) [N/m].
+        paired: whether places that touched at the start stay opposite, as nodes of a mesh do, so
+            that the overlap is h (j,).
     """
 
     depth: Array
@@ -43,6 +46,8 @@ class Faces(NamedTuple):
     share: Array
     shear: Array
     facets: bool
+    cohesion: Array
+    paired: Any
 
 
 @numba.njit(cache=True)
@@ -57,6 +62,20 @@ def overlap(depth, slip):  # type: ignore
     if length <= 0.0:
         return 0.0, 0.0
     return length, -np.sign(slip)
+
+
+@numba.njit(cache=True)
+def lap(faces, joint, slip):  # type: ignore
+    """Return the length on which the law of a joint acts, and its derivative by the slip.
+
+    Args:
+        faces: `Faces`.
+        joint: its number.
+        slip: between the faces [m].
+    """
+    if faces.paired[joint]:
+        return faces.depth[joint], 0.0
+    return overlap(faces.depth[joint], slip)
 
 
 @numba.njit(cache=True)
@@ -105,10 +124,10 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     Args:
         faces: `Faces`.
         joint: its number.
-        ends: measures at the start and at the end of the step (2, 3).
+        ends: measures at the start and at the end of the step (2, 4).
         late: lag of damping over the length of the step [-].
-        force: on opening, slip and turn, filled (3,) [N, N, N m].
-        rate: filled (3, 3).
+        force: on opening, slip, turn and stretch, filled (4,) [N, N, N m, N].
+        rate: filled (4, 4).
         normals: of each point mean pressing force, not negative, and its derivative by opening,
             slip and turn at the end, filled for those of this joint (p, 4) [N].
 
@@ -116,20 +135,21 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         Energy that the lag takes [J].
     """
     (l0, _), (l1, shrinks) = (
-        overlap(faces.depth[joint], ends[0, 1]),
-        overlap(faces.depth[joint], ends[1, 1]),
+        lap(faces, joint, ends[0, 1]),
+        lap(faces, joint, ends[1, 1]),
     )
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks
     total = moment = lost = 0.0
-    rate[:] = 0.0  # in its first and last row, derivatives of total and moment at first
-    stride, places, shares = 2 if faces.facets else 1, faces.place, faces.share
+    total_by, moment_by = np.zeros(3), np.zeros(3)
+    stride = 2 if faces.facets else 1
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
-        x0, x1 = places[point], places[point + stride - 1]
+        x0 = faces.place[point]
+        x1 = faces.place[point + stride - 1]
         a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
         b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
         lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        share = shares[point]
+        share = faces.share[point]
         (n0, n1), (k00, k01, k11) = _carried(lagged, late, 1.0 + late, faces.facets)
         if late > 0.0:
             p0, p1 = _carried((a, c, b, d), 0.0, 1.0, faces.facets)[0]
@@ -141,35 +161,46 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         if faces.facets:
             normals[point + 1, 0] = scale * mean * n1
         for k in range(3):
-            by_b, by_d = _gap_rate(k, x0, l1, shrinks, ends), _gap_rate(k, x1, l1, shrinks, ends)
+            by_b, by_d = gap_rate(k, x0, l1, shrinks, ends), gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            rate[0, k] += share * (near + far)
-            rate[2, k] += share * (x0 * near + x1 * far)
+            total_by[k] += share * (near + far)
+            moment_by[k] += share * (x0 * near + x1 * far)
             wider = widens if k == 1 else 0.0
             normals[point, 1 + k] = scale * (mean * near + wider * n0)
             if faces.facets:
                 normals[point + 1, 1 + k] = scale * (mean * far + wider * n1)
     before = stored(faces, joint, l0, ends[0, 0], ends[0, 2])[0]
     after, whole, tilted = stored(faces, joint, l1, ends[1, 0], ends[1, 2])
-    slope, bends = _slope(ends[0, 1], ends[1, 1], faces.depth[joint])
+    slope, bends = _slope(
+        ends[0, 1], ends[1, 1], lap(faces, joint, ends[0, 1]), lap(faces, joint, ends[1, 1])
+    )
     push = 0.5 * (before + after) - mean * turn * moment
+    rate[3, :], rate[:, 3], force[3] = 0.0, 0.0, 0.0
     force[0] = stiff * mean * total
     force[1] = stiff * slope * push
     force[2] = -stiff * mean * mean * moment
     by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
     for k in range(3):
-        wider, turns, by_moment = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0, rate[2, k]
-        rate[0, k] = stiff * (mean * rate[0, k] + wider * total)
-        rate[2, k] = -stiff * mean * (mean * by_moment + 2.0 * wider * moment)
+        wider, turns = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0
+        rate[0, k] = stiff * (mean * total_by[k] + wider * total)
+        rate[2, k] = -stiff * mean * (mean * moment_by[k] + 2.0 * wider * moment)
         change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
-        change -= mean * turn * by_moment
+        change -= mean * turn * moment_by[k]
         rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
     return stiff * mean * lost
 
 
 @numba.njit(cache=True)
-def _gap_rate(measure, place, length, shrinks, ends):  # type: ignore
-    """Derivative of the gap at a place by a measure at the end of the step."""
+def gap_rate(measure, place, length, shrinks, ends):  # type: ignore
+    """Return the derivative of the gap at a place by a measure at the end of the step.
+
+    Args:
+        measure: 0 opening, 1 slip, 2 turn.
+        place: x [-].
+        length: of the overlap at the end [m].
+        shrinks: its derivative by the slip [-].
+        ends: measures at the start and at the end of the step (2, 3).
+    """
     if measure == 0:
         return 1.0
     return -place * (shrinks * ends[1, 2] if measure == 1 else length)
@@ -205,63 +236,12 @@ def _carried(ends, first, second, facet):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _slope(before, after, depth):  # type: ignore
-    """Δℓ/Δs over a step, and its derivative by the slip at the end."""
-    (l0, r0), (l1, r1) = overlap(depth, before), overlap(depth, after)
+def _slope(before, after, first, last):  # type: ignore
+    """Δℓ/Δs over a step, and its derivative by the slip at the end, from ℓ and its derivatives."""
+    (l0, r0), (l1, r1) = first, last
     moved = after - before
     same = r0 == r1 and l0 > 0.0 and l1 > 0.0 and before * after > 0.0
     if same or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
         return r1, 0.0
     slope = (l1 - l0) / moved
     return slope, (r1 - slope) / moved
-
-
-@numba.njit(cache=True)
-def _rubbed(first, change, late, limit):  # type: ignore
-    """What `shear_means` gives of a point whether it slides or not, also over no step at all."""
-    trial = first + (0.5 + late) * change
-    if max(abs(first), abs(first + change), abs(trial)) <= limit:
-        return trial, 0.0, 0.5 + late, 0.0, late * change * change
-    found = shear_means(first, change, late, limit)
-    if change == 0.0 and abs(first) > limit:
-        return found[0], found[1], 0.0, np.sign(found[0]), found[4]
-    return found
-
-
-@numba.njit(cache=True)
-def rub_faces(  # type: ignore  # noqa: PLR0913  (arrays in a tuple would be counted at each call)
-    faces, joint, ends, late, normals, slid, force, rate, after
-):
-    """Add the shear of a joint over a step, and what its points remember at the end.
-
-    Args:
-        faces: `Faces`.
-        joint: its number.
-        ends: measures at the start and at the end of the step (2, 3).
-        late: lag of damping over the length of the step [-].
-        normals: as `press_faces` fills them (p, 4) [N].
-        slid: how far each point has slid for good before (p,) [m].
-        force: on opening, slip and turn, added to (3,) [N, N, N m].
-        rate: its derivative by the measures at the end, added to (3, 3).
-        after: `slid` at the end, filled for this joint (p,) [m].
-
-    Returns:
-        The mean shear [N], and the energy that friction and the lag take [J].
-    """
-    friction, shears = faces.friction[joint], faces.shear
-    total = lost = 0.0
-    for point in range(faces.first[joint], faces.first[joint + 1]):
-        stiff = shears[point]
-        change = stiff * (ends[1, 1] - ends[0, 1])
-        first = stiff * (ends[0, 1] - slid[point])
-        limit = np.inf if friction == np.inf else friction * max(normals[point, 0], 0.0)
-        shear, unheld, by_change, by_limit, taken = _rubbed(first, change, late, limit)
-        total += shear
-        lost += taken / stiff
-        rate[1, 1] += stiff * by_change
-        after[point] = slid[point] + unheld / stiff
-        if by_limit != 0.0:
-            for k in range(3):
-                rate[1, k] += by_limit * friction * normals[point, 1 + k]
-    force[1] += total
-    return total, lost

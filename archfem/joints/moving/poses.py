@@ -7,7 +7,9 @@ in the frame that turns with it. A face with its middle at r from the centroid t
 
 Displacements, never positions: the difference of two large numbers would lose what stiff joints
 need. Over a step the discrete derivative takes the change of coordinates to that of the pose
-exactly, as in `frames`.
+exactly, as in `frames`. A block that has no frame, as a fill, moves its faces by shapes alone, to
+which the same formulas apply with θ = 0; and where nodes slide apart on a face it gets longer, by
+E ξ.
 """
 
 from typing import Any, NamedTuple
@@ -16,36 +18,84 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import small_turn
+from archfem.joints.moving.frames import sinc, sinc_rate
 
 
 class Sides(NamedTuple):
     """The two faces of all joints, of the lower and of the higher block.
 
     Attributes:
-        start: first coordinate of the block, -1 of one that does not move (j, 2).
-        size: number of its coordinates, 0 of one that does not move (j, 2).
+        index: coordinates that move the face; first those of the block's frame, x, y and θ, where
+            it has one (j, 2, s).
+        size: how many they are, 0 of a block that does not move (j, 2).
+        turns: whether the block has a frame that turns; else its face goes as its shapes alone have
+            it, by displacements that are small (j, 2).
         arm: from the centroid to the middle of the face (j, 2, 2) [m].
-        shapes: U and Θ, x, y and angle of the face per shape (j, 2, 3, s).
+        shapes: U and Θ, x, y and angle of the face per coordinate, 0 of the frame (j, 2, 3, s).
+        stretch: how much longer the face gets per coordinate (j, 2, s); without a last axis to
+            speak of, (j, 2, 0), where no face stretches.
         held: pose where the block does not move (j, 2, 3) [m, m, rad].
     """
 
-    start: Any
+    index: Any
     size: Any
+    turns: Any
     arm: Array
     shapes: Array
+    stretch: Array
     held: Array
+
+
+@numba.njit(cache=True)
+def _first(sides, joint, side):  # type: ignore
+    """The first of the coordinates that is not of the frame."""
+    return 3 if sides.turns[joint, side] else 0
+
+
+@numba.njit(cache=True)
+def _strained(sides, joint, side, q):  # type: ignore
+    """U ξ."""
+    x = y = 0.0
+    for k in range(_first(sides, joint, side), sides.size[joint, side]):
+        own = q[sides.index[joint, side, k]]
+        x += sides.shapes[joint, side, 0, k] * own
+        y += sides.shapes[joint, side, 1, k] * own
+    return x, y
 
 
 @numba.njit(cache=True)
 def _reach(sides, joint, side, q):  # type: ignore
     """R + U ξ."""
-    x, y = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
-    start = sides.start[joint, side] + 3
-    for k in range(sides.size[joint, side] - 3):
-        x += sides.shapes[joint, side, 0, k] * q[start + k]
-        y += sides.shapes[joint, side, 1, k] * q[start + k]
-    return x, y
+    x, y = _strained(sides, joint, side, q)
+    return sides.arm[joint, side, 0] + x, sides.arm[joint, side, 1] + y
+
+
+@numba.njit(cache=True)
+def _midway(sides, joint, side, before, after):  # type: ignore
+    """Half-way through a step: r + U ξ on the mean, half the turn, and cosine and sine there."""
+    turn = sides.index[joint, side, 2]
+    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
+    half = 0.5 * (after[turn] - before[turn])
+    middle = before[turn] + half
+    return (0.5 * (x0 + x1), 0.5 * (y0 + y1)), half, (np.cos(middle), np.sin(middle))
+
+
+@numba.njit(cache=True)
+def stretched(sides, joint, q):  # type: ignore
+    """Return by how much the higher face of a joint has become longer than the lower [m].
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        q: coordinates (n,).
+    """
+    total = 0.0
+    if sides.stretch.shape[2] == 0:
+        return total
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        for k in range(sides.size[joint, side]):
+            total += sign * sides.stretch[joint, side, k] * q[sides.index[joint, side, k]]
+    return total
 
 
 @numba.njit(cache=True)
@@ -59,92 +109,79 @@ def pose(sides, joint, side, q, found):  # type: ignore
         q: coordinates (n,).
         found: filled (3,) [m, m, rad].
     """
-    start = sides.start[joint, side]
-    if start < 0:
+    size, index = sides.size[joint, side], sides.index[joint, side]
+    if size == 0:
         found[:] = sides.held[joint, side]
         return
-    half = 0.5 * q[start + 2]
-    _place(sides, joint, side, q, (np.cos(half), np.sin(half)), found)
+    dx, dy = _strained(sides, joint, side, q)
+    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    if sides.turns[joint, side]:
+        turn = q[index[2]]
+        c, s = np.cos(turn), np.sin(turn)
+        less = -2.0 * np.sin(0.5 * turn) ** 2  # cos θ - 1
+        found[0] = q[index[0]] + less * rx - s * ry + c * dx - s * dy
+        found[1] = q[index[1]] + s * rx + less * ry + s * dx + c * dy
+        found[2] = turn
+    else:
+        found[0], found[1], found[2] = dx, dy, 0.0
+    for k in range(_first(sides, joint, side), size):
+        found[2] += sides.shapes[joint, side, 2, k] * q[index[k]]
 
 
 @numba.njit(cache=True)
-def swing(sides, joint, side, before, after, poses, rates):  # type: ignore
-    """Find the poses of a face at both ends of a step, and their derivatives.
+def pose_gradient(sides, joint, side, before, after, rates):  # type: ignore
+    """Find what takes the change of coordinates over a step to that of the pose of a face.
+
+    With both ends the same it is the derivative there.
 
     Args:
         sides: `Sides`.
         joint: its number.
-        side: 0 of the lower block, 1 of the higher, of one that moves.
+        side: 0 of the lower block, 1 of the higher.
         before: coordinates at the start (n,).
         after: coordinates at the end (n,).
-        poses: at the start and at the end, of both sides, filled for this one (2, 2, 3).
-        rates: what takes the change of coordinates over the step to that of the pose, and the
-            derivative at the end, filled for this side (2, 2, 3, s).
-
-    Returns:
-        What `swing_bend` needs to know of the step.
+        rates: filled in its first columns (3, s).
     """
-    start = sides.start[joint, side]
-    half = 0.5 * (after[start + 2] - before[start + 2])
-    mean, shrunk, falls = small_turn(half)
-    ch, sh = np.cos(0.5 * before[start + 2]), np.sin(0.5 * before[start + 2])
-    c, s, x0, y0 = _place(sides, joint, side, before, (ch, sh), poses[0, side])
-    ch, sh = ch * mean - sh * half * shrunk, sh * mean + ch * half * shrunk
-    c1, s1, x1, y1 = _place(sides, joint, side, after, (ch, sh), poses[1, side])
-    _turning(sides, joint, side, (c1, s1, 1.0, 1.0), (x1, y1), rates[1, side])
-    middle, reach = (c * mean - s * half * shrunk, s * mean + c * half * shrunk), (x0 + x1, y0 + y1)
-    reach = 0.5 * reach[0], 0.5 * reach[1]
-    _turning(sides, joint, side, (middle[0], middle[1], mean, shrunk), reach, rates[0, side])
-    return middle, reach, (mean, half * shrunk, shrunk, falls)
-
-
-@numba.njit(cache=True)
-def _place(sides, joint, side, q, half, found):  # type: ignore
-    """Find a pose from cosine and sine of half the turn; cosine, sine and reach are returned."""
-    start = sides.start[joint, side]
-    less, s = -2.0 * half[1] * half[1], 2.0 * half[1] * half[0]  # cos θ - 1, sin θ
-    c, (x, y) = 1.0 + less, _reach(sides, joint, side, q)
-    rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
-    dx, dy = x - rx, y - ry
-    found[0] = q[start] + less * rx - s * ry + c * dx - s * dy
-    found[1] = q[start + 1] + s * rx + less * ry + s * dx + c * dy
-    found[2] = q[start + 2]
-    for k in range(sides.size[joint, side] - 3):
-        found[2] += sides.shapes[joint, side, 2, k] * q[start + 3 + k]
-    return c, s, x, y
-
-
-@numba.njit(cache=True)
-def _turning(sides, joint, side, turn, reach, rates):  # type: ignore
-    """Write down a derivative of a pose by the turn and by the shapes."""
-    (c, s, mean, shrunk), (x, y) = turn, reach
+    size = sides.size[joint, side]
+    rates[:] = 0.0
+    if not sides.turns[joint, side]:
+        rates[:, :size] = sides.shapes[joint, side, :, :size]
+        return
+    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
+    shrunk, mean = sinc(half), np.cos(half)
+    rates[0, 0] = rates[1, 1] = rates[2, 2] = 1.0
     rates[0, 2], rates[1, 2] = -shrunk * (s * x + c * y), shrunk * (c * x - s * y)
-    for k in range(sides.size[joint, side] - 3):
+    for k in range(3, size):
         u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
-        rates[0, 3 + k], rates[1, 3 + k] = mean * (c * u - s * v), mean * (s * u + c * v)
-        rates[2, 3 + k] = sides.shapes[joint, side, 2, k]
+        rates[0, k], rates[1, k] = mean * (c * u - s * v), mean * (s * u + c * v)
+        rates[2, k] = sides.shapes[joint, side, 2, k]
 
 
 @numba.njit(cache=True)
-def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
-    """Add the derivative of generalised forces on a face by the coordinates at the end.
+def pose_bend(sides, joint, side, before, after, force, rates):  # type: ignore
+    """Find the derivative of generalised forces on a face by the coordinates at the end.
 
     Args:
         sides: `Sides`.
         joint: its number.
-        side: 0 of the lower block, 1 of the higher, of one that moves.
-        step: as `swing` returned it.
+        side: 0 of the lower block, 1 of the higher.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
         force: on the pose, which is held (3,) [N, N, N m].
-        rates: of all joints, added to (j, 2, s, 2, s).
+        rates: filled in its first rows and columns (s, s).
     """
-    (c, s), (x, y), (mean, sine, shrunk, falls) = step
-    fx, fy = force[0], force[1]
-    along = fx * (c * x - s * y) + fy * (s * x + c * y)  # F·R x
-    across = -fx * (s * x + c * y) + fy * (c * x - s * y)  # F·J R x
-    rates[joint, side, 2, side, 2] += 0.5 * (falls * across - shrunk * along)
-    for k in range(sides.size[joint, side] - 3):
+    size = sides.size[joint, side]
+    rates[:] = 0.0
+    if not sides.turns[joint, side]:
+        return
+    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
+    shrunk, mean = sinc(half), np.cos(half)
+    along = force[0] * (c * x - s * y) + force[1] * (s * x + c * y)  # F·R x
+    across = -force[0] * (s * x + c * y) + force[1] * (c * x - s * y)  # F·J R x
+    rates[2, 2] = 0.5 * (sinc_rate(half) * across - shrunk * along)
+    for k in range(3, size):
         u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
-        straight = fx * (c * u - s * v) + fy * (s * u + c * v)
-        turned = -fx * (s * u + c * v) + fy * (c * u - s * v)
-        rates[joint, side, 3 + k, side, 2] += 0.5 * (mean * turned - sine * straight)
-        rates[joint, side, 2, side, 3 + k] += 0.5 * shrunk * turned
+        straight = force[0] * (c * u - s * v) + force[1] * (s * u + c * v)
+        turned = -force[0] * (s * u + c * v) + force[1] * (c * u - s * v)
+        rates[k, 2] = 0.5 * (mean * turned - np.sin(half) * straight)
+        rates[2, k] = 0.5 * shrunk * turned
