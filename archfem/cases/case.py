@@ -201,16 +201,7 @@ class Case:
 
     @cached_property
     def discretisation(self) -> Discretisation:
-        """What the structure is modelled by; its mesh alone counts where "auto" is to choose.
-
-        Raises:
-            InvalidInput: "auto" is to choose among models whose displacements are large.
-        """
-        if self.chooses and self.model.get("displacements", "small") != "small":
-            raise InvalidInput(
-                "model.fidelity = 'auto' chooses among models of small displacements: with "
-                "displacements = 'large' name a rung, 'rigid' or 'faces'"
-            )
+        """What the structure is modelled by; its mesh does not count where "auto" is to choose."""
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
         return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
 

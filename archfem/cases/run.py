@@ -176,7 +176,8 @@ def _chosen(case: Case) -> Model:
         first = next(iter(case.suite["pairs"]))  # the others need not be matched for this
         motion = case.alone(first).ground_suite().motions[0]
     damping, dt = expected_damping(case), case.analysis.get("dt")
-    return choose(case.structure, case.tolerance, motion, damping, dt)
+    displacements = case.discretisation.displacements
+    return choose(case.structure, case.tolerance, motion, damping, dt, displacements=displacements)
 
 
 def expected_damping(case: Case) -> Damping:

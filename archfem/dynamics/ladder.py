@@ -7,6 +7,7 @@ refined.
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
@@ -81,7 +82,8 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         dt: for "auto", the time step of the run to come [s]. Without it steps choose their length,
             by a tolerance that is chosen too. Their error counts either way.
         displacements: "small", or "large" where blocks may turn and slide as far as they like,
-            and fall, on the rungs "rigid" and "faces".
+            and fall; not on the rung "monolithic". With "auto" the choice is made by small
+            displacements, and holds as long as blocks hold together.
 
     Raises:
         InvalidInput: an option is not one of those above.
@@ -90,12 +92,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
     if not 0.0 < tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
     if fidelity == "auto":
-        if displacements != "small":
-            raise InvalidInput(
-                f"fidelity 'auto' with displacements {displacements!r}: name a rung, 'rigid' or "
-                "'faces'"
-            )
-        return choose(structure, tolerance, motion, damping, dt)
+        return choose(structure, tolerance, motion, damping, dt, displacements=displacements)
     asked = Discretisation(fidelity, cells, cell, coarse, degree, quadrature, points, displacements)
     return plain.build(structure, asked)
 
@@ -107,6 +104,7 @@ def choose(
     damping: Damping = None,
     dt: float | None = None,
     *,
+    displacements: str = "small",
     builder: Builder = plain.build,
 ) -> Model:
     """Return the cheapest model, and its steps, whose predicted error is within a tolerance.
@@ -121,23 +119,29 @@ def choose(
         motion: to come; without it a synthetic one is used that brings |e| to 0.4.
         damping: of the run to come, or a function that finds it of the finest model.
         dt: time step of the run to come [s]; without it steps choose their length.
+        displacements: "small" or "large", of the model that is returned.
         builder: makes the models.
 
     Raises:
+        InvalidInput: displacements are neither.
         DidNotConverge: the finest model failed.
     """
+    Discretisation(displacements=displacements)  # refuses what is neither small nor large
     first = builder(structure, best(structure, LEVELS[0]))
     yardstick = _yardstick(first, motion, damping)
     steps, in_time, considered = _steps(yardstick, tolerance, dt)
     allowed, found = max(tolerance - in_time, tolerance / 2.0), []
     for asked, model, in_model in _climbed(structure, yardstick, steps, builder):
-        found.append((in_model, model))
+        found.append((in_model, asked, model))
         considered.append((label(asked), in_model + in_time))
         if in_model <= allowed:
             break
-    in_model, model = min(found, key=lambda each: (each[0] > allowed, each[0]))
+    in_model, asked, model = min(found, key=lambda each: (each[0] > allowed, each[0]))
     error = in_model + in_time
-    small = error_of_small(yardstick, steps)
+    if displacements == "large":
+        small, model = 0.0, builder(structure, replace(asked, displacements=displacements))
+    else:
+        small = error_of_small(yardstick, steps)
     told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered), small)
     if not told.met:
         logger.warning("%s", _unmet(told, in_model <= allowed))
@@ -200,7 +204,7 @@ def _far(error: float, tolerance: float) -> str:
     found = f"errs by {error:.2g} in |e|" if error < 1.0 else "lets stand what falls"
     return (
         f"to take displacements as small {found}, and {tolerance:g} was asked for: joints turn "
-        "and slide too far; build(…, fidelity='rigid' or 'faces', displacements='large') follows "
+        "and slide too far; build(…, displacements='large') follows "
         "them"
     )
 

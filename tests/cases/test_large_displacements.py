@@ -41,7 +41,6 @@ def test_displacements_reach_the_model(path):
     ("change", "says"),
     [
         ("model.fidelity=monolithic", "the rung 'monolithic' does not know: use 'full'"),
-        ("model.fidelity=auto", "'auto' chooses among models of small displacements: .*'faces'"),
         ("model.displacements=far", "displacements 'far' are not known"),
         ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),
         ("dead_load.stages=usual", r"'large' and \[dead_load\] in stages: .* leave out one"),

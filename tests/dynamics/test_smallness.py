@@ -12,6 +12,7 @@ from archfem.dynamics.probe import peaks, usual_damping
 from archfem.dynamics.smallness import PER_TURN, QUIET, error_of_small
 from archfem.dynamics.yardstick import SAFETY, Steps, Yardstick
 from archfem.models.build import build as plain
+from archfem.models.moving import Moving
 
 STEPS = Steps(0.0025, None)
 COLUMN = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0])
@@ -21,6 +22,11 @@ def yardstick(structure, pga, fidelity="rigid", seconds=3.0):
     model = af.build(structure, fidelity=fidelity)
     motion = af.Motion.synthetic(duration=seconds, pga=pga, seed=3)
     return Yardstick(model, motion, usual_damping(model))
+
+
+def quick(structure, asked):
+    """As many models as are asked for, all of rigid stones."""
+    return plain(structure, replace(asked, fidelity="rigid"))
 
 
 def test_where_joints_hardly_turn_nothing_is_measured():
@@ -66,10 +72,6 @@ def test_with_soil_it_is_estimated_from_the_turn():
 
 def test_a_choice_warns_of_what_it_cannot_mend(caplog):
     """The rigid column turns at its foot: no finer mesh makes small displacements right."""
-
-    def quick(structure, asked):
-        return plain(structure, replace(asked, fidelity="rigid"))
-
     motion = af.Motion.synthetic(duration=3.0, pga=2.6, seed=3)
     with caplog.at_level(logging.WARNING, "archfem"):
         model = choose(COLUMN, 0.004, motion, dt=0.005, builder=quick)
@@ -77,6 +79,17 @@ def test_a_choice_warns_of_what_it_cannot_mend(caplog):
     assert "because displacements are taken as small" in model.prediction.text
     assert "to take displacements as small" in caplog.text
     assert "displacements='large'" in caplog.text
+
+
+def test_a_choice_may_be_of_large_displacements():
+    """The rung that small ones ask for; nothing is left to doubt about their size."""
+    motion = af.Motion.synthetic(duration=1.0, pga=0.8, seed=3)
+    model = choose(COLUMN, 0.05, motion, dt=0.005, displacements="large", builder=quick)
+    assert isinstance(model, Moving)
+    assert model.prediction.of_small == 0.0
+    assert model.prediction.met
+    with pytest.raises(af.InvalidInput, match="displacements 'huge' are not known"):
+        choose(COLUMN, 0.05, motion, dt=0.005, displacements="huge", builder=quick)
 
 
 def test_a_run_whose_joints_turn_is_doubted(caplog):
