@@ -3,8 +3,9 @@
 "1.48 MPa/mm" is 1.48e9 Pa/m.
 """
 
+import re
 from functools import cache
-from math import isfinite
+from math import isfinite, tan
 from typing import Any
 
 from archfem.errors import InvalidInput
@@ -22,6 +23,13 @@ STANDARD_GRAVITY = 9.80665
 """The g in which accelerograms are recorded and spectra are given [m/s²]."""
 
 
+ACCELERATION = "m/s**2"
+"""Where it is wanted, g is gravity and gal is Galileo's unit, not gram and gallon."""
+
+ANGLES = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
+"""Units that pass for pure numbers and are none."""
+
+
 @cache
 def _registry() -> Any:
     import pint  # slow to import, and only case files need it
@@ -33,12 +41,14 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     """Return a number, or a number with a unit, as a number in the given unit.
 
     Args:
-        value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already.
+        value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already. For an
+            acceleration "0.3 g" is 0.3 times standard gravity.
         unit: the unit wanted, "1" for a pure number.
         key: what to call the value in an error.
 
     Raises:
-        InvalidInput: it is no number, not finite, or of another dimension.
+        InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
+            number is wanted.
     """
     if isinstance(value, str):
         number = _converted(value, unit, key)
@@ -56,9 +66,19 @@ def _converted(text: str, unit: str, key: str) -> float:
 
     registry = _registry()
     wanted = "dimensionless" if unit == "1" else unit
+    if unit == ACCELERATION:
+        text = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", text))
     try:
         quantity = registry.Quantity(text)
+        if unit == "1" and ANGLES & {name for name, _ in quantity.unit_items()}:
+            angle = float(quantity.to("radian").magnitude)
+            raise InvalidInput(
+                f"{key} = {text!r} is an angle, and a pure number is wanted: a coefficient of "
+                f"friction is the tangent of its angle, {tan(angle):.3f}"
+            )
         return float(quantity.to(wanted).magnitude)
+    except InvalidInput:
+        raise
     except pint.DimensionalityError as error:
         raise InvalidInput(f"{key} = {text!r} is not in a unit like {wanted}: {error}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:

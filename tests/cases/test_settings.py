@@ -14,6 +14,23 @@ def test_quantities():
 
 
 @pytest.mark.parametrize(
+    ("text", "value"),
+    [("0.3 g", 2.941995), ("0.3 g_0", 2.941995), ("300 gal", 3.0), ("300 cm/s^2", 3.0)],
+)
+def test_of_an_acceleration_g_is_gravity_and_gal_no_gallon(text, value):
+    assert af.units.in_unit(text, "m/s**2", "pga") == pytest.approx(value, rel=1e-9)
+    with pytest.raises(af.InvalidInput, match="not in a unit like m"):
+        af.units.in_unit("0.3 g", "m", "width")
+
+
+@pytest.mark.parametrize(("text", "tangent"), [("35 deg", "0.700"), ("0.6109 rad", "0.700")])
+def test_an_angle_is_no_pure_number(text, tangent):
+    with pytest.raises(af.InvalidInput, match=f"is an angle.*{tangent}"):
+        af.units.in_unit(text, "1", "friction")
+    assert af.units.in_unit("5 percent", "1", "ratio") == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
     ("value", "says"),
     [
         ("2 kg", "not in a unit like m"),
