@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from archfem.errors import InvalidInput
 from archfem.files import in_one_stroke
@@ -102,6 +103,8 @@ def save(figure: Figure, path: str | Path) -> Path:
     kind = target.suffix.removeprefix(".").lower()
     if kind not in kinds:
         raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
+    for text in figure.findobj(Text):  # names and titles are words, though they hold a $
+        text.set_parse_math(False)
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
     with in_one_stroke(target) as draft, matplotlib.rc_context(fonts):
         figure.savefig(draft, format=kind, dpi=300)

@@ -3,7 +3,7 @@
 import pytest
 
 import archfem as af
-from archfem.view.style import save
+from archfem.view.style import canvas, save
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -17,3 +17,9 @@ def test_an_unknown_suffix_is_refused(ring, tmp_path):
     with pytest.raises(af.InvalidInput, match=r"suffix '\.xyz': use one of .*'png'"):
         save(af.view.draw_structure(ring), tmp_path / "ring.xyz")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_title_is_words_and_no_formula(tmp_path):
+    figure = canvas(af.column(breadth=1.0, heights=[1.0]))
+    figure.subplots().set_title("$$ a bridge worth $5 {")
+    assert save(figure, tmp_path / "dear.png").stat().st_size > 1000
