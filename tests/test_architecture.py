@@ -15,6 +15,7 @@ import archfem
 ROOT = Path(archfem.__file__).parent
 GROUND = {"errors", "arguments", "arrays", "units", "files", "tables", "_petsc"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
+ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}
 BARRED = {"motion": {"masonry"}, "masonry": {"motion"}, "joints": {"motion"}, "limit": {"motion"}}
 """What stands to the left and is left alone: `motion` has nothing to do with stones."""
@@ -33,9 +34,10 @@ ONLY_IN = {
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",
-    "tomllib": "cases",
+    "tomllib": ("cases", "studies"),
     "tomli_w": "cases",
-    "argparse": "cases",
+    "argparse": "commands",
+    "distributed": "studies.cluster",
 }
 """Where a package may be imported: in this room, or module, or these, and what lies in them."""
 
@@ -177,6 +179,7 @@ PROMISED = [
     "archfem.analysis.at_rest",
     "archfem.analysis.damping_of",
     "archfem.capacity.minimum_thickness",
+    "archfem.cases.cli.main",
     "archfem.criteria.judged",
     "archfem.events.MovingMechanism",
     "archfem.freebody.forces_on",

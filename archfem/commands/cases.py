@@ -78,27 +78,6 @@ def accuracy(given: argparse.Namespace) -> None:
     _tell_written(write_accuracy(found, text, Path(given.out)))
 
 
-def study(given: argparse.Namespace) -> None:
-    """Carry out a study: its tables, and a picture of the factors at first mechanism.
-
-    Args:
-        given: `case`, the file of a study, `changes` to its cases, and the folder `out`.
-    """
-    from archfem.cases.findings import study_table
-    from archfem.cases.report import write_study
-    from archfem.cases.study import Study, compared
-
-    asked, folder = Study.read(given.case, given.changes), Path(given.out)
-    print(asked.title)
-    found = {}
-    for name, finding in compared(asked, folder):
-        found[name] = finding
-        print(f"{name}: {len(finding.runs)} pairs")
-    text = study_table(found)
-    print(text)
-    _tell_written(write_study(asked, found, text, folder))
-
-
 def mesh(given: argparse.Namespace) -> None:
     """Write the mesh of a case as a gmsh file.
 

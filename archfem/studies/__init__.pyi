@@ -1,0 +1,13 @@
+from .comparison import Comparison as Comparison
+from .finders import of_history as of_history
+from .finders import run_of as run_of
+from .findings import Finding as Finding
+from .findings import study_table as study_table
+from .memory import ground_motion as ground_motion
+from .memory import resting as resting
+from .over import axes_over as axes_over
+from .progress import Status as Status
+from .progress import status as status
+from .slurm import slurm_job as slurm_job
+from .study import Study as Study
+from .table import read_table as read_table
