@@ -20,6 +20,7 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.points import content_digest
+from archfem.studies.warm import warm
 
 Made = TypeVar("Made")
 
@@ -31,7 +32,7 @@ GROUND = ("motion", "suite")
 ANALYSIS = ("analysis", "criteria")
 
 METHODS = ("compliance", "turning", "contact", "snes")
-"""Ways to step, of which the first that applies is taken: timing would not choose the same twice."""
+"""Ways to step, of which the first that applies is taken: a choice by timing may differ."""
 
 _kept: dict[str, OrderedDict[str, Any]] = {}
 
@@ -45,6 +46,7 @@ def resting(case: Case) -> Rest:
     Raises:
         DidNotConverge: the structure does not stand.
     """
+    warm()
     sections = (*MODEL, *GROUND, *ANALYSIS) if case.chooses else MODEL
     key = _key(case, sections)
     dead: Equilibrium = _remembered("models", key, lambda: at_rest(case), MODELS)

@@ -56,12 +56,10 @@ def on_processes(
     tasks = deque((number, _pickled(point, asked)) for number, point in points)
     died: Counter[int] = Counter()
     with Path(os.devnull if log is None else log).open("a") as words:
-        staff = [_Worker(words) for _ in range(min(workers, len(tasks)))]
+        staff: list[_Worker] = []
         try:
             while tasks or any(worker.task for worker in staff):
-                for worker in staff:
-                    if worker.task is None and tasks:
-                        worker.begin(tasks.popleft())
+                _hand_out(tasks, staff, workers, words)
                 busy = {worker.pipe: worker for worker in staff if worker.task is not None}
                 for pipe in wait(list(busy)):
                     worker = busy[pipe]  # type: ignore[index]
@@ -69,7 +67,7 @@ def on_processes(
                     if done is not None:
                         yield done
                         continue
-                    staff[staff.index(worker)] = _Worker(words)
+                    staff.remove(worker)
                     assert task is not None
                     died[task[0]] += 1
                     if died[task[0]] < ATTEMPTS:
@@ -79,6 +77,18 @@ def on_processes(
         finally:
             for worker in staff:
                 worker.end()
+
+
+def _hand_out(
+    tasks: "deque[tuple[int, bytes]]", staff: "list[_Worker]", most: int, words: Any
+) -> None:
+    """Give a task to each process that has none, and to new ones where there may be more."""
+    idle = [worker for worker in staff if worker.task is None]
+    while tasks and (idle or len(staff) < most):
+        if not idle:
+            idle.append(_Worker(words))
+            staff.append(idle[0])
+        idle.pop().begin(tasks.popleft())
 
 
 class _Worker:

@@ -44,9 +44,9 @@ def slurm_job(
 ) -> Path:
     """Write a file for `sbatch` that carries out a study on many cores of a cluster.
 
-    The folder must be one that the node of the driver sees; workers need none of it, but the
-    records and drawings that cases name, under the same paths. With dask-jobqueue a driver that lives as
-    long as the study does the same without a file: `cluster = SLURMCluster(cores=1, processes=1,
+    The node of the driver must see the folder; workers need the records and drawings that cases
+    name, under the same paths. With dask-jobqueue a driver that lives as long as the study does the
+    same without a file: `cluster = SLURMCluster(cores=1, processes=1,
     memory="2GB"); cluster.scale(200); study.run(folder, client=Client(cluster))`.
 
     Args:

@@ -1,19 +1,11 @@
 """What a worker does: one point at a time, on one thread, and a row even where it fails."""
 
 import contextlib
-import fcntl
-import hashlib
-import json
 import logging
-import os
 import pickle
-import tempfile
 import threading
-import tomllib
-from collections.abc import Iterator, Sequence
-from functools import cache
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -31,23 +23,6 @@ THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")
 
 SINGLE = {f"{name}_NUM_THREADS": "1" for name in THREADS}
 """Environment of a worker."""
-
-WARM = """
-title = "what compiled code is warmed on"
-[structure]
-shape = "circular_arch"
-radius = 3.0
-thickness = 0.5
-embrace = 150.0
-voussoirs = 3
-[model]
-fidelity = "rigid"
-[analysis]
-dt = 0.005
-damping = { ratio = 0.05, frequency = 8.0 }
-[motion]
-synthetic = { seed = 1, duration = 0.1, pga = 1.0 }
-"""
 
 _one_at_a_time = threading.Lock()
 
@@ -95,7 +70,6 @@ def answers(
     if own != version:
         return own, []
     with _one_at_a_time, threadpool_limits(limits=1):
-        warmed()
         return own, [(number, answer(point, asked)) for number, point in points]
 
 
@@ -107,7 +81,6 @@ def serve(handle: int) -> None:
     """
     logging.getLogger("archfem").setLevel(logging.ERROR)  # what is said of one run of thousands
     with Connection(handle) as pipe, contextlib.suppress(EOFError, OSError), threadpool_limits(1):
-        warmed()
         while True:
             number, task = pipe.recv()
             try:
@@ -116,35 +89,3 @@ def serve(handle: int) -> None:
                 pipe.send((number, row({}, f"{type(error).__name__}: {error}", ours=False)))
                 continue
             pipe.send((number, answer(point, asked)))
-
-
-@cache
-def warmed() -> None:
-    """Load compiled code once a process, and compile it once a machine, not once a worker."""
-    settings = tomllib.loads(WARM)
-    with _alone():
-        answer(Point(settings, Path()), Asked.of("history"))
-
-
-@contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """Let one process go first, unless one has before since the sources were last changed."""
-    done = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{_sources()}.warm"
-    if done.exists():
-        yield
-        return
-    with done.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-        done.touch()
-
-
-def _sources() -> str:
-    """What tells this state of the compiled modules from any other."""
-    rooms = Path(__file__).parents[1]
-    times = [
-        (str(path), path.stat().st_mtime_ns)
-        for room in ("dynamics", "joints")
-        for path in sorted((rooms / room).rglob("*.py"))
-    ]
-    return hashlib.sha256(json.dumps(times).encode()).hexdigest()[:16]

@@ -30,12 +30,12 @@ def slowly(case, seconds=0.2):
     return lengths(case)
 
 
-def deadly(case, folder=""):
-    """Ends its own process: always where there is no folder, else the first time."""
-    mark = Path(folder) / f"{case.settings['structure']['thickness']}"
-    if not folder or not mark.exists():
-        if folder:
-            mark.touch()
+def deadly(case, folder):
+    """Ends its own process: a thin ring the first time, a thick one always."""
+    mark = Path(folder) / "seen"
+    thin = case.settings["structure"]["thickness"] < 0.55
+    if not (thin and mark.exists()):
+        mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return lengths(case)
 '''
