@@ -1,10 +1,11 @@
 """Points on a cluster, by Dask distributed: all that knows it."""
 
-import asyncio
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from typing import Any
 
-from distributed import Client, CommClosedError, KilledWorker, as_completed
+from distributed import Client, KilledWorker, as_completed
+from distributed.comm import CommClosedError
 
 from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.asking import Asked
@@ -20,7 +21,7 @@ SHARE = 40
 LARGEST = 200
 """Most points of one task."""
 
-LOST = (CommClosedError, OSError, TimeoutError, asyncio.CancelledError)
+LOST = (CommClosedError, OSError, TimeoutError, CancelledError)
 
 
 def on_cluster(
