@@ -58,6 +58,7 @@ from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
+from .studies.ida import ida as ida
 from .studies.study import Study as Study
 
 __version__: str

@@ -17,6 +17,9 @@
     comparison  several cases side by side
     findings    what was found of one of them, and tables of all
     compared    cases side by side, carried out
+    intensity   measures of a motion as it is scaled
+    ida         incremental dynamic analysis
+    fragility   the probability of a limit state over intensity
     slurm       the file of a job for SLURM
 
 It imports from all rooms to its left. Start reading at `study`, then at `worker`.

@@ -3,6 +3,9 @@ from .finders import of_history as of_history
 from .finders import run_of as run_of
 from .findings import Finding as Finding
 from .findings import study_table as study_table
+from .fragility import Fragility as Fragility
+from .fragility import stripe_fragility as stripe_fragility
+from .ida import Ida as Ida
 from .memory import ground_motion as ground_motion
 from .memory import resting as resting
 from .over import axes_over as axes_over

@@ -79,7 +79,8 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
             process.wait()
             process = driver(folder, out)
     if process.returncode:
-        raise SystemExit(f"the study ended with {process.returncode}: see {folder}/log.txt")
+        log = (folder / "log.txt").read_text()[-3000:]
+        raise SystemExit(f"{log}\nthe study ended with {process.returncode}")
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Fragility curves recover the lognormal that samples were drawn from, and say how sure they are."""
+"""Fragility curves recover the lognormal that samples are drawn from, and say how sure they are."""
 
 import numpy as np
 import pytest
