@@ -58,7 +58,9 @@ from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
+from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida
+from .studies.stiffness import joint_stiffness as joint_stiffness
 from .studies.study import Study as Study
 
 __version__: str

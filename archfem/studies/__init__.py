@@ -20,6 +20,8 @@
     intensity   measures of a motion as it is scaled
     ida         incremental dynamic analysis
     fragility   the probability of a limit state over intensity
+    convergence what findings hang on besides the structure: mesh, step, quadrature, rung
+    stiffness   of dry joints, and what hangs on it
     slurm       the file of a job for SLURM
 
 It imports from all rooms to its left. Start reading at `study`, then at `worker`.

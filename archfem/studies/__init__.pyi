@@ -1,4 +1,7 @@
 from .comparison import Comparison as Comparison
+from .convergence import Convergence as Convergence
+from .convergence import MeshSensitivity as MeshSensitivity
+from .convergence import converged as converged
 from .finders import of_history as of_history
 from .finders import run_of as run_of
 from .findings import Finding as Finding
@@ -12,5 +15,7 @@ from .over import axes_over as axes_over
 from .progress import Status as Status
 from .progress import status as status
 from .slurm import slurm_job as slurm_job
+from .stiffness import JointStiffness as JointStiffness
+from .stiffness import stiffness_report as stiffness_report
 from .study import Study as Study
 from .table import read_table as read_table

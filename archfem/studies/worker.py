@@ -21,7 +21,10 @@ such an error is told of the case itself, so that it would be the same again."""
 THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")
 """Libraries that are told by NAME_NUM_THREADS how many threads to use."""
 
-SINGLE = {f"{name}_NUM_THREADS": "1" for name in THREADS}
+SINGLE = {
+    **{f"{name}_NUM_THREADS": "1" for name in THREADS},
+    "OMPI_MCA_ess_singleton_isolated": "1",  # no daemon of Open MPI beside each worker
+}
 """Environment of a worker."""
 
 _one_at_a_time = threading.Lock()

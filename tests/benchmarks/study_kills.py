@@ -51,7 +51,15 @@ def workers(process: "subprocess.Popen[bytes]") -> list[int]:
         text = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
     except OSError:
         return []
-    return [int(word) for word in text.split()]
+    commands = {int(word): Path(f"/proc/{word}/cmdline") for word in text.split()}
+    return [pid for pid, command in commands.items() if b"studies.worker" in _read(command)]
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
 
 
 def rows(out: Path) -> int:

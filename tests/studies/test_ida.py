@@ -10,21 +10,21 @@ from archfem.studies.intensity import intensities
 
 
 def made(count):
-    motion = {"duration": 0.5, "pga": 3.0}
+    motion = {"duration": 0.6, "pga": 9.0}
     return [{"synthetic": {"seed": seed, **motion}} for seed in range(1, count + 1)]
 
 
 @pytest.fixture(scope="module")
 def small_ida(tmp_path_factory):
-    """Two motions on a rigid ring of nine stones."""
+    """Two motions on a rigid ring of seven stones."""
     case = af.Case.of(
         {
             "structure": {
                 "shape": "circular_arch",
                 "radius": 3.0,
-                "thickness": 0.5,
+                "thickness": 0.35,
                 "embrace": 150.0,
-                "voussoirs": 9,
+                "voussoirs": 7,
             },
             "model": {"fidelity": "rigid"},
             "analysis": {"dt": 0.01, "damping": {"ratio": 0.05, "frequency": 8.0}},
@@ -34,14 +34,14 @@ def small_ida(tmp_path_factory):
     return (
         case,
         folder,
-        af.ida(case, made(2), precision=0.2, between=(0.5, 4.0), folder=folder, workers=1),
+        af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1),
     )
 
 
 def test_brackets_hold_what_runs_at_their_ends_do(small_ida):
     case, _, found = small_ida
     assert found.limits == ("first hinge", "four failures", "verified")
-    motion = af.Motion.synthetic(seed=2, duration=0.5, pga=3.0)
+    motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
     dead = af.cases.at_rest(case)
     for limit, key in (("four failures", "any four joints"), ("verified", "verified")):
         for end, met in ((f"{limit}, survives", False), (limit, True)):
@@ -56,7 +56,7 @@ def test_brackets_hold_what_runs_at_their_ends_do(small_ida):
 
 def test_measures_grow_with_the_scale_as_they_do(small_ida):
     _, _, found = small_ida
-    motion = af.Motion.synthetic(seed=1, duration=0.5, pga=3.0)
+    motion = af.Motion.synthetic(seed=1, duration=0.6, pga=9.0)
     scale = float(found.table["verified"][0])
     period = float(found.table["period"][0])
     for measure, value in intensities(motion.scaled(scale), period).items():
@@ -72,7 +72,7 @@ def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
         raise AssertionError("searched again")
 
     monkeypatch.setattr("archfem.studies.study.serially", never)
-    again = af.ida(case, made(2), precision=0.2, between=(0.5, 4.0), folder=folder, workers=1)
+    again = af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1)
     assert again.table.identical(found.table)
 
 
@@ -99,12 +99,15 @@ def test_fractiles_are_those_of_curves_drawn_by_hand():
     assert (low.tolist(), high.tolist()) == ([1.0, 1.0, 4.0], [2.0, 2.0, np.inf])
 
 
-def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small):
-    found = ida(
-        af.Case.read(small), precision=0.5, between=(1.0, 4.0), limits=["first hinge"], workers=1
-    )
-    assert found.table["motion"].values.tolist() == ["first", "second"]
-    assert found.limits == ("first hinge",)
+def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small_ida):
+    case, _, found = small_ida
+    pairs = {"first": made(1)[0], "second": made(2)[1]}
+    suite = af.Case.of({**case.settings, "suite": {"reduction": 2.0, "pairs": pairs}})
+    few = {"precision": 0.5, "between": (2.0, 2.0), "limits": ["first hinge"], "workers": 1}
+    halved = ida(suite, **few)
+    assert halved.table["motion"].values.tolist() == ["first", "second"]
+    assert halved.limits == ("first hinge",)
+    assert halved.table["pga"].values == pytest.approx(0.5 * found.table["pga"].values)
 
 
 def test_analyses_that_cannot_be_meant(small_ring):
