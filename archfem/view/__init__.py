@@ -20,7 +20,7 @@
     studies    factors at first mechanism, case by case
     films      films and stills: all that knows pyvista and imageio
 
-It imports from all rooms but `cases`. Start reading at `structure`, with `style` beside it.
+It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
 """
 
 import lazy_loader
