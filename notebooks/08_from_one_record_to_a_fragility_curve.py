@@ -80,8 +80,8 @@ ida.table[["pga", "first hinge", "four failures", "verified"]].to_dataframe()
 # luckier moment. Triangles are motions that did not meet a limit state as far as they were scaled.
 
 # %%
-intensity = np.linspace(0.5, 25.0, 60)
 capacities = {limit: ida.capacities(limit) for limit in ida.limits}
+intensity = np.linspace(0.1, 1.5 * capacities["four failures"][1].max(), 60)
 af.view.draw_ida(ida.curves(), capacities, fractiles=(intensity, ida.fractiles(intensity)))
 
 # %% [markdown]

@@ -18,6 +18,7 @@
     findings    what was found of one of them, and tables of all
     compared    cases side by side, carried out
     intensity   measures of a motion as it is scaled
+    hunt        scales of one motion at which limit states are met
     ida         incremental dynamic analysis
     fragility   the probability of a limit state over intensity
     convergence what findings hang on besides the structure: mesh, step, quadrature, rung

@@ -160,7 +160,7 @@ def beside(case: Case, scales: Mapping[str, Any] | None = None) -> Found:
         run = run_of(rest, motion)
     except DidNotConverge as error:
         run = history_of(error)
-    found |= _of_run(run)
+    found |= of_run(run)
     if scales is not None:
         suite = ground_suite(case)
         factors = of_scales(rest, suite.pairs[0].scaled(suite.scale), **scales)
@@ -170,8 +170,15 @@ def beside(case: Case, scales: Mapping[str, Any] | None = None) -> Found:
     return found
 
 
-def _of_run(run: History) -> Found:
-    """What is kept of a run, which may have broken off."""
+def of_run(run: History) -> Found:
+    """Return what is kept of a run, which may have broken off.
+
+    Args:
+        run: what happened.
+
+    Returns:
+        As `beside` does.
+    """
     joints, met = judged(run.joints), first_mechanisms(run)
     return {
         **_each("eccentricity", by_part(abs(joints["eccentricity"]).max("time").fillna(0.5))),

@@ -133,9 +133,10 @@ def fragility(
     means, deviations = _censored(ends[:, drawn])
     median, dispersion = float(np.exp(mean[0])), float(deviation[0])
     misfit = float(_distance(ends[:, None, :], mean, deviation)[0])
-    made = chance.normal(mean[0], deviation[0], size=drawn.shape)
-    refit = made.mean(axis=1), np.maximum(made.std(axis=1), NARROWEST)
-    goodness = float((_distance(np.array([made, made]), *refit) >= misfit).mean())
+    made = _bracketed(chance.normal(mean[0], deviation[0], size=drawn.shape), ends)
+    middle = made.mean(axis=0)
+    refit = middle.mean(axis=1), np.maximum(middle.std(axis=1), NARROWEST)
+    goodness = float((_distance(made, *refit) >= misfit).mean())
     resampled = np.column_stack([np.exp(means), deviations])
     return Fragility(median, dispersion, goodness, misfit, resampled)
 
@@ -224,6 +225,16 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
     first = np.where(exact, low, mean + deviation * shift)
     second = mean**2 + 2.0 * mean * deviation * shift + deviation**2 * square
     return first, np.where(exact, np.where(exact, low, 0.0) ** 2, second)
+
+
+def _bracketed(samples: Array, ends: Array) -> Array:
+    """Ends of brackets about samples, as wide as those that are known."""
+    known = np.isfinite(ends).all(axis=0)
+    width = float(np.median((ends[1] - ends[0])[known])) if known.any() else 0.0
+    if width < 1e-9:
+        return np.array([samples, samples])
+    low = np.floor(samples / width) * width
+    return np.array([low, low + width])
 
 
 def _between(a: Array, b: Array) -> Array:

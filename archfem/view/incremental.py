@@ -63,8 +63,8 @@ def draw_ida(
         right.vlines(spread[met], low[met], high[met], color=colour, lw=2.0)
         right.plot(spread[~met], low[~met], "^", color=colour, ms=4)
         if met.sum() > len(met) / 2:
-            right.hlines(np.quantile(high, 0.5, method="nearest"), place - 0.35, place + 0.35,
-                         color=EDGE, lw=1.2)  # fmt: skip
+            middle = float(np.quantile(np.sqrt(low * high), 0.5, method="nearest"))
+            right.hlines(middle, place - 0.35, place + 0.35, color=EDGE, lw=1.2)
     right.set_xticks(range(len(capacities)), list(capacities), rotation=25, ha="right")
     right.set_xlim(-0.6, len(capacities) - 0.4)
     right.grid(axis="y", color=GHOST, lw=0.5)

@@ -3,8 +3,8 @@
 import pytest
 
 import archfem as af
-from archfem.cases.commands import run as run_command
 from archfem.cases.summary import pair_table
+from archfem.commands.cases import run as run_command
 
 CASE = """
 title = "a column that falls"
