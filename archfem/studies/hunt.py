@@ -1,4 +1,4 @@
-"""Hunt and fill: the scales of one motion at which a case meets limit states, and what runs came to.
+"""Hunt and fill: scales of one motion at which a case meets limit states, and what runs came to.
 
 References:
     Vamvatsikos and Cornell, Earthq. Spectra 20 (2004) 523-553.

@@ -35,10 +35,10 @@ def table(axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, An
     found = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
-            found.coords[_safe(key)] = _safe(axis.name), _column([row[k] for row in axis.rows])
+            found.coords[_place(key)] = _place(axis.name), _column([row[k] for row in axis.rows])
         if axis.name not in axis.keys:
             found.coords[axis.name] = axis.name, np.arange(len(axis.rows))
-    dims, sizes = tuple(_safe(name) for name in shape), tuple(shape.values())
+    dims, sizes = tuple(_place(name) for name in shape), tuple(shape.values())
     for name in dict.fromkeys(name for row in rows for name in row["found"]):
         values = [row["found"].get(name) for row in rows]
         key = _safe(name) if _safe(name) not in found.coords else f"{_safe(name)} found"
@@ -108,6 +108,11 @@ def _padded(values: Sequence[Any], rows: Sequence[Row]) -> Any:
         if isinstance(value, list):
             padded[k, : len(value)] = value
     return padded
+
+
+def _place(name: str) -> str:
+    """A key as the name of a coordinate, in which NetCDF has no spaces."""
+    return _safe(name).replace(" ", "_")
 
 
 def _safe(name: str) -> str:

@@ -27,9 +27,10 @@ def draw_tornado(
     axes = figure.add_subplot()
     dress(axes, quantity)
     for row, name in enumerate(order):
-        for value, colour, words in zip(ranges[name], LINES, ("low", "high"), strict=False):
-            axes.barh(row, value - usual, left=usual, height=0.62, color=colour, alpha=0.85,
-                      label=None if row else words)  # fmt: skip
+        ends = zip(ranges[name], LINES, ("low", "high"), strict=False)
+        for value, colour, words in sorted(ends, key=lambda end: -abs(end[0] - usual)):
+            label = None if row else words  # where both ends lie on one side, the nearer is on top
+            axes.barh(row, value - usual, left=usual, height=0.62, color=colour, label=label)
     axes.axvline(usual, color=EDGE, lw=1.0)
     axes.set_yticks(range(len(order)), order)
     axes.margins(x=0.08)

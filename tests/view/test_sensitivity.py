@@ -12,6 +12,8 @@ def test_what_matters_most_is_at_the_top():
     assert [text.get_text() for text in axes.get_yticklabels()] == ["damping", "k_n", "k_s"]
     widths = [patch.get_width() for patch in axes.patches[-2:]]
     assert widths == pytest.approx([-0.5, 0.2])
+    one_side = draw_tornado({"k_s": (1.1, 1.4)}, 1.0).axes[0].patches
+    assert [patch.get_width() for patch in one_side] == pytest.approx([0.4, 0.1])
 
 
 def test_the_limit_is_at_size_zero():
