@@ -1,6 +1,7 @@
 """The command for studies: carries one out, or says how far it has come."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from archfem.errors import InvalidInput
@@ -24,6 +25,7 @@ def study(given: argparse.Namespace) -> None:
         raise InvalidInput("a study needs a file and a folder: archfem study STUDY.toml --out DIR")
     from archfem.studies.files import study_tables
 
+    sys.path.insert(0, str(Path(given.case).resolve().parent))  # find = "module:function" beside it
     if "cases" in study_tables(Path(given.case)):
         _compare(given, Path(given.out))
     else:

@@ -47,8 +47,7 @@ def resting(case: Case) -> Rest:
         DidNotConverge: the structure does not stand.
     """
     warm()
-    sections = (*MODEL, *GROUND, *ANALYSIS) if case.chooses else MODEL
-    key = _key(case, sections)
+    key = _model_key(case)
     dead: Equilibrium = _remembered("models", key, lambda: at_rest(case), MODELS)
     rest = Rest(case, dead)
     damped = f"{key} {case.analysis.get('damping')!r}"
@@ -98,7 +97,7 @@ def method_for(rest: Rest, motion: Motion) -> str:
         motion: of the ground.
     """
     damping, scheme = rest.damping[0], rest.case.scheme or Conserving()
-    key = f"{id(rest.dead)} {damping!r} {scheme!r}"
+    key = f"{_model_key(rest.case)} {damping!r} {scheme!r}"
     return _remembered("methods", key, lambda: _first_method(rest, motion, damping, scheme))
 
 
@@ -114,6 +113,11 @@ def _first_method(rest: Rest, motion: Motion, damping: Viscous | None, scheme: S
             continue
         return method
     return METHODS[-1]
+
+
+def _model_key(case: Case) -> str:
+    """Everything that makes the model of a case; the motion too, where it is chosen for that."""
+    return _key(case, (*MODEL, *GROUND, *ANALYSIS) if case.chooses else MODEL)
 
 
 def _key(case: Case, sections: Sequence[str]) -> str:
