@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem.arrays import Array
@@ -56,19 +57,24 @@ def draw_ida(
     left.set_xlim(0.0, 1.1 * end or 1.0)
     left.set_ylim(bottom=0.0)
     left.legend(frameon=False, fontsize=SMALL, loc="lower right")
+    _draw_capacities(right, capacities)
+    return figure
+
+
+def _draw_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]]) -> None:
+    """Draw the bracket of each motion, the median, and a triangle where nothing was met."""
     for place, (low, high) in enumerate(capacities.values()):
         spread = place + np.linspace(-0.25, 0.25, len(low))
         met = np.isfinite(high)
         colour = LINES[place % len(LINES)]
-        right.vlines(spread[met], low[met], high[met], color=colour, lw=2.0)
-        right.plot(spread[~met], low[~met], "^", color=colour, ms=4)
+        axes.vlines(spread[met], low[met], high[met], color=colour, lw=2.0)
+        axes.plot(spread[~met], low[~met], "^", color=colour, ms=4)
         if met.sum() > len(met) / 2:
             middle = float(np.quantile(np.sqrt(low * high), 0.5, method="nearest"))
-            right.hlines(middle, place - 0.35, place + 0.35, color=EDGE, lw=1.2)
-    right.set_xticks(range(len(capacities)), list(capacities), rotation=25, ha="right")
-    right.set_xlim(-0.6, len(capacities) - 0.4)
-    right.grid(axis="y", color=GHOST, lw=0.5)
-    return figure
+            axes.hlines(middle, place - 0.35, place + 0.35, color=EDGE, lw=1.2)
+    axes.set_xticks(range(len(capacities)), list(capacities), rotation=25, ha="right")
+    axes.set_xlim(-0.6, len(capacities) - 0.4)
+    axes.grid(axis="y", color=GHOST, lw=0.5)
 
 
 def draw_fragility(
