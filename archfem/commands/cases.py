@@ -114,12 +114,16 @@ def run(given: argparse.Namespace) -> None:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
     Args:
-        given: `case`, a file, `changes` to it, and the folder `out`.
+        given: `case`, a file, `changes` to it, the folder `out`, and `workers` for pairs.
     """
     case, folder = Case.read(given.case, given.changes), Path(given.out)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     print(case.title)
+    if given.workers > 1 and case.suite is not None:
+        from archfem.studies.pairs import run_pairs
+
+        run_pairs(case, folder, workers=given.workers)
     tell(case, carried_out(case, folder), folder)
 
 

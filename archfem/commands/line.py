@@ -66,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
 
     run = case_command("run", "dead load, time histories, tables and pictures")
     run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    run.add_argument("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
     run.set_defaults(command=cases.run)
     check = case_command("check", "read a case, build its model and find its dead load")
     check.set_defaults(command=cases.check)

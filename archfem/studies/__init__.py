@@ -23,6 +23,7 @@
     fragility   the probability of a limit state over intensity
     convergence what findings hang on besides the structure: mesh, step, quadrature, rung
     stiffness   of dry joints, and what hangs on it
+    pairs       pairs of a suite on processes
     slurm       the file of a job for SLURM
 
 It imports from all rooms to its left. Start reading at `study`, then at `worker`.

@@ -12,6 +12,7 @@ from .ida import Ida as Ida
 from .memory import ground_motion as ground_motion
 from .memory import resting as resting
 from .over import axes_over as axes_over
+from .pairs import run_pairs as run_pairs
 from .progress import Status as Status
 from .progress import status as status
 from .slurm import slurm_job as slurm_job

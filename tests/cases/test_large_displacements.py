@@ -68,7 +68,7 @@ def test_schemes_without_memory_are_refused_in_python_too(path):
 
 def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):
     class Given:
-        case, changes, out = path, (), tmp_path / "out"
+        case, changes, out, workers = path, (), tmp_path / "out", 1
 
     run_command(Given)
     names = {file.name for file in Given.out.iterdir()}
