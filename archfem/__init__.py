@@ -9,10 +9,10 @@
 
 SI units throughout. N > 0 is compression, eccentricity > 0 toward the extrados, gravity along -y.
 
-Nine rooms, from left to right: `motion`, `masonry`, `joints`, `limit`, `models`, `statics`,
-`dynamics`, `view`, `cases`. What is used most is here; `__init__.pyi` lists it and says where it
-is defined. Everything is loaded when first used, so the masonry side (structures, motions, limit
-analysis) works without FEniCSx and PETSc.
+Eleven rooms, from left to right: `motion`, `masonry`, `joints`, `limit`, `models`, `statics`,
+`dynamics`, `view`, `cases`, `studies`, `commands`. What is used most is here; `__init__.pyi` lists
+it and says where it is defined. Everything is loaded when first used, so the masonry side
+(structures, motions, limit analysis) works without FEniCSx and PETSc.
 """
 
 import lazy_loader

@@ -1,4 +1,5 @@
 from . import cases as cases
+from . import commands as commands
 from . import dynamics as dynamics
 from . import errors as errors
 from . import joints as joints
@@ -7,10 +8,10 @@ from . import masonry as masonry
 from . import models as models
 from . import motion as motion
 from . import statics as statics
+from . import studies as studies
 from . import units as units
 from . import view as view
 from .cases.case import Case as Case
-from .cases.study import Study as Study
 from .dynamics.collapse_scale import collapse_scale as collapse_scale
 from .dynamics.events import CountedMechanism as CountedMechanism
 from .dynamics.history import History as History
@@ -57,5 +58,9 @@ from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
+from .studies.convergence import mesh_sensitivity as mesh_sensitivity
+from .studies.ida import ida as ida
+from .studies.stiffness import joint_stiffness as joint_stiffness
+from .studies.study import Study as Study
 
 __version__: str

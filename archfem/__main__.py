@@ -2,6 +2,6 @@
 
 import sys
 
-from archfem.cases.cli import main
+from archfem.commands.line import main
 
 sys.exit(main())

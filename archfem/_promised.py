@@ -14,6 +14,7 @@ PLACES = {
     "actions": "masonry.actions",
     "analysis": "cases.run",
     "capacity": "limit.thickness",
+    "cases.cli": "commands.line",
     "criteria": "joints.criteria",
     "events": "dynamics.events",
     "freebody": "statics.freebody",

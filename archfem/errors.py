@@ -19,6 +19,10 @@ class MeshError(ArchfemError):
     """A mesh that does not fit its structure: change the mesh settings."""
 
 
+class StudyStopped(ArchfemError):
+    """A study that could not go on; what was finished is kept: make good what is said, go on."""
+
+
 class DidNotConverge(ArchfemError):
     """No equilibrium was found; what was computed up to there is kept.
 

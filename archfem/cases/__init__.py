@@ -1,4 +1,4 @@
-"""Analyses as files: TOML in, folders of results out, studies, the command line.
+"""Analyses as files: TOML in, folders of results out.
 
     settings    tables of a case file and changes to them
     structures  [structure], [materials], [contacts] as a `Structure`
@@ -8,14 +8,11 @@
     stepping    damping and scheme of [analysis]
     case        one analysis as one value, read from a TOML file
     run         carry out a case; go on where an earlier run ended
-    findings    what a study finds of its cases, kept in files
-    study       several cases side by side
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
-    commands    the commands of the command line
-    cli         the command line itself
+    inputs      files that a case reads besides its own
 
-It imports from all rooms. Start reading at `case`, then at `run`.
+It imports from all rooms to its left. Start reading at `case`, then at `run`.
 """
 
 import lazy_loader

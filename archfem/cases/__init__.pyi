@@ -1,7 +1,4 @@
 from .case import Case as Case
-from .cli import main as main
-from .findings import Finding as Finding
-from .findings import study_table as study_table
 from .limits import Limit as Limit
 from .run import Rest as Rest
 from .run import Result as Result
@@ -10,5 +7,3 @@ from .run import at_rest as at_rest
 from .run import carried_out as carried_out
 from .run import damping_of as damping_of
 from .run import shaken as shaken
-from .study import Study as Study
-from .study import compared as compared

@@ -7,9 +7,7 @@ from pathlib import Path
 import xarray as xr
 
 from archfem.cases.case import Case
-from archfem.cases.findings import Finding
 from archfem.cases.run import Rest, Run
-from archfem.cases.study import Study
 from archfem.dynamics.history import History
 from archfem.dynamics.tradeoff import Accuracy
 from archfem.files import in_one_stroke
@@ -33,7 +31,6 @@ from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.names import draw_names
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_structure
-from archfem.view.studies import draw_study
 from archfem.view.style import LINES, save
 
 SUMMARY = "summary.txt"
@@ -213,27 +210,6 @@ def write_accuracy(found: Accuracy, text: str, folder: Path) -> list[Path]:
         _write(text, folder / "accuracy.txt"),
         save(draw_accuracy(found), folder / "accuracy.png"),
     ]
-
-
-def write_study(
-    study: Study, findings: Mapping[str, Finding], text: str, folder: Path
-) -> list[Path]:
-    """Write the tables of a study, and draw the factors at first mechanism where it asks for them.
-
-    Args:
-        study: what was compared.
-        findings: by name of the case.
-        text: tables of them.
-        folder: for the files.
-
-    Returns:
-        The files.
-    """
-    files = [_write(f"{study.title}\n\n{text}", folder / "study.txt")]
-    if study.scales is not None:
-        factors = {name: each.factors for name, each in findings.items()}
-        files.append(save(draw_study(factors, study.reduction), folder / "study.png"))
-    return files
 
 
 def write_motions(motions: Sequence[Motion], folder: Path) -> list[Path]:

@@ -226,7 +226,12 @@ def _found(wanted: EffectiveDamping, dead: Equilibrium) -> tuple[Viscous, str]:
 
 
 def shaken(
-    case: Case, motion: Motion, dead: Equilibrium, damping: Viscous | None = None
+    case: Case,
+    motion: Motion,
+    dead: Equilibrium,
+    damping: Viscous | None = None,
+    *,
+    method: str = "auto",
 ) -> History:
     """Return the time history of a case under a motion; the history carries the case.
 
@@ -235,6 +240,7 @@ def shaken(
         motion: of the ground.
         dead: where it starts.
         damping: as by `damping_of`, which is asked where it is not given.
+        method: as for `time_history`.
 
     Raises:
         DidNotConverge: a step failed; `history` is the record up to it.
@@ -254,6 +260,7 @@ def shaken(
             ),
             until=CountedMechanism() if case.analysis.get("halt", False) else None,
             criteria=case.criteria,
+            method=method,
         )
     except DidNotConverge as error:
         if error.history is not None:

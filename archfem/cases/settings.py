@@ -136,12 +136,26 @@ def change(settings: dict[str, Any], text: str) -> None:
         value = tomllib.loads(f"value = {words}")["value"]
     except tomllib.TOMLDecodeError:
         value = words.strip()
-    *parents, last = path.strip().split(".")
+    put(settings, path.strip(), value)
+
+
+def put(settings: dict[str, Any], path: str, value: Any) -> None:
+    """Set the value at "section.key"; tables on the way there are made.
+
+    Args:
+        settings: tables of a case, which are changed.
+        path: names of tables and the key, with dots between them.
+        value: what the key is to hold.
+
+    Raises:
+        InvalidInput: a parent of the key is not a table.
+    """
+    *parents, last = path.split(".")
     table: Any = settings
     for parent in parents:
         table = table.setdefault(parent, {})
         if not isinstance(table, dict):
-            raise InvalidInput(f"'{text}': {parent} is not a table")
+            raise InvalidInput(f"'{path}' = {value!r}: {parent} is not a table")
     table[last] = value
 
 

@@ -12,6 +12,7 @@ from archfem.dynamics.events import EveryMechanism, possible_counts
 from archfem.dynamics.falling.verdict import LOST, Fall
 from archfem.dynamics.history import Ending, history_of
 from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.errors import DidNotConverge, InvalidInput
@@ -174,7 +175,7 @@ class MechanismScales:
         ]
 
 
-def mechanism_scales(
+def mechanism_scales(  # noqa: PLR0913  (what `time_history` takes, and the search)
     model: Model,
     motion: Motion,
     *,
@@ -184,6 +185,7 @@ def mechanism_scales(
     criteria: Criteria | None = None,
     precision: float = 0.05,
     between: tuple[float, float] = (0.05, 5.0),
+    method: str | Stepper = "auto",
 ) -> MechanismScales:
     """Find the least factor on a motion at which each definition of a mechanism is first met.
 
@@ -201,6 +203,7 @@ def mechanism_scales(
         criteria: as for `time_history`.
         precision: relative width of the last brackets [-].
         between: least and largest scale tried [-]; no ground motion may exceed 5 g.
+        method: as for `time_history`.
 
     Returns:
         Brackets, mechanisms and runs; at most 40 runs are made.
@@ -230,6 +233,7 @@ def mechanism_scales(
                 dt=dt,
                 until=EveryMechanism(),
                 criteria=criteria,
+                method=method,
             )
         except DidNotConverge as error:
             run = history_of(error)

@@ -18,9 +18,11 @@
     accuracy   speed against error
     falls      blocks on their way to the ground
     studies    factors at first mechanism, case by case
+    incremental  curves of incremental dynamic analysis; fragility
+    sensitivity  tornado and convergence
     films      films and stills: all that knows pyvista and imageio
 
-It imports from all rooms but `cases`. Start reading at `structure`, with `style` beside it.
+It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
 """
 
 import lazy_loader

@@ -9,6 +9,8 @@ from .films.modes import film_modes as film_modes
 from .films.scenes import film as film
 from .films.scenes import picture as picture
 from .freebody import draw_free_body as draw_free_body
+from .incremental import draw_fragility as draw_fragility
+from .incremental import draw_ida as draw_ida
 from .joints import draw_joint as draw_joint
 from .joints import draw_joints as draw_joints
 from .modes import draw_modes as draw_modes
@@ -17,6 +19,8 @@ from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .names import draw_names as draw_names
 from .pushover import draw_pushover as draw_pushover
+from .sensitivity import draw_convergence as draw_convergence
+from .sensitivity import draw_tornado as draw_tornado
 from .stress import draw_stress as draw_stress
 from .structure import draw_instants as draw_instants
 from .structure import draw_structure as draw_structure

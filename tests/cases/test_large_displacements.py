@@ -3,8 +3,8 @@
 import pytest
 
 import archfem as af
-from archfem.cases.commands import run as run_command
 from archfem.cases.summary import pair_table
+from archfem.commands.cases import run as run_command
 
 CASE = """
 title = "a column that falls"
@@ -67,7 +67,7 @@ def test_schemes_without_memory_are_refused_in_python_too(path):
 
 def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):
     class Given:
-        case, changes, out = path, (), tmp_path / "out"
+        case, changes, out, workers = path, (), tmp_path / "out", 1
 
     run_command(Given)
     names = {file.name for file in Given.out.iterdir()}

@@ -5,8 +5,8 @@ import re
 import pytest
 
 import archfem as af
-from archfem.cases.cli import main
 from archfem.cases.run import damping_of, expected_damping
+from archfem.commands.line import main
 from archfem.dynamics.schemes import EffectiveDamping
 
 SMALL_CASE = """

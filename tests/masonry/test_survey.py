@@ -8,7 +8,7 @@ import pytest
 from drawn import assert_same, dxf, geojson, square
 
 import archfem as af
-from archfem.cases.cli import main
+from archfem.commands.line import main
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "survey.toml"
 

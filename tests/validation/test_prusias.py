@@ -94,7 +94,7 @@ def test_run_command_on_the_bridge(tmp_path, capsys):
     ]
     options = [word for text in changes for word in ("--set", text)]
     command = ["run", str(MESHES / "prusias.toml"), "--out", str(tmp_path), *options]
-    assert af.cases.main(command) == 0
+    assert af.commands.main(command) == 0
     told = capsys.readouterr().out
     assert "the first and the last effective along x" in told
     for name in ("dead.png", "dead_stress.png", "free_body.png", "suite.txt", "envelope.png"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.commands import tell
+from archfem.commands.cases import tell
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
@@ -16,7 +16,7 @@ RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 def test_run_command(tmp_path, capsys):
     changes = ["model.fidelity=rigid", "motion.end=2", "output.animation=false"]
     given = [part for change in changes for part in ("--set", change)]
-    assert af.cases.main(["run", str(RING), "--out", str(tmp_path / "out"), *given]) == 0
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path / "out"), *given]) == 0
     made = {path.name for path in (tmp_path / "out").iterdir()}
     assert made == {
         "case.toml",
@@ -39,10 +39,12 @@ def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     changes = ["model.fidelity=rigid", "motion.end=4", "analysis.halt=true"]
     changes += ["output.animation=false"]
     given = [part for change in changes for part in ("--set", change)]
-    assert af.cases.main(["run", str(RING), "--out", str(tmp_path / "usual"), *given]) == 0
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path / "usual"), *given]) == 0
     assert "by count: no mechanism, never 4 failed joints" in capsys.readouterr().out
     loose = ["--set", "criteria.hinge=0.38"]
-    assert af.cases.main(["run", str(RING), "--out", str(tmp_path / "loose"), *given, *loose]) == 0
+    assert (
+        af.commands.main(["run", str(RING), "--out", str(tmp_path / "loose"), *given, *loose]) == 0
+    )
     run = af.History.read(tmp_path / "loose" / "history.nc")
     assert run.criteria == af.Criteria(hinge=0.38)
     assert run.ended is af.dynamics.Ending.EVENT
@@ -57,14 +59,15 @@ def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
 def test_mesh_command(tmp_path):
     path = tmp_path / "ring.msh"
     assert (
-        af.cases.main(["mesh", str(RING), "--out", str(path), "--set", "model.cells=[2, 2]"]) == 0
+        af.commands.main(["mesh", str(RING), "--out", str(path), "--set", "model.cells=[2, 2]"])
+        == 0
     )
     assert np.any(["voussoir 3" in line for line in path.read_text().splitlines()])
 
 
 def run(small, *changes):
     given = [part for change in changes for part in ("--set", change)]
-    return af.cases.main(["run", str(small), "--out", str(small.parent / "out"), *given])
+    return af.commands.main(["run", str(small), "--out", str(small.parent / "out"), *given])
 
 
 def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undrawn, capsys):
@@ -162,7 +165,7 @@ def test_a_motion_that_fails_is_kept_and_ends_the_command(small, capsys):
 
 
 def test_check_tells_how_strong_the_pairs_are(small, capsys):
-    assert af.cases.main(["check", str(small)]) == 0
+    assert af.commands.main(["check", str(small)]) == 0
     said = capsys.readouterr().out
     assert re.search(r"first +horizontal .* 0\.0510 g", said)  # 1 m/s² by R = 2
     assert "ready" in said
@@ -173,7 +176,7 @@ def test_motion_command_measures_and_draws(tmp_path, capsys, at2):
         (tmp_path / folder).mkdir()
         at2(tmp_path / folder / "x.AT2", [0.0, peak, -0.1, *np.zeros(50)], 0.01)
     files = [str(tmp_path / folder / "x.AT2") for folder in "ab"]
-    assert af.cases.main(["motion", *files, "--out", str(tmp_path / "out")]) == 0
+    assert af.commands.main(["motion", *files, "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert re.search(r"^x\.AT2 +only one +53 +0\.01 s +0\.2000 g", said, re.MULTILINE)
     assert re.search(r"^x\.AT2 \(2\) +only one +53 +0\.01 s +0\.4000 g", said, re.MULTILINE)
@@ -185,9 +188,9 @@ def test_motion_command_reads_plain_columns(tmp_path, capsys):
     path = tmp_path / "plain.txt"
     path.write_text("0 0\n1 98.0665\n0 0\n0 0\n")
     keywords = ["--column", "2", "--units", "cm/s2", "--dt", "0.02"]
-    assert af.cases.main(["motion", str(path), *keywords, "--out", str(tmp_path)]) == 0
+    assert af.commands.main(["motion", str(path), *keywords, "--out", str(tmp_path)]) == 0
     assert re.search(r"only one +4 +0\.02 s +0\.1000 g", capsys.readouterr().out)
-    assert af.cases.main(["motion", str(path), "--out", str(tmp_path)]) == 1
+    assert af.commands.main(["motion", str(path), "--out", str(tmp_path)]) == 1
     assert "plain.txt" in capsys.readouterr().err
 
 
@@ -209,7 +212,7 @@ horizontal = 1.0
 def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT)
-    assert af.cases.main(["run", str(path), "--out", str(out)]) == 0
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     found = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
     assert f"at a factor of {found.factor:.4g} on the load" in said
@@ -217,12 +220,12 @@ def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
     assert (out / "limit.txt").read_text() in said
     assert (out / "collapse.png").is_file()
     assert (out / "dead.png").is_file()
-    assert af.cases.main(["check", str(path)]) == 0
+    assert af.commands.main(["check", str(path)]) == 0
     assert f"at a factor of {found.factor:.4g}" in capsys.readouterr().out
 
 
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):
     options = ["--set", "limit.horizontal=1", "--out", str(tmp_path)]
-    assert af.cases.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1
+    assert af.commands.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1
     assert "'backfill'] are softer than the joints around them" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]

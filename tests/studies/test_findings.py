@@ -2,7 +2,7 @@
 
 import json
 
-from archfem.cases.findings import Finding, kept, study_table, write
+from archfem.studies.findings import Finding, study_table, write
 
 DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
 
@@ -37,20 +37,13 @@ def test_a_study_tells_rings_from_piers_by_their_roles():
     assert row[head.index("|e| rings") :].split()[:2] == ["0.410", "0.320"]
 
 
-def test_findings_are_kept_with_how_they_were_searched_for(tmp_path):
+def test_findings_are_written_as_they_are(tmp_path):
     path = tmp_path / "case.json"
     write(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
-    same = kept(path, "text", {"precision": 0.1, "between": [0.2, 2.0]})
-    assert set(same.scales) == {"a", "b"}
-    assert same.runs["a"]["friction"]["arch"] == float("inf")
-    finer = kept(path, "text", {"precision": 0.05, "between": [0.2, 2.0]})
-    assert (set(finer.runs), finer.scales) == ({"a", "b"}, {})
-    assert kept(path, "another text", None) is None
-    found = json.loads(path.read_text())
-    del found["runs"]["a"]["ended"]  # as an earlier version wrote it
-    path.write_text(json.dumps(found))
-    assert kept(path, "text", None) is None
-    assert kept(tmp_path / "none.json", "text", None) is None
+    kept = json.loads(path.read_text())
+    assert set(kept["scales"]) == {"a", "b"}
+    assert kept["runs"]["a"]["friction"]["arch"] == float("inf")
+    assert kept["search"]["precision"] == 0.1
 
 
 def test_a_table_counts_the_pairs_asked_for_and_runs_that_broke_off():

@@ -78,27 +78,6 @@ def accuracy(given: argparse.Namespace) -> None:
     _tell_written(write_accuracy(found, text, Path(given.out)))
 
 
-def study(given: argparse.Namespace) -> None:
-    """Carry out a study: its tables, and a picture of the factors at first mechanism.
-
-    Args:
-        given: `case`, the file of a study, `changes` to its cases, and the folder `out`.
-    """
-    from archfem.cases.findings import study_table
-    from archfem.cases.report import write_study
-    from archfem.cases.study import Study, compared
-
-    asked, folder = Study.read(given.case, given.changes), Path(given.out)
-    print(asked.title)
-    found = {}
-    for name, finding in compared(asked, folder):
-        found[name] = finding
-        print(f"{name}: {len(finding.runs)} pairs")
-    text = study_table(found)
-    print(text)
-    _tell_written(write_study(asked, found, text, folder))
-
-
 def compile_steps(given: argparse.Namespace) -> None:
     """Compile what time steps need, so that no run has to wait for it.
 
@@ -147,12 +126,16 @@ def run(given: argparse.Namespace) -> None:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
     Args:
-        given: `case`, a file, `changes` to it, and the folder `out`.
+        given: `case`, a file, `changes` to it, the folder `out`, and `workers` for pairs.
     """
     case, folder = Case.read(given.case, given.changes), Path(given.out)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     print(case.title)
+    if given.workers > 1 and case.suite is not None:
+        from archfem.studies.pairs import run_pairs
+
+        run_pairs(case, folder, workers=given.workers)
     tell(case, carried_out(case, folder), folder)
 
 

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
-from archfem.cases import commands
+from archfem.commands import cases, studies
 from archfem.errors import ArchfemError
 
 INTERRUPTED = 130
@@ -61,39 +61,53 @@ def _parser() -> argparse.ArgumentParser:
     def case_command(name: str, about: str) -> argparse.ArgumentParser:
         command = chosen.add_parser(name, help=about, description=about)
         command.add_argument("case", metavar="CASE.toml", help="the case file")
-        command.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="SECTION.KEY=VALUE",
-            dest="changes",
-            help="use this value instead of the file's; may be given again",
-        )
+        _changes(command)
         return command
 
     run = case_command("run", "dead load, time histories, tables and pictures")
     run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    run.set_defaults(command=commands.run)
+    run.add_argument("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
+    run.set_defaults(command=cases.run)
     check = case_command("check", "read a case, build its model and find its dead load")
-    check.set_defaults(command=commands.check)
+    check.set_defaults(command=cases.check)
     modes = case_command("modes", "frequencies, masses and shapes of vibrations about dead load")
     modes.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
-    modes.set_defaults(command=commands.modes)
+    modes.set_defaults(command=cases.modes)
     mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
     mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
-    mesh.set_defaults(command=commands.mesh)
+    mesh.set_defaults(command=cases.mesh)
     accuracy = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
     accuracy.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    accuracy.set_defaults(command=commands.accuracy)
-    study = case_command("study", "several cases side by side: when do mechanisms form in each?")
-    study.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    study.set_defaults(command=commands.study)
+    accuracy.set_defaults(command=cases.accuracy)
+    about = "many cases: a table of what is found of each, on all cores or a cluster"
+    _study_command(chosen.add_parser("study", help=about, description=about))
     ready = chosen.add_parser("compile", help="compile once what time steps need: about a minute")
     ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
-    ready.set_defaults(command=commands.compile_steps)
+    ready.set_defaults(command=cases.compile_steps)
     _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
+
+
+def _changes(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.KEY=VALUE",
+        dest="changes",
+        help="use this value instead of the file's; may be given again",
+    )
+
+
+def _study_command(command: argparse.ArgumentParser) -> None:
+    command.add_argument("case", nargs="?", metavar="STUDY.toml", help="the study's file")
+    _changes(command)
+    command.add_argument("--out", metavar="DIR", help="folder for the results")
+    command.add_argument("--workers", type=int, help="processes (one a core)")
+    command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
+    command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
+    command.set_defaults(command=studies.study)
 
 
 def _motion_command(command: argparse.ArgumentParser) -> None:
@@ -105,4 +119,4 @@ def _motion_command(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
     )
-    command.set_defaults(command=commands.motion)
+    command.set_defaults(command=cases.motion)

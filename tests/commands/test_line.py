@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.cases.cli import INTERRUPTED, exit_code, main
+from archfem.commands.line import INTERRUPTED, exit_code, main
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 

@@ -2,14 +2,13 @@
 
 import json
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.study import compared
+from archfem.studies.compared import compared
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -42,7 +41,7 @@ def unscaled(study):
 
 
 def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
-    asked = af.Study.read(study, QUICK)
+    asked = af.studies.Comparison.read(study, QUICK)
     found = dict(compared(asked, tmp_path / "out"))
     case = af.Case.read(MESHES / "ring_suite.toml", QUICK)
     dead = af.cases.at_rest(case)
@@ -58,7 +57,7 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
         thin, thick = (float(found[name].least(definition)[0]) for name in ("thin", "thick"))
         assert 0.05 < thin < thick  # the thinner ring fails first
     assert np.isinf(found["thin"].least("ring and pier")).all()  # it has no piers
-    table = af.cases.study_table(found)
+    table = af.studies.study_table(found)
     assert all(word in table for word in ("thick", "thin", *DEFINITIONS, "of 1"))
 
 
@@ -84,13 +83,13 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
 def test_studies_that_cannot_be_meant(text, says, tmp_path):
     (tmp_path / "study.toml").write_text(text)
     with pytest.raises(af.InvalidInput, match=says):
-        af.Study.read(tmp_path / "study.toml")
+        af.studies.Comparison.read(tmp_path / "study.toml")
     with pytest.raises(af.InvalidInput, match="there is no study"):
-        af.Study.read(tmp_path / "other.toml")
+        af.studies.Comparison.read(tmp_path / "other.toml")
 
 
-def interrupted_run(*given):
-    history = af.cases.shaken(*given)
+def interrupted_run(*given, **options):
+    history = af.cases.shaken(*given, **options)
     history.dataset.attrs["ended"] = "interrupted"
     return history
 
@@ -101,48 +100,46 @@ def interrupted_search(*given, **options):
 
 
 @pytest.mark.parametrize(
-    "during",
-    [
-        {"carry_out": partial(af.cases.carried_out, shake=interrupted_run)},
-        {"search": interrupted_search},
-    ],
-    ids=["run", "search"],
+    ("name", "instead"), [("shaken", interrupted_run), ("mechanism_scales", interrupted_search)]
 )
-def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, during):
+def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, name, instead):
+    monkeypatch.setattr(f"archfem.studies.finders.{name}", instead)
     folder = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        dict(compared(af.Study.read(study, QUICK), folder, **during))
-    assert list(folder.iterdir()) == []
+        dict(compared(af.studies.Comparison.read(study, QUICK), folder))
+    assert not [*folder.glob("*/*/*.json"), *folder.glob("thi*.json")]
 
 
 def test_a_case_that_does_not_stand_is_named(study, tmp_path):
     unscaled(study)
     study.write_text(study.read_text().replace("thickness=0.4", "thickness=0.1"))
     with pytest.raises(af.DidNotConverge, match=r"^'thin': no equilibrium"):
-        dict(compared(af.Study.read(study, QUICK), tmp_path))
+        dict(compared(af.studies.Comparison.read(study, QUICK), tmp_path))
     assert (tmp_path / "thick.json").is_file()
 
 
-def test_a_study_goes_on_where_it_was_ended(study, tmp_path):
+def never(*_, **__):
+    raise AssertionError("a case was run again")
+
+
+def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
     unscaled(study)
     folder = tmp_path / "out"
-    command = ["study", str(study), "--out", str(folder)]
+    command = ["study", str(study), "--out", str(folder), "--workers", "1"]
     command += [word for text in QUICK for word in ("--set", text)]
-    assert af.cases.main(command) == 0
+    assert af.commands.main(command) == 0
     table = (folder / "study.txt").read_text()
     assert (folder / "study.png").is_file()
 
-    def never(*_, **__):
-        raise AssertionError("a case was run again")
-
-    asked = af.Study.read(study, QUICK)
-    found = dict(compared(asked, folder, carry_out=never))
-    assert af.cases.study_table(found) in table
-    assert af.cases.main(command) == 0
+    monkeypatch.setattr("archfem.studies.study.serially", never)
+    asked = af.studies.Comparison.read(study, QUICK)
+    found = dict(compared(asked, folder))
+    assert af.studies.study_table(found) in table
+    assert json.loads((folder / "thin.json").read_text())["case"] == asked.cases["thin"].text()
+    assert af.commands.main(command) == 0
     assert (folder / "study.txt").read_text() == table
+    assert set(af.studies.read_table(folder / "results.nc")["case"].values) == {"thick", "thin"}
 
-    found = json.loads((folder / "thin.json").read_text())
-    found["case"] += " "  # of another case
-    (folder / "thin.json").write_text(json.dumps(found))
+    other = af.studies.Comparison.read(study, [*QUICK, "analysis.dt=4 ms"])
     with pytest.raises(AssertionError, match="run again"):
-        dict(compared(asked, folder, carry_out=never))
+        dict(compared(other, folder))

@@ -11,10 +11,9 @@ import xarray as xr
 
 from archfem.arrays import Array
 from archfem.dynamics.falling.verdict import LOST
-from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdicts import DEFINITIONS, PUBLISHED, first_mechanisms
+from archfem.dynamics.history import Ending
+from archfem.dynamics.verdicts import DEFINITIONS, PUBLISHED
 from archfem.files import in_one_stroke
-from archfem.joints.criteria import judged
 from archfem.limit.counted import KINDS
 from archfem.tables import aligned
 
@@ -24,12 +23,14 @@ class Finding:
     """What was found of one case.
 
     Attributes:
-        case: the case as text, by which a finding is known again.
+        case: the case as text.
         frequency: of the first mode about the dead load [Hz].
         mass: its share of the mass along x [-].
         roles: of the rings and piers, by part.
         dead: largest |e| of each of them under dead load [-].
-        runs: by pair, what `of_run` gives.
+        runs: by pair, the largest `eccentricity` and `friction` of each part [-], the first of the
+            `mechanisms` by each definition, its kind and time [s], how the run `ended`, the same in
+            words, `outcome`, and what it left, `fall`, where displacements may be large.
         scales: by pair and definition, the least factor found to fail and the largest below it
             found not to; infinite where none failed.
         search: options with which they were searched for; None where that was not kept.
@@ -67,30 +68,6 @@ class Finding:
         return {definition: self.least(definition) for definition in DEFINITIONS}
 
 
-def of_run(run: History) -> dict[str, Any]:
-    """Return what a study keeps of a run.
-
-    Args:
-        run: what happened.
-
-    Returns:
-        The largest |e| and V / N of each part [-], the first mechanism by each definition, how the
-        run ended, and what it left where displacements may be large, ready to be written as JSON.
-    """
-    joints = judged(run.joints)
-    return {
-        "eccentricity": by_part(abs(joints["eccentricity"]).max("time").fillna(0.5)),
-        "friction": by_part(joints["friction"].max("time").fillna(np.inf)),
-        "mechanisms": {
-            definition: None if found is None else {"kind": found.kind, "time": found.time}
-            for definition, found in first_mechanisms(run).items()
-        },
-        "fall": None if run.fall is None else run.fall.kind,
-        "ended": run.ended,
-        "outcome": run.outcome,
-    }
-
-
 def by_part(values: xr.DataArray) -> dict[str, float]:
     """Return the largest value of each part's joints.
 
@@ -99,31 +76,6 @@ def by_part(values: xr.DataArray) -> dict[str, float]:
     """
     largest = values.groupby("part").max()
     return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
-
-
-def kept(path: Path, case: str, search: Mapping[str, Any] | None) -> Finding | None:
-    """Return what an earlier command found of a case, without factors searched for otherwise.
-
-    What an earlier version wrote, which kept less of its runs, is not taken.
-
-    Args:
-        path: of the file that `write` has written.
-        case: as text.
-        search: options of the search for factors, None where none are wanted.
-
-    Returns:
-        The findings; None where there are none of the same case.
-    """
-    try:
-        found = Finding(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return None
-    whole = all("ended" in run and PUBLISHED in run["mechanisms"] for run in found.runs.values())
-    if found.case != case or not whole:
-        return None
-    if search is not None and found.search not in (None, search):
-        found.scales = {}
-    return found
 
 
 def write(finding: Finding, path: Path) -> None:

@@ -1,0 +1,12 @@
+"""The command line: words after `archfem`, and what each command prints.
+
+    line     words as a command, and its exit code
+    cases    commands for one case, and for records
+    studies  the command for studies
+
+It imports from all rooms. Start reading at `line`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

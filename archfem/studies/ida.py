@@ -1,0 +1,231 @@
+"""Incremental dynamic analysis: motions scaled up until limit states are met, by hunt and fill."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem.arrays import Array
+from archfem.cases.case import Case
+from archfem.cases.settings import chosen
+from archfem.errors import InvalidInput
+from archfem.studies.asking import Asked
+from archfem.studies.fragility import Fragility, fragility
+from archfem.studies.hunt import BETWEEN, DEMANDS, LIMITS, PRECISION, searched
+from archfem.studies.intensity import MEASURES, scaled_intensity
+from archfem.studies.over import Axis
+from archfem.studies.points import PAIR, Point
+from archfem.studies.study import Study
+
+SHARES = (0.16, 0.50, 0.84)
+"""Fractiles that are usual: the median, and one standard deviation to either side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ida:
+    """What incremental dynamic analysis found.
+
+    Attributes:
+        table: over `motion`: the measures of each as it is, `period` of the first mode [s], by
+            limit state the least scale found to fail, ", survives" the largest below that did not,
+            and ", survives above" how many beyond survived all the same; over motion and `entry`
+            the runs: `scale`, and what each came to.
+    """
+
+    table: xr.Dataset
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Limit states that were looked for."""
+        return tuple(limit for limit in LIMITS if limit in self.table)
+
+    def capacities(self, limit: str, measure: str = "pga") -> tuple[Array, Array]:
+        """Return between which intensities each motion meets a limit state.
+
+        Args:
+            limit: one of `limits`.
+            measure: "pga" [m/s²], "pgv" [m/s], "sa" [m/s²] or "arias" [m/s].
+
+        Returns:
+            Largest that survives below the least that fails, and that, infinite where none was
+            found (motions,); without motions whose search failed.
+
+        Raises:
+            InvalidInput: limit state or measure are not known.
+        """
+        chosen(limit, self.limits, "limit")
+        chosen(measure, MEASURES, "measure")
+        whole = self.table[measure].values
+        ends = (
+            scaled_intensity(measure, whole, self.table[name].values)
+            for name in (f"{limit}, survives", limit)
+        )
+        low, high = (each[np.isfinite(whole)] for each in ends)
+        return low, high
+
+    def fragility(self, limit: str, measure: str = "pga", **options: Any) -> Fragility:
+        """Return the fragility curve of a limit state, record-to-record.
+
+        Args:
+            limit: one of `limits`.
+            measure: as for `capacities`.
+            options: of `fragility`.
+
+        Raises:
+            InvalidInput: as for `capacities`, or the capacities tell no curve.
+        """
+        low, high = self.capacities(limit, measure)
+        return fragility(high, low, **options)
+
+    def curves(
+        self, measure: str = "pga", demand: str = "rotation"
+    ) -> Iterator[tuple[str, Array, Array]]:
+        """Give the curve of each motion, as it is: it need not rise.
+
+        Args:
+            measure: as for `capacities`.
+            demand: "rotation" [rad], "eccentricity" [-], "slip", "largest_displacement" or
+                "residual_displacement" [m].
+
+        Yields:
+            Name of the motion, intensities and demands (runs,) in order of the scale; a run that
+            broke off has an infinite demand.
+
+        Raises:
+            InvalidInput: measure or demand are not known.
+        """
+        chosen(measure, MEASURES, "measure")
+        chosen(demand, DEMANDS, "demand")
+        for k, name in enumerate(self.table["motion"].values):
+            scale = self.table["scale"].values[k]
+            made = np.isfinite(scale)
+            whole = self.table[measure].values[k]
+            intensity = scaled_intensity(measure, whole, scale[made])
+            yield str(name), intensity, self.table[demand].values[k][made]
+
+    def fractiles(self, intensity: Array, measure: str = "pga", demand: str = "rotation") -> Array:
+        """Return the 16, 50 and 84 % fractiles of the demand at intensities.
+
+        Args:
+            intensity: values above 0 (n,).
+            measure: as for `curves`.
+            demand: likewise.
+
+        Returns:
+            Demands (3, n), between runs on straight lines; infinite beyond runs that broke off,
+            NaN where fewer than half of the motions were taken so far.
+        """
+        found = np.array(
+            [
+                np.interp(
+                    intensity, [0.0, *x], [0.0, *y], right=y[-1] if np.isinf(y[-1]) else np.nan
+                )
+                for _, x, y in self.curves(measure, demand)
+                if len(x)
+            ]
+        )
+        known = ~np.isnan(found)
+        fractiles = np.full((len(SHARES), found.shape[1]), np.nan)
+        for k in np.flatnonzero(2 * known.sum(axis=0) >= len(found)):
+            fractiles[:, k] = np.quantile(found[known[:, k], k], SHARES, method="nearest")
+        return fractiles
+
+    def not_monotonic(self, limit: str) -> list[str]:
+        """Return the motions that survive a scale beyond one at which they fail.
+
+        Args:
+            limit: one of `limits`.
+        """
+        beyond = self.table[f"{limit}, survives above"].values
+        return [str(name) for name in self.table["motion"].values[beyond > 0.0]]
+
+
+def ida(
+    case: Case,
+    motions: Sequence[Any] | Mapping[str, Any] | None = None,
+    *,
+    limits: Sequence[str] | None = None,
+    precision: float = PRECISION,
+    between: tuple[float, float] = BETWEEN,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    client: Any = None,
+) -> Ida:
+    """Scale each motion up until each limit state is met, and narrow down where.
+
+    Scales are hunted for from 1 by factors of √2, then brackets are halved, and the widest gaps
+    between runs are filled. Every run goes over the whole motion. A run without equilibrium counts
+    as failed.
+
+    Args:
+        case: of the structure; with `model.displacements = "large"` collapse is a limit state too.
+        motions: records, files that the case's folder leads to, or tables as under [motion], by
+            name or in a row; by default the pairs of the case's suite, as scaled and reduced.
+        limits: of `LIMITS`; by default all that the structure has joints for.
+        precision: relative width of the last brackets [-].
+        between: least and largest scale tried [-]; no ground motion may exceed 5 g.
+        folder: as for `Study.run`, and `workers` and `client`: where one ended, it goes on.
+        workers: likewise.
+        client: likewise.
+
+    Returns:
+        Capacities, curves and fragility by any measure.
+
+    Raises:
+        InvalidInput: there are no motions, or a limit state is not known.
+        StudyStopped: as for `Study.run`.
+
+    References:
+        Vamvatsikos and Cornell, Earthq. Eng. Struct. Dyn. 31 (2002) 491-514, and Earthq. Spectra 20
+        (2004) 523-553 for hunt and fill.
+    """
+    for limit in limits or ():
+        chosen(limit, LIMITS, "limits")
+    options = {
+        "limits": None if limits is None else list(limits),
+        "precision": precision,
+        "between": [float(each) for each in between],
+    }
+    names, points = _points(case, motions)
+    axis = Axis("motion", ("motion",), tuple((name,) for name in names))
+    study = Study(f"{case.title}: IDA", Asked(searched, options), (axis,), points)
+    return Ida(study.run(folder, workers=workers, client=client))
+
+
+def _points(
+    case: Case, motions: Sequence[Any] | Mapping[str, Any] | None
+) -> tuple[list[str], tuple[Point, ...]]:
+    """Names of motions, and the case under each."""
+    if motions is None:
+        names = list((case.suite or {}).get("pairs", ()))
+        if not names:
+            raise InvalidInput("no motions were given, and the case has no [suite] of them")
+        changes: list[tuple[tuple[str, Any], ...]] = [((PAIR, name),) for name in names]
+        return names, tuple(Point(case.settings, case.folder, each) for each in changes)
+    named = motions if isinstance(motions, Mapping) else {_name(each): each for each in motions}
+    if not named or len(named) < len(motions):
+        raise InvalidInput(f"{len(motions)} motions under {len(named)} names: give each its own")
+    base = {key: value for key, value in case.settings.items() if key not in ("suite", "motion")}
+    points = tuple(Point(base, case.folder, (("motion", _table(each)),)) for each in named.values())
+    return list(named), points
+
+
+def _table(motion: Any) -> dict[str, Any]:
+    """A motion as under [motion]."""
+    if isinstance(motion, str | Path):
+        return {"file": str(motion)}
+    if isinstance(motion, Mapping):
+        return dict(motion)
+    raise InvalidInput(
+        f"a motion is a {type(motion).__name__}: give a record's file, or a table as under [motion]"
+    )
+
+
+def _name(motion: Any) -> str:
+    """What to call a motion that was given without a name."""
+    table = _table(motion)
+    seed = table.get("synthetic", {}).get("seed")
+    return Path(table["file"]).stem if "file" in table else f"seed {seed}"

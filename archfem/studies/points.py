@@ -1,0 +1,105 @@
+"""One point of a study: a case file and what differs from it."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from archfem.cases.case import Case
+from archfem.cases.inputs import input_files
+from archfem.cases.settings import put, refuse_unknown
+from archfem.errors import InvalidInput
+
+PAIR = "suite.pair"
+"""Key whose value is the one pair of the suite that a point is about."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One case of a study, told by what differs from a case that many points share.
+
+    Attributes:
+        base: tables of the case that is changed.
+        folder: where relative file names start.
+        changes: keys, "section.key" each, and their values; "suite.pair" names the one pair of the
+            suite that is meant.
+    """
+
+    base: Mapping[str, Any] = field(repr=False)
+    folder: Path
+    changes: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Tables of the case, changes made.
+
+        Raises:
+            InvalidInput: a key goes through something that is no table, or there is no such pair.
+        """
+        made = deepcopy(dict(self.base))
+        for key, value in self.changes:
+            if key == PAIR:
+                _leave_one(made, value)
+            else:
+                put(made, key, deepcopy(value))
+        return made
+
+    @property
+    def case(self) -> Case:
+        """The case.
+
+        Raises:
+            InvalidInput: what cannot be meant.
+            InvalidStructure: lengths that do not make a structure.
+        """
+        return Case.of(self.settings, self.folder)
+
+    def digest(self, asked: str) -> str:
+        """Return what tells this point from every other: of its case, its files and the version.
+
+        Args:
+            asked: what is to be found, as text.
+        """
+        settings = self.settings
+        files = [(path.name, content_digest(path)) for path in input_files(settings, self.folder)]
+        told = [package_version(), asked, settings, files]
+        text = json.dumps(told, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def package_version() -> str:
+    """Return the version of archfem that runs."""
+    return str(import_module("archfem").__version__)
+
+
+def content_digest(path: Path) -> str:
+    """Return what tells the content of a file; a word where it cannot be read.
+
+    Args:
+        path: the file.
+    """
+    try:
+        now = path.stat()
+    except OSError:
+        return "missing"
+    return _digest(path, now.st_mtime_ns, now.st_size)
+
+
+@lru_cache(maxsize=4096)
+def _digest(path: Path, changed: int, size: int) -> str:
+    """Digest of a file's content, read once as long as its time and size are the same."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _leave_one(settings: dict[str, Any], pair: str) -> None:
+    """Take all other pairs out of a suite."""
+    pairs = settings.get("suite", {}).get("pairs", {})
+    if not pairs:
+        raise InvalidInput(f"{PAIR} = {pair!r}: the case has no [suite] to take a pair of")
+    refuse_unknown({pair: None}, pairs, "suite.pairs")
+    settings["suite"]["pairs"] = {pair: pairs[pair]}

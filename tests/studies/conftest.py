@@ -1,0 +1,88 @@
+"""A case that takes milliseconds, a study of it, and a module of finders for workers."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import archfem as af
+
+FINDERS = '''
+"""Finders of the tests, in a module that workers can import."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+
+def lengths(case):
+    """Findings that take no time."""
+    ring = case.settings["structure"]
+    if ring["thickness"] > 0.9:
+        raise RuntimeError("too thick for this test")
+    return {"twice": 2.0 * ring["thickness"], "voussoirs": ring["voussoirs"], "rows": [1.0, 2.0]}
+
+
+def slowly(case, seconds=0.2):
+    """Findings that take time."""
+    time.sleep(seconds)
+    return lengths(case)
+
+
+def deadly(case, folder):
+    """Ends its own process: a thin ring the first time, a thick one always."""
+    mark = Path(folder) / "seen"
+    thin = case.settings["structure"]["thickness"] < 0.55
+    if not (thin and mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return lengths(case)
+'''
+
+
+@pytest.fixture(scope="session")
+def finders(tmp_path_factory):
+    """The module `finders_of_tests`, also for workers."""
+    folder = tmp_path_factory.mktemp("finders")
+    (folder / "finders_of_tests.py").write_text(FINDERS)
+    sys.path.insert(0, str(folder))
+    yield folder
+    sys.path.remove(str(folder))
+    sys.modules.pop("finders_of_tests", None)
+
+
+@pytest.fixture
+def ring_file(tmp_path):
+    """Case file of a rigid ring of five stones, half a second of shaking."""
+    path = tmp_path / "ring.toml"
+    path.write_text(
+        'title = "a small ring"\n'
+        '[structure]\nshape = "circular_arch"\nradius = 3.0\nthickness = 0.6\nembrace = 150.0\n'
+        'voussoirs = 5\n[model]\nfidelity = "rigid"\n'
+        "[analysis]\ndt = 0.005\ndamping = { ratio = 0.05, frequency = 8.0 }\n"
+        "[motion]\nscale = 1.0\nsynthetic = { seed = 1, duration = 0.5, pga = 3.0 }\n"
+    )
+    return path
+
+
+@pytest.fixture
+def small_ring(ring_file):
+    """The case of that file."""
+    return af.Case.read(ring_file)
+
+
+@pytest.fixture
+def study_file(ring_file, finders):
+    """A study of six points, one of which fails."""
+    path = ring_file.with_name("study.toml")
+    path.write_text(
+        'title = "six rings"\ncase = "ring.toml"\nfind = "finders_of_tests:lengths"\n'
+        "[over]\nstructure.thickness = [0.5, 0.6, 1.0]\nmotion.scale = [1.0, 2.0]\n"
+    )
+    return path
+
+
+def rows_of(folder: Path) -> dict[str, str]:
+    """The stored rows of a study by their names."""
+    return {path.name: path.read_text() for path in folder.glob("points/*/*.json")}

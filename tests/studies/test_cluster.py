@@ -1,0 +1,138 @@
+"""Studies on a scheduler of Dask: the same rows, and errors of ours where it fails."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+
+import archfem as af
+from archfem.studies.store import Store
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def client():
+    """A scheduler and two workers in this process."""
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def cluster(folder, workers=2, preload=None):
+    """A scheduler and workers as processes of their own; gives the address, and the processes."""
+    path = os.pathsep.join(each or os.getcwd() for each in sys.path)
+    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    file = folder / "scheduler.json"
+
+    def started(*words):
+        command = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(file)]
+        command += ["--no-dashboard"]
+        log = (folder / f"{words[0]}.log").open("a")
+        return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+
+    processes = [started("scheduler", "--host", "127.0.0.1", "--port", "0")]
+    try:
+        while not file.exists() or not file.stat().st_size:
+            assert processes[0].poll() is None
+            time.sleep(0.1)
+        more = ["--preload", str(preload)] if preload else []
+        processes += [
+            started("worker", "--nthreads", "1", "--no-nanny", *more) for _ in range(workers)
+        ]
+        with file.open() as text:
+            yield json.load(text)["address"], processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, client):
+    study = af.Study.read(study_file)
+    found = study.run(tmp_path / "out", client=client)
+    assert found.identical(study.run(tmp_path / "serial", workers=1))
+    names = ("results.nc", "results.csv")
+    assert all(
+        (tmp_path / "out" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
+        for name in names
+    )
+
+
+def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
+    monkeypatch.setattr("archfem.studies.cluster.package_version", lambda: "9.9.9")
+    with pytest.raises(
+        af.InvalidInput, match=r"a worker runs archfem .*, this is 9\.9\.9: install"
+    ):
+        af.Study.read(study_file).run(client=client)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "no address"])
+def test_a_dead_scheduler_is_named(study_file, monkeypatch, address):
+    monkeypatch.setattr("archfem.studies.cluster.PATIENCE", 0.5)
+    with pytest.raises(
+        af.InvalidInput, match=r"no scheduler .*answers at .*start 'dask scheduler'"
+    ):
+        af.Study.read(study_file).run(client=address)
+
+
+def test_without_dask_the_extra_is_named(study_file, monkeypatch):
+    monkeypatch.delitem(sys.modules, "archfem.studies.cluster", raising=False)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(af.InvalidInput, match=r"pip install 'archfem\[cluster\]'"):
+        af.Study.read(study_file).run(client="tcp://127.0.0.1:1")
+
+
+@pytest.mark.slow
+def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
+    with cluster(tmp_path) as (address, _):
+        command = ["study", str(study_file), "--out", str(tmp_path / "out")]
+        assert af.commands.main([*command, "--scheduler", address]) == 0
+    af.Study.read(study_file).run(tmp_path / "serial", workers=1)
+    names = ("results.nc", "results.csv")
+    assert all(
+        (tmp_path / "out" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
+        for name in names
+    )
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp_path, monkeypatch):
+    monkeypatch.setattr("archfem.studies.cluster.PATIENCE", 20.0)
+    over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
+    find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
+    study, folder = af.Study.of(small_ring, over, find), tmp_path / "out"
+    with cluster(tmp_path) as (address, processes):
+        original = Store.keep
+
+        def keep(self, digest, row):
+            original(self, digest, row)
+            if processes[0].poll() is None and len(self.digests()) >= 3:
+                processes[0].kill()
+
+        monkeypatch.setattr(Store, "keep", keep)
+        with pytest.raises(af.errors.StudyStopped, match="scheduler was lost"):
+            study.run(folder, client=address)
+    assert 3 <= len(Store(folder).digests()) < 12
+    monkeypatch.setattr(Store, "keep", original)
+    assert study.run(folder, workers=1).identical(study.run(workers=1))
+
+
+@pytest.mark.slow
+def test_a_process_of_another_version_is_named(study_file, tmp_path):
+    preload = tmp_path / "older.py"
+    preload.write_text("import archfem\narchfem.__version__ = '0.1.0'\n")
+    with (
+        cluster(tmp_path, 1, preload) as (address, _),
+        pytest.raises(af.InvalidInput, match=r"a worker runs archfem 0\.1\.0"),
+    ):
+        af.Study.read(study_file).run(client=address)

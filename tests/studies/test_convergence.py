@@ -1,0 +1,50 @@
+"""Orders, limits and error bars of values whose law is known, and of a ring's."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.studies.convergence import converged
+
+
+@pytest.mark.parametrize("order", [0.6, 1.0, 2.0])
+@pytest.mark.parametrize("sizes", [(4.0, 2.0, 1.0), (5.0, 2.0, 1.0), (9.0, 4.0, 2.0, 1.0)])
+def test_powers_of_the_size_give_their_order_and_limit(order, sizes):
+    values = 3.0 + 0.2 * np.array(sizes) ** order
+    found = converged(sizes, values)
+    assert found.order == pytest.approx(order, rel=1e-8)
+    assert found.limit == pytest.approx(3.0, abs=1e-8)
+    assert found.error == pytest.approx(1.25 * 0.2, rel=1e-7)
+
+
+def test_values_that_do_not_settle_have_no_order_and_a_wide_bar():
+    for values in ([1.0, 2.0, 1.5], [1.0, 1.1, 1.3]):
+        found = converged([4.0, 2.0, 1.0], values)
+        assert np.isnan(found.order)
+        assert found.error == pytest.approx(3.0 * np.ptp(values))
+    fast = converged([4.0, 2.0, 1.0], 3.0 + np.array([4.0, 2.0, 1.0]) ** 5)
+    assert fast.order == pytest.approx(5.0)
+    assert fast.error > abs(fast.limit - 3.0)
+    assert converged([4.0, 2.0, 1.0], [1.0, 1.0, 1.0]).error == 0.0
+
+
+def test_error_bar_of_a_ring_holds_its_converged_eccentricity():
+    """The crown's |e| converges to 0.2853 (README); the springings have the largest."""
+    ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
+    case = af.Case.of({"structure": {**ring, "voussoirs": 17}, "model": {"fidelity": "condensed"}})
+    found = af.mesh_sensitivity(case, rungs=["rigid"], rules=["exact"], workers=1)
+    fine = af.dead_load(af.build(case.structure, fidelity="condensed", cells=(12, 12)))
+    finest = float(abs(fine.joints["eccentricity"]).max())
+    assert abs(finest - found.mesh.limit) <= found.error
+    assert found.step is None
+    assert found.rules["exact"] == pytest.approx(found.mesh.values[-1])
+    assert found.of("N").mesh.error < 0.01 * found.of("N").mesh.limit
+    assert "rung rigid" in found.text()
+
+
+def test_findings_that_have_no_numbers(small_ring):
+    few = {"rules": ["exact"], "rungs": ["rigid"], "find": "dead load", "workers": 1}
+    with pytest.raises(af.InvalidInput, match="'colour' is none of the numbers"):
+        af.mesh_sensitivity(small_ring, "colour", **few)
+    with pytest.raises(af.InvalidInput, match="the coarsest first"):
+        converged([1.0, 2.0, 4.0], [1.0, 2.0, 3.0])

@@ -1,0 +1,113 @@
+"""Fragility curves recover the lognormal that samples are drawn from, and say how sure they are."""
+
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+import archfem as af
+from archfem.studies.fragility import fragility, stripe_fragility
+
+MEDIAN, DISPERSION = 2.5, 0.4
+
+
+def drawn(count, seed=1):
+    return np.random.default_rng(seed).lognormal(np.log(MEDIAN), DISPERSION, count)
+
+
+def test_exact_capacities_give_mean_and_deviation_of_their_logarithms():
+    capacities = drawn(25)
+    found = fragility(capacities)
+    assert found.median == pytest.approx(np.exp(np.log(capacities).mean()), rel=1e-9)
+    assert found.dispersion == pytest.approx(np.log(capacities).std(), rel=1e-9)
+    assert float(found.probability(found.median)) == pytest.approx(0.5)
+    fitted = stats.lognorm(s=found.dispersion, scale=found.median)
+    assert found.misfit == pytest.approx(stats.kstest(capacities, fitted.cdf).statistic, rel=1e-6)
+
+
+def test_censored_capacities_give_what_the_likelihood_has_its_peak_at():
+    capacities = drawn(60)
+    lower, upper = 0.9 * capacities, 1.1 * capacities
+    beyond = capacities > 3.5
+    lower[beyond], upper[beyond] = 3.5, np.inf
+    found = fragility(upper, lower)
+
+    def unlikely(parameters):
+        mean, deviation = parameters[0], np.exp(parameters[1])
+        low, high = (stats.norm.cdf(np.log(end), mean, deviation) for end in (lower, upper))
+        return -np.log(high - low).sum()
+
+    best = optimize.minimize(unlikely, [0.5, -0.5], method="Nelder-Mead", tol=1e-10).x
+    assert np.log(found.median) == pytest.approx(best[0], abs=1e-6)
+    assert np.log(found.dispersion) == pytest.approx(best[1], abs=1e-6)
+
+
+def test_many_samples_recover_their_curve():
+    found = fragility(drawn(4000), resamples=20)
+    assert found.median == pytest.approx(MEDIAN, rel=3 * DISPERSION / np.sqrt(4000))
+    assert found.dispersion == pytest.approx(DISPERSION, rel=3 / np.sqrt(8000))
+
+
+def test_stripes_give_what_the_likelihood_has_its_peak_at():
+    levels = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0])
+    share = stats.lognorm(s=DISPERSION, scale=MEDIAN).cdf(levels)
+    exact = stripe_fragility(levels, 1e4 * share, 1e4, resamples=10)
+    assert exact.median == pytest.approx(MEDIAN, rel=1e-6)
+    assert exact.dispersion == pytest.approx(DISPERSION, rel=1e-6)
+    failed = np.random.default_rng(2).binomial(20, share)
+    found = stripe_fragility(levels, failed, 20)
+
+    def unlikely(parameters):
+        curve = stats.lognorm(s=np.exp(parameters[1]), scale=np.exp(parameters[0])).cdf(levels)
+        return -stats.binom.logpmf(failed, 20, curve).sum()
+
+    best = optimize.minimize(unlikely, [0.5, -0.5], method="Nelder-Mead", tol=1e-10).x
+    assert np.log(found.median) == pytest.approx(best[0], abs=1e-6)
+    assert np.log(found.dispersion) == pytest.approx(best[1], abs=1e-6)
+    assert found.goodness > 0.05
+
+
+def test_bands_hold_the_truth_about_as_often_as_they_say():
+    """Of 60 intervals of 90 %, by 40 motions each, 47 or more hold it but for one case in 500."""
+    held = 0
+    for seed in range(60):
+        low, high = fragility(drawn(40, seed), resamples=200).interval(0.9)
+        held += low <= MEDIAN <= high
+    assert 47 <= held <= 60
+    found = fragility(drawn(40))
+    low, high = found.band(np.array([1.0, MEDIAN, 6.0]))
+    assert (low < found.probability([1.0, MEDIAN, 6.0])).all()
+    assert (high > found.probability([1.0, MEDIAN, 6.0])).all()
+
+
+def test_what_is_not_lognormal_is_seen():
+    two_heaps = np.concatenate([drawn(30) * 0.1, drawn(30) * 10.0])
+    assert fragility(two_heaps).goodness < 0.05
+    assert fragility(drawn(60)).goodness > 0.05
+    uneven = stripe_fragility([1.0, 2.0, 3.0, 4.0], [1, 18, 3, 19], 20)
+    assert uneven.goodness < 0.01
+
+
+def test_what_is_not_known_of_the_structure_widens_the_curve():
+    found = fragility(drawn(30))
+    wider = found.widened(0.3)
+    assert wider.dispersion == pytest.approx(np.hypot(found.dispersion, 0.3))
+    assert wider.median == found.median
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (([1.0, 2.0],), "give 3 or more"),
+        (([1.0, 2.0, -1.0],), "above 0"),
+        (([2.0, 2.0, 2.0],), "all are alike"),
+        (([2.0, np.inf, np.inf], [1.0, 3.0, 3.0]), "more than half were not reached"),
+        (([2.0, 1.0, 1.0], [1.0, 3.0, 0.5]), "none larger below"),
+    ],
+)
+def test_capacities_that_tell_nothing(given, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        fragility(*given)
+    with pytest.raises(af.InvalidInput, match="no more failures"):
+        stripe_fragility([1.0, 2.0, 3.0], [0, 5, 21], 20)
+    with pytest.raises(af.InvalidInput, match="try levels between"):
+        stripe_fragility([1.0, 2.0, 3.0], [0, 0, 20], 20)

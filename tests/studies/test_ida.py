@@ -1,0 +1,123 @@
+"""Incremental dynamic analysis: brackets, curves, and what is made of them."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import archfem as af
+from archfem.studies.ida import ida
+from archfem.studies.intensity import intensities
+
+
+def made(count):
+    motion = {"duration": 0.6, "pga": 9.0}
+    return [{"synthetic": {"seed": seed, **motion}} for seed in range(1, count + 1)]
+
+
+@pytest.fixture(scope="module")
+def small_ida(tmp_path_factory):
+    """Two motions on a rigid ring of seven stones."""
+    case = af.Case.of(
+        {
+            "structure": {
+                "shape": "circular_arch",
+                "radius": 3.0,
+                "thickness": 0.35,
+                "embrace": 150.0,
+                "voussoirs": 7,
+            },
+            "model": {"fidelity": "rigid"},
+            "analysis": {"dt": 0.01, "damping": {"ratio": 0.05, "frequency": 8.0}},
+        }
+    )
+    folder = tmp_path_factory.mktemp("ida")
+    return (
+        case,
+        folder,
+        af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1),
+    )
+
+
+def test_brackets_hold_what_runs_at_their_ends_do(small_ida):
+    case, _, found = small_ida
+    assert found.limits == ("first hinge", "four failures", "verified")
+    motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
+    dead = af.cases.at_rest(case)
+    for limit, key in (("four failures", "any four joints"), ("verified", "verified")):
+        for end, met in ((f"{limit}, survives", False), (limit, True)):
+            scale = float(found.table[end].sel(motion="seed 2"))
+            run = af.cases.shaken(case, motion.scaled(scale), dead)
+            assert (af.first_mechanisms(run)[key] is not None) == met
+    for limit in found.limits:
+        low, high = found.capacities(limit)
+        assert (high / low <= 1.2).all()
+        assert (found.table["first hinge"] <= found.table[limit]).all()
+
+
+def test_measures_grow_with_the_scale_as_they_do(small_ida):
+    _, _, found = small_ida
+    motion = af.Motion.synthetic(seed=1, duration=0.6, pga=9.0)
+    scale = float(found.table["verified"][0])
+    period = float(found.table["period"][0])
+    for measure, value in intensities(motion.scaled(scale), period).items():
+        assert found.capacities("verified", measure)[1][0] == pytest.approx(value, rel=1e-9)
+    sa = float(af.response_spectrum(motion, [period])[0])
+    assert float(found.table["sa"][0]) == pytest.approx(sa)
+
+
+def test_it_goes_on_where_it_ended(small_ida, monkeypatch):
+    case, folder, found = small_ida
+
+    def never(*_):
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr("archfem.studies.study.serially", never)
+    again = af.ida(case, made(2), precision=0.2, between=(0.3, 2.5), folder=folder, workers=1)
+    assert again.table.identical(found.table)
+
+
+def test_fractiles_are_those_of_curves_drawn_by_hand():
+    rows = {
+        "pga": ("motion", [2.0, 2.0, 2.0]),
+        "scale": (("motion", "entry"), [[0.5, 1.0, 2.0], [0.5, 1.0, np.nan], [0.5, 1.0, 2.0]]),
+        "rotation": (
+            ("motion", "entry"),
+            [[1.0, 2.0, 4.0], [2.0, np.inf, np.nan], [3.0, 6.0, 5.0]],
+        ),
+        "verified": ("motion", [1.0, 1.0, np.inf]),
+        "verified, survives": ("motion", [0.5, 0.5, 2.0]),
+        "verified, survives above": ("motion", [0, 1, 0]),
+    }
+    found = af.studies.Ida(xr.Dataset(rows, {"motion": ["a", "b", "c"]}))
+    half = found.fractiles(np.array([0.5, 1.0, 4.0, 9.0]))
+    assert half[:, 0] == pytest.approx([0.5, 1.0, 1.5])  # halfway to the first run
+    assert half[:, 1] == pytest.approx([1.0, 2.0, 3.0])
+    assert half[:, 2] == pytest.approx([4.0, 5.0, np.inf])
+    assert np.isnan(half[:, 3]).all()
+    assert found.not_monotonic("verified") == ["b"]
+    low, high = found.capacities("verified")
+    assert (low.tolist(), high.tolist()) == ([1.0, 1.0, 4.0], [2.0, 2.0, np.inf])
+
+
+def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small_ida):
+    case, _, found = small_ida
+    pairs = {"first": made(1)[0], "second": made(2)[1]}
+    suite = af.Case.of({**case.settings, "suite": {"reduction": 2.0, "pairs": pairs}})
+    few = {"precision": 0.5, "between": (2.0, 2.0), "limits": ["first hinge"], "workers": 1}
+    halved = ida(suite, **few)
+    assert halved.table["motion"].values.tolist() == ["first", "second"]
+    assert halved.limits == ("first hinge",)
+    assert halved.table["pga"].values == pytest.approx(0.5 * found.table["pga"].values)
+
+
+def test_analyses_that_cannot_be_meant(small_ring):
+    with pytest.raises(af.InvalidInput, match="no motions were given"):
+        ida(small_ring)
+    with pytest.raises(af.InvalidInput, match="3 motions under 1 names"):
+        ida(small_ring, made(1) * 3)
+    with pytest.raises(af.InvalidInput, match="limits = 'colapse'"):
+        ida(small_ring, made(1), limits=["colapse"])
+    with pytest.raises(af.InvalidInput, match="a motion is a int"):
+        ida(small_ring, [3])
+    found = ida(small_ring, made(1), limits=["collapse"], workers=1)
+    assert "collapse needs model.displacements" in found.table["error"].item()

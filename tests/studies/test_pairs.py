@@ -1,0 +1,30 @@
+"""Pairs on processes leave what `carried_out` finds, and it is what it would have found itself."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.studies.pairs import run_pairs
+
+
+def histories(case, folder):
+    """Runs of a case by pair."""
+    found = af.cases.carried_out(case, folder)
+    return {run.motion.name: run for run in found if isinstance(run, af.cases.Run)}
+
+
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_pairs_are_kept_where_they_are_looked_for(small, tmp_path, workers):
+    case = af.Case.read(small)
+    assert run_pairs(case, tmp_path / "out", workers=workers) == ["finished", "finished"]
+    there, alone = histories(case, tmp_path / "out"), histories(case, tmp_path / "alone")
+    assert [run.kept for run in there.values()] == [True, True]
+    for name, run in alone.items():
+        ours, theirs = (each.history.joints["N"].values for each in (there[name], run))
+        assert np.abs(ours - theirs).max() <= 1e-6 * np.abs(theirs).max()
+
+
+def test_a_model_chosen_for_all_pairs_is_not_chosen_pair_by_pair(small, small_ring, tmp_path):
+    for case in (af.Case.read(small, ["model.fidelity=auto"]), small_ring):
+        with pytest.raises(af.InvalidInput, match="pairs run side by side where"):
+            run_pairs(case, tmp_path)

@@ -1,0 +1,288 @@
+"""Studies: points, findings, one table, and going on where one was ended."""
+
+import errno
+import json
+import os
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy import stats
+
+import archfem as af
+from archfem.studies.over import axes_over
+from archfem.studies.store import Store
+
+
+def test_a_study_finds_of_each_point_what_its_case_does_alone(small_ring, tmp_path):
+    over = {"structure.thickness": [0.5, 0.6], "motion.scale": [0.5, 2.0]}
+    found = af.Study.of(small_ring, over).run(workers=1)
+    assert dict(found.sizes) == {"structure.thickness": 2, "motion.scale": 2}
+    changes = ["structure.thickness=0.5", "motion.scale=2.0"]
+    case = af.Case.read(small_ring.folder / "ring.toml", changes)
+    alone = af.studies.of_history(
+        af.cases.shaken(case, case.ground_motion(), af.cases.at_rest(case))
+    )
+    there = found.sel({"structure.thickness": 0.5, "motion.scale": 2.0})
+    for name in ("eccentricity", "rotation", "verified", "largest_displacement"):
+        assert float(there[name]) == pytest.approx(alone[name], rel=1e-6)
+    assert (found["eccentricity"].diff("motion.scale") > 0.0).all()
+
+
+def test_two_processes_and_one_give_the_same_bits(study_file, tmp_path):
+    study = af.Study.read(study_file)
+    one, two = (study.run(tmp_path / f"out{n}", workers=n) for n in (1, 2))
+    xr.testing.assert_identical(one, two)
+    names = ("results.nc", "results.csv")
+    assert all(
+        (tmp_path / "out1" / name).read_bytes() == (tmp_path / "out2" / name).read_bytes()
+        for name in names
+    )
+    failed = one["error"].sel({"structure.thickness": 1.0}).values
+    assert set(failed) == {"RuntimeError: too thick for this test"}
+    assert np.isnan(one["twice"].sel({"structure.thickness": 1.0})).all()
+    assert one["rows"].dims == ("structure.thickness", "motion.scale", "entry")
+
+
+def test_keys_with_spaces_are_coordinates_too(small_ring, tmp_path):
+    axis = "contacts.stone_to_stone.friction"
+    over = {"contacts.stone to stone.friction": [0.5, 0.6], "title": ["a/b"]}
+    found = af.Study.of(small_ring, over, "dead load").run(tmp_path, workers=1)
+    assert found[axis].values.tolist() == [0.5, 0.6]
+    assert af.studies.read_table(tmp_path / "results.nc").identical(found)
+
+
+def test_plain_xarray_and_pandas_read_the_table(study_file, tmp_path):
+    found = af.Study.read(study_file).run(tmp_path / "out", workers=1)
+    with xr.open_dataset(tmp_path / "out" / "results.nc") as kept:
+        assert kept["twice"].equals(found["twice"])
+        assert kept.attrs["archfem"] == af.__version__
+    frame = pd.read_csv(tmp_path / "out" / "results.csv")
+    assert len(frame) == 6
+    assert frame["twice"].tolist()[:4] == [1.0, 1.0, 1.2, 1.2]
+    assert af.studies.read_table(tmp_path / "out" / "results.nc").identical(found)
+
+
+def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatch):
+    study = af.Study.read(study_file)
+    folder = tmp_path / "out"
+    first = study.run(folder, workers=1)
+    asked = []
+
+    def counted(points, question):
+        asked.extend(number for number, _ in points)
+        return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
+
+    monkeypatch.setattr("archfem.studies.study.serially", counted)
+    # what failed for no reason of the case's own is tried again: numbers 4 and 5
+    study.run(folder, workers=1)
+    assert asked == [4, 5]
+    next(iter(folder.glob("points/*/*.json"))).unlink()
+    asked.clear()
+    study.run(folder, workers=1)
+    assert len(asked) == 1
+    assert set(first.data_vars) == {"twice", "voussoirs", "rows", "error"}
+
+
+@pytest.mark.parametrize("what", ["case", "record", "option", "version"])
+def test_a_changed_case_is_told_apart(what, study_file, tmp_path, at2, monkeypatch, caplog):
+    at2(tmp_path / "a.at2", [0.1, 0.2, -0.1], 0.01)
+    case = tmp_path / "ring.toml"
+    case.write_text(case.read_text().replace("synthetic = {", 'file = "a.at2" # {'))
+    folder = tmp_path / "out"
+    before = af.Study.read(study_file)
+    before.run(folder, workers=1)
+    if what == "case":
+        case.write_text(case.read_text().replace("radius = 3.0", "radius = 3.1"))
+    elif what == "record":
+        at2(tmp_path / "a.at2", [0.1, 0.2, -0.3], 0.01)
+    elif what == "option":
+        study_file.write_text(study_file.read_text().replace("tests:lengths", "tests:slowly"))
+    else:
+        monkeypatch.setattr(af, "__version__", "0.1.0")
+    after = af.Study.read(study_file)
+    digests = [[point.digest(study.asked.text) for point in study.points]
+               for study in (before, after)]  # fmt: skip
+    if what in ("case", "option"):
+        assert not set(digests[0]) & set(digests[1])
+    assert len(Store(folder).finished(digests[1])) == 0
+    with caplog.at_level("WARNING", logger="archfem"):
+        after.run(folder, workers=1)
+    assert "6 points of other cases" in caplog.text
+
+
+def test_a_process_that_dies_is_replaced(small_ring, tmp_path, finders, monkeypatch):
+    monkeypatch.setattr("archfem.studies.processes.ATTEMPTS", 2)
+    over = {"structure.thickness": [0.5, 0.6]}
+    find = {"name": "finders_of_tests:deadly", "folder": str(tmp_path)}
+    found = af.Study.of(small_ring, over, find).run(tmp_path / "out", workers=2)
+    assert found["twice"].values[0] == 1.0  # its second process lives
+    assert "WorkerDied: 2 processes" in found["error"].values[1]
+    assert "signal 9" in found["error"].values[1]
+
+
+def test_a_second_driver_is_refused(study_file, tmp_path):
+    folder = tmp_path / "out"
+    with (
+        Store(folder).locked(),
+        pytest.raises(af.InvalidInput, match=rf"another driver .*process {os.getpid()}"),
+    ):
+        af.Study.read(study_file).run(folder, workers=1)
+    assert not af.Study.read(study_file).run(folder, workers=1)["twice"].isnull().all()
+
+
+def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, monkeypatch):
+    folder, written = tmp_path / "out", []
+    fsync = os.fsync
+
+    def full(descriptor):
+        written.append(descriptor)
+        if len(written) > 4:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        fsync(descriptor)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(af.errors.StudyStopped, match=r"disk of .*out is full"):
+            af.Study.read(study_file).run(folder, workers=1)
+    kept = list(folder.glob("points/*/*.json"))
+    assert 1 <= len(kept) < 6
+    assert all(json.loads(path.read_text())["ours"] for path in kept)
+    assert not list(folder.rglob(".*.part*"))
+    found = af.Study.read(study_file).run(folder, workers=1)
+    assert found.identical(af.Study.read(study_file).run(tmp_path / "other", workers=1))
+
+
+def test_status_tells_how_far_a_study_is(study_file, tmp_path, capsys):
+    folder = tmp_path / "out"
+    command = ["study", str(study_file), "--out", str(folder), "--workers", "1"]
+    assert af.commands.main(command) == 0
+    said = capsys.readouterr().out
+    assert "2 ended in RuntimeError: too thick" in said
+    next(iter(folder.glob("points/*/*.json"))).unlink()
+    assert af.commands.main(["study", "--status", str(folder)]) == 0
+    assert "points done" in (said := capsys.readouterr().out)
+    assert "not running" in said
+    assert af.commands.main(["study", "--status", str(tmp_path / "none")]) == 1
+    assert af.commands.main(["study", str(study_file)]) == 1
+    assert "needs a file and a folder" in capsys.readouterr().err
+    assert str(af.studies.Status(4, 2, 1, 0.5)).startswith("2 of 4 points done, 1 failed, 0.5 a")
+    assert af.studies.Status(4, 2, 1, 0.5).remaining == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("method", ["latin", "sobol"])
+def test_samples_have_their_distribution_and_their_seed(small_ring, method):
+    over = {
+        "structure.thickness": stats.uniform(0.5, 0.2),
+        "analysis": {"damping": {"ratio": {"distribution": "lognorm", "s": 0.3, "scale": 0.05}}},
+        "motion.scale": [1.0, 2.0],
+    }
+    told = {"count": 256, "method": method, "seed": 4}
+    axes = axes_over(over, told)
+    assert [axis.name for axis in axes] == ["motion.scale", "sample"]
+    assert axes[1].keys == ("structure.thickness", "analysis.damping.ratio")
+    thickness, ratio = np.array(axes[1].rows).T
+    assert thickness.mean() == pytest.approx(0.6, abs=2e-4)  # both fill space evenly
+    assert np.median(ratio) == pytest.approx(0.05, rel=0.01)
+    assert np.log(ratio).std() == pytest.approx(0.3, rel=0.02)
+    assert abs(np.corrcoef(thickness, ratio)[0, 1]) < 0.1
+    assert axes_over(over, told)[1].rows == axes[1].rows
+    assert axes_over(over, told | {"seed": 5})[1].rows != axes[1].rows
+    study = af.Study.of(small_ring, over, "dead load", samples=told)
+    assert len(study.points) == 512
+
+
+def test_points_may_be_listed(small_ring):
+    points = [{"structure.thickness": 0.5}, {"structure.thickness": 0.6, "title": "other"}]
+    study = af.Study.of(small_ring, points, "dead load")
+    found = study.run(workers=1)
+    assert found["structure.thickness"].dims == ("point",)
+    assert found["title"].values.tolist() == ["", "other"]
+    assert study.points[1].case.title == "other"
+
+
+def test_a_study_goes_over_pairs_of_a_suite(small):
+    case = af.Case.read(small)
+    found = af.Study.of(case, {"suite.pair": ["first", "second"]}).run(workers=1)
+    run = af.cases.shaken(
+        case, case.alone("second").ground_suite().motions[0], af.cases.at_rest(case)
+    )
+    alone = af.studies.of_history(run)["eccentricity"]
+    assert float(found["eccentricity"].sel({"suite.pair": "second"})) == pytest.approx(
+        alone, rel=1e-6
+    )
+    assert (
+        af.Study.of(case, {"model.points": [3]})
+        .run()["error"]
+        .item()
+        .startswith("InvalidInput: the suite has 2 pairs")
+    )
+
+
+GOOD = 'case = "ring.toml"\nfind = "dead load"\n'
+RANDOM = "over.structure.thickness = { distribution = 'norm', loc = 0.5, scale = 0.01 }\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (GOOD, "says nothing of over"),
+        ("over.structure.thickness = [0.5]", "says nothing of case"),
+        (f"{GOOD}over.structure.thicknes = [0.5]", "did you mean 'thickness'"),
+        (f"{GOOD}over.structure.thickness = []", "thickness is empty: a product"),
+        (f"{GOOD}over = []", "lists no points"),
+        (f"{GOOD}over = {{}}", "give a table of keys"),
+        (f"{GOOD}over.structure.thickness = 0.5", "give a list of values, or a distribution"),
+        (f"{GOOD}over.structure.thickness = [0.5, -0.5]", "thickness = -0.5 is no case"),
+        (f"{GOOD}{RANDOM}", "say how they are sampled"),
+        (f"{GOOD}{RANDOM}samples = {{ count = 12, method = 'sobol' }}", "powers of 2 alone"),
+        (f"{GOOD}{RANDOM}samples = {{ count = 8, method = 'halton' }}", "use one of"),
+        (f"{GOOD}{RANDOM}samples = {{ number = 8 }}", "unknown key 'samples.number'"),
+        (f"{GOOD}{RANDOM.replace('norm', 'nrm')}samples.count = 8", "no distribution 'nrm'"),
+        (f"{GOOD}{RANDOM.replace('loc', 'mean')}samples.count = 8", "does not take"),
+        (f"{GOOD}{RANDOM.replace('0.01', '-1.0')}samples.count = 8", "that are no numbers"),
+        (f"{GOOD}samples.count = 8\n[over]\nstructure.thickness = [0.5]", "over has none"),
+        (
+            f"{GOOD}samples.count = 16\n[over.contacts.'stone to stone']\nnormal_stiffness = "
+            "{ distribution = 'norm', loc = 1e9, scale = 1e9 }",
+            "normal_stiffness = -.* is no case",
+        ),
+        (f"{GOOD}over.suite.pair = ['a']", "has no \\[suite\\]"),
+        (f"{GOOD.replace('dead load', 'ded load')}over.title = ['a']", "did you mean 'dead load'"),
+        (f"{GOOD.replace('dead load', 'no_module:f')}over.title = ['a']", "No module named"),
+        (
+            f"{GOOD.replace(chr(34) + 'dead load' + chr(34), '{ name = chr, x = 1 }')}"
+            "over.title = ['a']",
+            "is not TOML",
+        ),
+    ],
+)
+def test_studies_that_cannot_be_meant(text, says, ring_file):
+    path = ring_file.with_name("study.toml")
+    path.write_text(text)
+    with pytest.raises(af.InvalidInput, match=says):
+        af.Study.read(path)
+
+
+def test_findings_that_cannot_be_kept(small_ring):
+    over = {"structure.thickness": [0.5]}
+    found = af.Study.of(small_ring, over, lambda case: {"x": {"y": 1}}).run(workers=1)
+    assert "finding 'x' is a dict" in found["error"].item()
+    with pytest.raises(af.InvalidInput, match="does not take"):
+        af.Study.of(small_ring, over, {"name": "scales", "precisions": 0.1})
+    study = af.Study.of(small_ring, {"structure.thickness": [0.5, 0.6]}, lambda case: {})
+    with pytest.raises(af.InvalidInput, match="cannot be handed to another process"):
+        study.run(workers=2)
+    with pytest.raises(af.InvalidInput, match="workers = 0 is not a whole number"):
+        study.run(workers=0)
+
+
+def test_a_job_for_slurm_names_study_folder_and_workers(study_file, tmp_path):
+    path = af.studies.slurm_job(study_file, tmp_path / "my out", tmp_path / "job.sh", workers=99)
+    text = path.read_text()
+    assert "--ntasks=100" in text
+    assert f"archfem study {study_file} --out '{tmp_path}/my out' --scheduler" in text
+    assert os.system(f"bash -n {path}") == 0
+    with pytest.raises(af.InvalidInput, match="there is no study"):
+        af.studies.slurm_job("none.toml", tmp_path, path, workers=1)

@@ -1,0 +1,34 @@
+"""Incremental dynamic analysis and fragility: what is drawn where."""
+
+import numpy as np
+
+from archfem.view.incremental import draw_fragility, draw_ida
+
+
+def test_curves_turn_back_and_what_was_not_met_is_an_arrow():
+    curves = [
+        ("a", np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.3, 0.2])),
+        ("b", np.array([1.0, 2.0]), np.array([0.2, np.inf])),
+    ]
+    capacities = {"verified": (np.array([1.0, 2.0]), np.array([1.1, np.inf]))}
+    figure = draw_ida(curves, capacities, fractiles=(np.array([1.0]), np.array([[0.1]] * 3)))
+    left, right = figure.axes
+    turned = left.lines[0].get_xydata()
+    assert turned.tolist() == [[0.0, 0.0], [0.1, 1.0], [0.3, 2.0], [0.2, 3.0]]
+    assert len(left.texts) == 1  # the arrow of the one that broke off
+    (beyond,) = (line for line in right.lines if line.get_marker() == "^")
+    assert beyond.get_ydata().tolist() == [2.0]
+    assert [text.get_text() for text in right.get_xticklabels()] == ["verified"]
+
+
+def test_fragility_has_its_band_and_its_data():
+    x = np.array([1.0, 2.0, 3.0])
+    middle = np.array([0.1, 0.5, 0.9])
+    figure = draw_fragility(
+        {"verified": (middle, middle - 0.1, middle + 0.1)}, x, data={"verified": (x, middle)}
+    )
+    (axes,) = figure.axes
+    assert axes.lines[0].get_ydata().tolist() == middle.tolist()
+    assert axes.lines[1].get_marker() == "o"
+    low = axes.collections[0].get_paths()[0].vertices[:, 1].min()
+    assert np.isclose(low, 0.0)
