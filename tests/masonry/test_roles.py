@@ -110,11 +110,12 @@ def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(told):
         )
         met.append((replace(run.mechanism, part=""), replace(run.verified.moved, part="")))
     assert met[0] == met[1] == met[2]
-    assert (met[0][0].kind, told()) == ("global", [])
+    assert met[0][0].kind == "global"
+    assert not [words for words in told() if "displacements as small" not in words]
     blank = af.build(untold(made), fidelity="rigid")
     run = af.time_history(blank, motion, dt=0.005, damping=af.Rayleigh(0.05, (4.0, 15.0)))
     assert replace(run.mechanism, part="") != met[0][0]
-    assert len(told()) >= 3
+    assert len([words for words in told() if "displacements as small" not in words]) >= 3
 
 
 @pytest.mark.parametrize(
