@@ -6,7 +6,7 @@ import pytest
 from archfem.joints.moving import frames
 from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
 from archfem.joints.moving.overlap import Faces
-from archfem.joints.moving.poses import Sides, pose, pose_gradient
+from archfem.joints.moving.poses import Sides, pose, swing
 
 SEEDS = range(12)
 
@@ -27,10 +27,22 @@ def measured(poses, angle):
 def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
-    rates = np.empty((3, 6))
-    frames.discrete(before, after, angle, rates)
-    change = measured(after, angle) - measured(before, angle)
-    assert np.abs(rates @ (after - before).ravel() - change).max() < 4e-15
+    ends, rates, now = np.empty((2, 3)), np.empty((3, 4)), np.empty((3, 4))
+    frames.follow(before, after, angle, ends, rates, now)
+    for end, poses in zip(ends, (before, after), strict=True):
+        assert end == pytest.approx(measured(poses, angle), abs=2e-15)
+    lower, higher = after - before
+    moved = np.array([*(higher - lower)[:2], lower[2], higher[2]])
+    assert np.abs(rates @ moved - (ends[1] - ends[0])).max() < 4e-15
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
+def test_small_turns(x):
+    """Against NumPy, and the derivative of sin x / x against differences of it."""
+    assert frames.small_turn(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
+    assert frames.both(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
+    there, back = (frames.small_turn(x + d)[1] for d in (1e-4, -1e-4))
+    assert frames.small_turn(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
 
 
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
@@ -143,14 +155,20 @@ def test_the_derivative_is_that_of_the_force(shapes, friction, facets):
     assert np.quantile(errors, 0.75) < 1e-7
 
 
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("turns", [True, False])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_pose_follows_its_discrete_derivative(seed):
-    """P Δq = Δp, of a block with modes that turns by radians."""
+def test_the_pose_follows_its_discrete_derivative(seed, turns, side):
+    """P Δq = Δp, of a block with modes that turns by radians, and of one without a frame."""
     rng = np.random.default_rng(seed)
     sides = two_joints(3, 0.5, True, rng).sides
+    sides.turns[0, side] = turns
     before, after = rng.normal(size=(2, 12))
-    poses, rates = np.empty((2, 3)), np.empty((3, 6))
-    for row, q in zip(poses, (before, after), strict=True):
-        pose(sides, 0, 1, q, row)
-    pose_gradient(sides, 0, 1, before, after, rates)
-    assert np.abs(rates @ (after - before)[6:] - (poses[1] - poses[0])).max() < 1e-14
+    poses, moves, found = np.empty((2, 2, 3)), np.zeros((2, 2, 3, 6)), np.empty(3)
+    swing(sides, 0, side, before, after, poses, moves)
+    for row, q in zip(poses[:, side], (before, after), strict=True):
+        pose(sides, 0, side, q, found)
+        assert row == pytest.approx(found, abs=4e-15)
+    own = sides.index[0, side]
+    change = poses[1, side] - poses[0, side]
+    assert np.abs(moves[0, side] @ (after - before)[own] - change).max() < 1e-14
