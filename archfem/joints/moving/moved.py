@@ -177,7 +177,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         found: `Answer`, filled.
     """
     sides, size = joints.sides, found.force.shape[2]
-    poses, moves, ends = np.empty((2, 2, 3)), np.zeros((2, 2, 3, size)), np.zeros((2, 4))
+    poses, moves, ends = np.empty((2, 2, 3)), np.empty((2, 2, 3, size)), np.empty((2, 4))
     by_faces, curved, pushed = np.empty((2, 3, 4)), np.empty((4, 4)), np.empty((2, 3))
     force, rate, normals = np.empty(4), np.empty((4, 4)), np.empty((len(slid), 4))
     stretches = sides.stretch.shape[2] > 0
@@ -189,8 +189,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
             swing(sides, joint, 1, before, after, poses, moves),
         )
         step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
-        if stretches:
-            ends[0, 3], ends[1, 3] = stretched(sides, joint, before), stretched(sides, joint, after)
+        ends[0, 3], ends[1, 3] = stretched(sides, joint, before), stretched(sides, joint, after)
         lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
         limit_faces(joints.faces, joint, ends, late, normals)
         shear, rubbing = rub_faces(

@@ -131,8 +131,9 @@ def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
     if not sides.turns[joint, side]:
         pose(sides, joint, side, before, poses[0, side])
         pose(sides, joint, side, after, poses[1, side])
-        size = sides.size[joint, side]
-        moves[:, side, :, :size] = sides.shapes[joint, side, :, :size]
+        for k in range(sides.size[joint, side]):
+            for row in range(3):
+                moves[0, side, row, k] = moves[1, side, row, k] = sides.shapes[joint, side, row, k]
         return (1.0, 0.0), (rx, ry), (1.0, 0.0, 1.0, 0.0)
     x, y, turn = index[0], index[1], index[2]
     half = 0.5 * (after[turn] - before[turn])
