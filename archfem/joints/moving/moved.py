@@ -196,27 +196,23 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
             joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
         )
         found.lost[joint] = lagging + rubbing
-        _sum_up(joints, joint, force, shear, found.resultants)
+        whole, hand = joints.whole[joint], joints.hand[joint]
+        found.resultants[whole, 0] -= force[0]
+        found.resultants[whole, 1] += hand * shear
+        found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
         _between(by_faces, rate, curved)
         bend(step, force, curved)
         for side in range(2):
-            _push(by_faces[0], force, side, pushed[side])
-            _gather(sides, joint, side, moves[0, side], pushed[side], found.force)
+            _push(by_faces, force, side, pushed)
+            count = sides.size[joint, side]
+            _gather(joint, side, count, moves, pushed, found.force)
             for other in range(2):
-                _spread(sides, (joint, side, other), moves, curved, found.rate)
+                counts = count, sides.size[joint, other]
+                _spread((joint, side, other), counts, moves, curved, found.rate)
             if sides.turns[joint, side]:
-                swing_bend(sides, joint, side, swings[side], pushed[side], found.rate)
+                swing_bend(sides, joint, side, swings[side], pushed, found.rate)
         if stretches:
             _stretch(sides, joint, (force, rate), by_faces, moves, longer, found)
-
-
-@numba.njit(cache=True)
-def _sum_up(joints, joint, force, shear, resultants):  # type: ignore
-    """Add a joint's, or a piece's, forces to N, V, M of the whole."""
-    whole, hand = joints.whole[joint], joints.hand[joint]
-    resultants[whole, 0] -= force[0]
-    resultants[whole, 1] += hand * shear
-    resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
 
 
 @numba.njit(cache=True)
@@ -235,35 +231,36 @@ def _between(by_faces, rate, found):  # type: ignore
 
 @numba.njit(cache=True)
 def _push(by_faces, force, side, found):  # type: ignore
-    """Forces on the pose of a face (3,)."""
-    sign = 2.0 * side - 1.0
-    found[0] = sign * (by_faces[0, 0] * force[0] + by_faces[1, 0] * force[1])
-    found[1] = sign * (by_faces[0, 1] * force[0] + by_faces[1, 1] * force[1])
-    found[2] = 0.0
+    """Forces on the pose of a face."""
+    sign, turn = 2.0 * side - 1.0, 0.0
     for row in range(3):
-        found[2] += by_faces[row, 2 + side] * force[row]
+        turn += by_faces[0, row, 2 + side] * force[row]
+    found[side, 0] = sign * (by_faces[0, 0, 0] * force[0] + by_faces[0, 1, 0] * force[1])
+    found[side, 1] = sign * (by_faces[0, 0, 1] * force[0] + by_faces[0, 1, 1] * force[1])
+    found[side, 2] = turn
 
 
 @numba.njit(cache=True)
-def _gather(sides, joint, side, moves, pushed, found):  # type: ignore
+def _gather(joint, side, count, moves, pushed, found):  # type: ignore
     """Forces on the coordinates of a block."""
-    for k in range(sides.size[joint, side]):
-        value = moves[0, k] * pushed[0] + moves[1, k] * pushed[1] + moves[2, k] * pushed[2]
-        found[joint, side, k] = value
+    x, y, turn = pushed[side, 0], pushed[side, 1], pushed[side, 2]
+    for k in range(count):
+        value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
+        found[joint, side, k] = value + moves[0, side, 2, k] * turn
 
 
 @numba.njit(cache=True)
-def _spread(sides, where, moves, curved, found):  # type: ignore
+def _spread(where, counts, moves, curved, found):  # type: ignore
     """Derivative of the forces on a block by the coordinates of one."""
     joint, side, other = where
     toward, against, row, last = 2.0 * side - 1.0, 2.0 * other - 1.0, 2 + side, 2 + other
-    for column in range(sides.size[joint, other]):
+    for column in range(counts[1]):
         a, b = against * moves[1, other, 0, column], against * moves[1, other, 1, column]
         c = moves[1, other, 2, column]
         x = toward * (curved[0, 0] * a + curved[0, 1] * b + curved[0, last] * c)
         y = toward * (curved[1, 0] * a + curved[1, 1] * b + curved[1, last] * c)
         turn = curved[row, 0] * a + curved[row, 1] * b + curved[row, last] * c
-        for k in range(sides.size[joint, side]):
+        for k in range(counts[0]):
             value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
             found[joint, side, k, other, column] = value + moves[0, side, 2, k] * turn
 

@@ -46,14 +46,14 @@ class Sides(NamedTuple):
 
 
 @numba.njit(cache=True)
-def _shaped(sides, joint, side, q, first):  # type: ignore
-    """U ξ and Θ ξ, of the coordinates from the first on."""
+def _shaped(shapes, index, span, q):  # type: ignore
+    """U ξ and Θ ξ of a face."""
     x = y = turn = 0.0
-    for k in range(first, sides.size[joint, side]):
-        own = q[sides.index[joint, side, k]]
-        x += sides.shapes[joint, side, 0, k] * own
-        y += sides.shapes[joint, side, 1, k] * own
-        turn += sides.shapes[joint, side, 2, k] * own
+    for k in range(span[0], span[1]):
+        own = q[index[k]]
+        x += shapes[0, k] * own
+        y += shapes[1, k] * own
+        turn += shapes[2, k] * own
     return x, y, turn
 
 
@@ -96,14 +96,15 @@ def pose(sides, joint, side, q, found):  # type: ignore
         q: coordinates (n,).
         found: filled (3,) [m, m, rad].
     """
-    index = sides.index[joint, side]
+    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
+    size = sides.size[joint, side]
     if not sides.turns[joint, side]:
-        dx, dy, turn = _shaped(sides, joint, side, q, 0)
+        dx, dy, turn = _shaped(shapes, index, (0, size), q)
         found[0] = sides.held[joint, side, 0] + dx
         found[1] = sides.held[joint, side, 1] + dy
         found[2] = sides.held[joint, side, 2] + turn
         return
-    dx, dy, turn = _shaped(sides, joint, side, q, 3)
+    dx, dy, turn = _shaped(shapes, index, (3, size), q)
     arm = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     (x, y), _ = _turned(arm, (dx, dy), both(0.5 * q[index[2]]))
     found[0], found[1], found[2] = q[index[0]] + x, q[index[1]] + y, q[index[2]] + turn
@@ -126,46 +127,47 @@ def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
     Returns:
         What `swing_bend` needs to know of the step, of a block that turns.
     """
-    index = sides.index[joint, side]
+    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
+    size = sides.size[joint, side]
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     if not sides.turns[joint, side]:
         pose(sides, joint, side, before, poses[0, side])
         pose(sides, joint, side, after, poses[1, side])
-        for k in range(sides.size[joint, side]):
+        for k in range(size):
             for row in range(3):
-                moves[0, side, row, k] = moves[1, side, row, k] = sides.shapes[joint, side, row, k]
+                moves[0, side, row, k] = moves[1, side, row, k] = shapes[row, k]
         return (1.0, 0.0), (rx, ry), (1.0, 0.0, 1.0, 0.0)
     x, y, turn = index[0], index[1], index[2]
     half = 0.5 * (after[turn] - before[turn])
     mean, shrunk, falls = small_turn(half)
     start = both(0.5 * before[turn])
-    u0, v0, tilt = _shaped(sides, joint, side, before, 3)
+    u0, v0, tilt = _shaped(shapes, index, (3, size), before)
     (dx, dy), (c, s) = _turned((rx, ry), (u0, v0), start)
     poses[0, side, 0], poses[0, side, 1] = before[x] + dx, before[y] + dy
     poses[0, side, 2] = before[turn] + tilt
-    u1, v1, tilt = _shaped(sides, joint, side, after, 3)
+    u1, v1, tilt = _shaped(shapes, index, (3, size), after)
     end = added(start[0], start[1], mean, half * shrunk)
     (dx, dy), last = _turned((rx, ry), (u1, v1), end)
     poses[1, side, 0], poses[1, side, 1] = after[x] + dx, after[y] + dy
     poses[1, side, 2] = after[turn] + tilt
-    _turning(sides, joint, side, (last, 1.0, 1.0), (rx + u1, ry + v1), moves[1, side])
+    _turning(shapes, size, (last, 1.0, 1.0), (rx + u1, ry + v1), moves[1, side])
     middle = added(c, s, mean, half * shrunk)
     reach = rx + 0.5 * (u0 + u1), ry + 0.5 * (v0 + v1)
-    _turning(sides, joint, side, (middle, mean, shrunk), reach, moves[0, side])
+    _turning(shapes, size, (middle, mean, shrunk), reach, moves[0, side])
     return middle, reach, (mean, half * shrunk, shrunk, falls)
 
 
 @numba.njit(cache=True)
-def _turning(sides, joint, side, turn, reach, moves):  # type: ignore
+def _turning(shapes, size, turn, reach, moves):  # type: ignore
     """Write down a derivative of a pose by the frame and by the shapes."""
     ((c, s), mean, shrunk), (x, y) = turn, reach
     moves[0, 0], moves[0, 1], moves[0, 2] = 1.0, 0.0, -shrunk * (s * x + c * y)
     moves[1, 0], moves[1, 1], moves[1, 2] = 0.0, 1.0, shrunk * (c * x - s * y)
     moves[2, 0], moves[2, 1], moves[2, 2] = 0.0, 0.0, 1.0
-    for k in range(3, sides.size[joint, side]):
-        u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
+    for k in range(3, size):
+        u, v = shapes[0, k], shapes[1, k]
         moves[0, k], moves[1, k] = mean * (c * u - s * v), mean * (s * u + c * v)
-        moves[2, k] = sides.shapes[joint, side, 2, k]
+        moves[2, k] = shapes[2, k]
 
 
 @numba.njit(cache=True)
@@ -177,11 +179,11 @@ def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
         joint: its number.
         side: 0 of the lower block, 1 of the higher, of one that turns.
         step: as `swing` returned it.
-        force: on the pose, which is held (3,) [N, N, N m].
+        force: on the poses of both faces, which is held (2, 3) [N, N, N m].
         rates: of all joints, added to (j, 2, s, 2, s).
     """
     (c, s), (x, y), (mean, sine, shrunk, falls) = step
-    fx, fy = force[0], force[1]
+    fx, fy = force[side, 0], force[side, 1]
     along = fx * (c * x - s * y) + fy * (s * x + c * y)  # F·R x
     across = -fx * (s * x + c * y) + fy * (c * x - s * y)  # F·J R x
     rates[joint, side, 2, side, 2] += 0.5 * (falls * across - shrunk * along)
