@@ -6,9 +6,12 @@ import pytest
 from archfem.joints.moving import frames
 from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
 from archfem.joints.moving.overlap import Faces
-from archfem.joints.moving.poses import Sides, pose, pose_gradient
+from archfem.joints.moving.poses import Sides, pose, swing
 
 SEEDS = range(12)
+
+KINDS = [(0, False), (3, False), (3, True)]
+"""Shapes of the blocks, and whether block 1 is a fill."""
 
 
 def random_poses(seed):
@@ -27,10 +30,22 @@ def measured(poses, angle):
 def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
-    rates = np.empty((3, 6))
-    frames.discrete(before, after, angle, rates)
-    change = measured(after, angle) - measured(before, angle)
-    assert np.abs(rates @ (after - before).ravel() - change).max() < 4e-15
+    ends, rates, now = np.empty((2, 3)), np.empty((3, 4)), np.empty((3, 4))
+    frames.follow(before, after, angle, ends, rates, now)
+    for end, poses in zip(ends, (before, after), strict=True):
+        assert end == pytest.approx(measured(poses, angle), abs=2e-15)
+    lower, higher = after - before
+    moved = np.array([*(higher - lower)[:2], lower[2], higher[2]])
+    assert np.abs(rates @ moved - (ends[1] - ends[0])).max() < 4e-15
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
+def test_small_turns(x):
+    """Against NumPy, and the derivative of sin x / x against differences of it."""
+    assert frames.small_turn(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
+    assert frames.both(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
+    there, back = (frames.small_turn(x + d)[1] for d in (1e-4, -1e-4))
+    assert frames.small_turn(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
 
 
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
@@ -46,16 +61,20 @@ def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
         assert found[0] - arm * found[2] == pytest.approx(0.0, abs=1e-15)
 
 
-def two_joints(shapes, friction, facets, rng):
-    """Block 0 on block 1 on the ground, with modes or without."""
+def two_joints(shapes, friction, facets, rng, fill=False):
+    """Block 0 on block 1 on the ground, with modes or without; block 1 may be a fill, no stone."""
     count, size = 4, 3 + shapes
     moves, stretch = np.zeros((2, 2, 3, size)), np.zeros((2, 2, size))
     moves[..., 3:] = 0.1 * rng.normal(size=(2, 2, 3, shapes))
     stretch[..., 3:] = 0.1 * rng.normal(size=(2, 2, shapes))
+    if fill:
+        for joint, side in ((0, 1), (1, 0)):
+            moves[joint, side, :, :3] = rng.normal(size=(3, 3))
+            stretch[joint, side, :3] = 0.1 * rng.normal(size=3)
     sides = Sides(
         np.array([[0, size], [size, 0]])[..., None] + np.arange(size),
         np.array([[size, size], [size, 0]]),
-        np.array([[True, True], [True, False]]),
+        np.array([[True, not fill], [not fill, False]]),
         rng.normal(size=(2, 2, 2)),
         moves,
         stretch if shapes else stretch[..., :0],
@@ -102,12 +121,14 @@ def gathered(joints, before, after, late, slid):
 
 @pytest.mark.parametrize("facets", [True, False])
 @pytest.mark.parametrize("friction", [0.5, np.inf])
-@pytest.mark.parametrize("shapes", [0, 3])
-def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(shapes, friction, facets):
+@pytest.mark.parametrize(("shapes", "fill"), KINDS)
+def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(
+    shapes, fill, friction, facets
+):
     """However far blocks move in a step, with damping by a lag and without."""
     rng = np.random.default_rng(shapes)
     for trial in range(40):
-        joints = two_joints(shapes, friction, facets, rng)
+        joints = two_joints(shapes, friction, facets, rng, fill)
         size = 2 * (3 + shapes)
         before = 0.05 * rng.normal(size=size)
         after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-4, -0.5)
@@ -122,12 +143,12 @@ def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(shapes, 
 
 @pytest.mark.parametrize("facets", [True, False])
 @pytest.mark.parametrize("friction", [0.5, np.inf])
-@pytest.mark.parametrize("shapes", [0, 3])
-def test_the_derivative_is_that_of_the_force(shapes, friction, facets):
+@pytest.mark.parametrize(("shapes", "fill"), KINDS)
+def test_the_derivative_is_that_of_the_force(shapes, fill, friction, facets):
     """By central differences, but where the law bends between them: in three of four states."""
     rng, errors = np.random.default_rng(3), []
     for trial in range(40):
-        joints = two_joints(shapes, friction, facets, rng)
+        joints = two_joints(shapes, friction, facets, rng, fill)
         size = 2 * (3 + shapes)
         before = 0.05 * rng.normal(size=size)
         after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-3, -1)
@@ -143,14 +164,17 @@ def test_the_derivative_is_that_of_the_force(shapes, friction, facets):
     assert np.quantile(errors, 0.75) < 1e-7
 
 
+@pytest.mark.parametrize("turns", [True, False])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_pose_follows_its_discrete_derivative(seed):
-    """P Δq = Δp, of a block with modes that turns by radians."""
+def test_the_pose_follows_its_discrete_derivative(seed, turns):
+    """P Δq = Δp, of a block with modes that turns by radians, and of one without a frame."""
     rng = np.random.default_rng(seed)
-    sides = two_joints(3, 0.5, True, rng).sides
+    sides = two_joints(3, 0.5, True, rng, fill=not turns).sides
     before, after = rng.normal(size=(2, 12))
-    poses, rates = np.empty((2, 3)), np.empty((3, 6))
-    for row, q in zip(poses, (before, after), strict=True):
-        pose(sides, 0, 1, q, row)
-    pose_gradient(sides, 0, 1, before, after, rates)
-    assert np.abs(rates @ (after - before)[6:] - (poses[1] - poses[0])).max() < 1e-14
+    poses, moves, found = np.empty((2, 2, 3)), np.zeros((2, 2, 3, 6)), np.empty(3)
+    swing(sides, 0, 1, before, after, poses, moves)
+    for row, q in zip(poses[:, 1], (before, after), strict=True):
+        pose(sides, 0, 1, q, found)
+        assert row == pytest.approx(found, abs=4e-15)
+    change = poses[1, 1] - poses[0, 1]
+    assert np.abs(moves[0, 1] @ (after - before)[6:] - change).max() < 1e-14

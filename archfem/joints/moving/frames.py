@@ -11,34 +11,62 @@ be small.
 
 Over a step the discrete derivative D takes the change of the faces' poses to that of the measures
 exactly, so forces Dᵀ f do the work that f does on the measures (Gonzalez, J. Nonlinear Sci. 6
-(1996) 449, here in closed form). A pose is (x, y, θ), displacement of the middle and angle.
+(1996) 449, here in closed form). A pose is (x, y, θ), displacement of the middle and angle. Both
+blocks move a joint by one jump, so derivatives have four columns: by the jump's x and y, and by the
+angles of the lower and of the higher face.
+
+Sines of angles at the end of a step follow from those at its start by addition theorems: those of
+what a step turns are short series.
 """
 
 import numba
 import numpy as np
 
-SMALL = 1e-4
-"""Angle below which sin x / x is its series, whose next term is x⁴/120."""
+SMALL = 0.25
+"""Angle up to which series are taken [rad]; the terms left out are below 1e-17, of the derivative
+of sin x / x below 1e-14 of it."""
 
 
 @numba.njit(cache=True)
-def sinc(x):  # type: ignore
-    """Return sin x / x.
+def small_turn(x):  # type: ignore
+    """Return cos x, sin x / x and the derivative of the latter.
 
     Args:
         x: angle [rad].
     """
-    return 1.0 - x * x / 6.0 if abs(x) < SMALL else np.sin(x) / x
+    if abs(x) > SMALL:
+        c, s = np.cos(x), np.sin(x) / x
+        return c, s, (c - s) / x
+    y = x * x
+    c = y * (1 / 40320 + y * (-1 / 3628800 + y * (1 / 479001600)))
+    c = 1.0 + y * (-1 / 2 + y * (1 / 24 + y * (-1 / 720 + c)))
+    s = y * (1 / 362880 + y * (-1 / 39916800))
+    s = 1.0 + y * (-1 / 6 + y * (1 / 120 + y * (-1 / 5040 + s)))
+    return c, s, x * (-1 / 3 + y * (1 / 30 + y * (-1 / 840 + y * (1 / 45360 - y * (1 / 3991680)))))
 
 
 @numba.njit(cache=True)
-def sinc_rate(x):  # type: ignore
-    """Return the derivative of sin x / x.
+def both(x):  # type: ignore
+    """Return cos x and sin x.
 
     Args:
         x: angle [rad].
     """
-    return -x / 3.0 if abs(x) < SMALL else (np.cos(x) - np.sin(x) / x) / x
+    c, s, _ = small_turn(x)
+    return c, x * s
+
+
+@numba.njit(cache=True)
+def added(c, s, more_c, more_s):  # type: ignore
+    """Return cosine and sine of the sum of two angles.
+
+    Args:
+        c: cosine of the first [-].
+        s: its sine [-].
+        more_c: cosine of the second [-].
+        more_s: its sine [-].
+    """
+    return c * more_c - s * more_s, s * more_c + c * more_s
 
 
 @numba.njit(cache=True)
@@ -59,82 +87,76 @@ def measures(lower, higher, angle, found):  # type: ignore
 
 
 @numba.njit(cache=True)
-def gradient(pose, angle, rates):  # type: ignore
-    """Find the derivative of the measures by the poses of both faces.
-
-    Args:
-        pose: of the lower and of the higher face (2, 3) [m, m, rad].
-        angle: direction of the joint's normal before anything moved [rad].
-        rates: filled (3, 6).
-    """
-    direction = angle + 0.5 * (pose[0, 2] + pose[1, 2])
-    c, s = np.cos(direction), np.sin(direction)
-    x, y = pose[1, 0] - pose[0, 0], pose[1, 1] - pose[0, 1]
-    opening, slip = c * x + s * y, c * y - s * x
-    turn = np.cos(0.5 * (pose[1, 2] - pose[0, 2]))
-    for side, sign in ((0, -1.0), (3, 1.0)):
-        rates[0, side], rates[0, side + 1], rates[0, side + 2] = sign * c, sign * s, 0.5 * slip
-        rates[1, side], rates[1, side + 1], rates[1, side + 2] = -sign * s, sign * c, -0.5 * opening
-        rates[2, side], rates[2, side + 1], rates[2, side + 2] = 0.0, 0.0, sign * turn
-
-
-@numba.njit(cache=True)
-def discrete(before, after, angle, rates):  # type: ignore
-    """Find D, which takes the change of the poses over a step to that of the measures.
+def follow(before, after, angle, ends, rates, now):  # type: ignore
+    """Find the measures at both ends of a step, and their derivatives.
 
     Args:
         before: poses of both faces at the start (2, 3) [m, m, rad].
         after: poses at the end (2, 3) [m, m, rad].
         angle: direction of the joint's normal before anything moved [rad].
-        rates: filled (3, 6).
+        ends: opening, slip and turn at the start and at the end, filled (2, 3 or more).
+        rates: D, which takes the change of the poses to that of the measures, filled (3, 4).
+        now: derivative at the end, filled (3, 4).
+
+    Returns:
+        What `bend` needs to know of the step.
     """
     first = angle + 0.5 * (before[0, 2] + before[1, 2])
-    change = 0.5 * (after[0, 2] + after[1, 2]) - 0.5 * (before[0, 2] + before[1, 2])
-    middle, shrunk, mean = first + 0.5 * change, sinc(0.5 * change), np.cos(0.5 * change)
-    c, s = np.cos(middle), np.sin(middle)
-    x = 0.5 * (before[1, 0] - before[0, 0] + after[1, 0] - after[0, 0])
-    y = 0.5 * (before[1, 1] - before[0, 1] + after[1, 1] - after[0, 1])
+    turns = after[0, 2] - before[0, 2], after[1, 2] - before[1, 2]
+    half, quarter = 0.25 * (turns[0] + turns[1]), 0.25 * (turns[1] - turns[0])
+    mean, shrunk, falls = small_turn(half)
+    c0, s0 = np.cos(first), np.sin(first)
+    c, s = added(c0, s0, mean, half * shrunk)
+    c1, s1 = added(c, s, mean, half * shrunk)
+    x0, y0 = before[1, 0] - before[0, 0], before[1, 1] - before[0, 1]
+    x1, y1 = after[1, 0] - after[0, 0], after[1, 1] - after[0, 1]
+    ends[0, 0], ends[0, 1] = c0 * x0 + s0 * y0, c0 * y0 - s0 * x0
+    ends[1, 0], ends[1, 1] = c1 * x1 + s1 * y1, c1 * y1 - s1 * x1
+    start = 0.5 * (before[1, 2] - before[0, 2])
+    near, less, drops = small_turn(quarter)
+    cosine, sine = both(start)
+    ends[0, 2] = 2.0 * sine
+    cosine, sine = added(cosine, sine, near, quarter * less)
+    last = added(cosine, sine, near, quarter * less)
+    ends[1, 2] = 2.0 * last[1]
+    x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     across, along = 0.5 * shrunk * (c * x + s * y), 0.5 * shrunk * (c * y - s * x)
-    start, end = before[1, 2] - before[0, 2], after[1, 2] - after[0, 2]
-    turn = sinc(0.25 * (end - start)) * np.cos(0.25 * (start + end))
-    c, s = mean * c, mean * s
-    for side, sign in ((0, -1.0), (3, 1.0)):
-        rates[0, side], rates[0, side + 1], rates[0, side + 2] = sign * c, sign * s, along
-        rates[1, side], rates[1, side + 1], rates[1, side + 2] = -sign * s, sign * c, -across
-        rates[2, side], rates[2, side + 1], rates[2, side + 2] = 0.0, 0.0, sign * turn
+    _fill(rates, (mean * c, mean * s), (along, across), less * cosine)
+    _fill(now, (c1, s1), (0.5 * ends[1, 1], 0.5 * ends[1, 0]), last[0])
+    by_turn = 0.25 * (drops * cosine - less * sine)
+    return (c, s), (c1, s1), (x, y), (shrunk, falls), by_turn
 
 
 @numba.njit(cache=True)
-def bend(before, after, angle, force, rates):  # type: ignore
-    """Find the derivative of Dᵀ f by the poses at the end, with f held.
+def _fill(rates, normal, arms, turn):  # type: ignore
+    """Write down a derivative."""
+    (c, s), (along, across) = normal, arms
+    rates[0, 0], rates[0, 1], rates[0, 2], rates[0, 3] = c, s, along, along
+    rates[1, 0], rates[1, 1], rates[1, 2], rates[1, 3] = -s, c, -across, -across
+    rates[2, 0], rates[2, 1], rates[2, 2], rates[2, 3] = 0.0, 0.0, -turn, turn
+
+
+@numba.njit(cache=True)
+def bend(step, force, rates):  # type: ignore
+    """Add the derivative of Dᵀ f by the jump and the angles at the end, with f held.
 
     Args:
-        before: poses of both faces at the start (2, 3) [m, m, rad].
-        after: poses at the end (2, 3) [m, m, rad].
-        angle: direction of the joint's normal before anything moved [rad].
-        force: f, on opening, slip and turn (3,) [N, N, N m].
-        rates: filled (6, 6).
+        step: as `follow` returned it.
+        force: f, on opening, slip and turn (3 or more,) [N, N, N m].
+        rates: added to (4, 4).
     """
-    first = angle + 0.5 * (before[0, 2] + before[1, 2])
-    change = 0.5 * (after[0, 2] + after[1, 2]) - 0.5 * (before[0, 2] + before[1, 2])
-    middle, end = first + 0.5 * change, first + change
-    c, s = np.cos(end), np.sin(end)
-    pull = (-0.5 * force[0] * s - 0.5 * force[1] * c, 0.5 * force[0] * c - 0.5 * force[1] * s)
-    c, s = np.cos(middle), np.sin(middle)
-    arm = (-force[0] * s - force[1] * c, force[0] * c - force[1] * s)  # f_g t_m - f_s n_m
-    x = 0.5 * (before[1, 0] - before[0, 0] + after[1, 0] - after[0, 0])
-    y = 0.5 * (before[1, 1] - before[0, 1] + after[1, 1] - after[0, 1])
-    shrunk, falls = sinc(0.5 * change), sinc_rate(0.5 * change)
-    by_angle = 0.5 * falls * (arm[0] * x + arm[1] * y) + 0.5 * shrunk * (-arm[1] * x + arm[0] * y)
-    by_angle *= 0.25
-    by_place = (0.25 * shrunk * arm[0], 0.25 * shrunk * arm[1])
-    start, stop = before[1, 2] - before[0, 2], after[1, 2] - after[0, 2]
-    quarter, half = 0.25 * (stop - start), 0.25 * (start + stop)
-    by_turn = 0.25 * (sinc_rate(quarter) * np.cos(half) - sinc(quarter) * np.sin(half)) * force[2]
-    rates[:] = 0.0
-    for side, sign in ((0, -1.0), (3, 1.0)):
-        for other, against in ((0, -1.0), (3, 1.0)):
-            for axis in range(2):
-                rates[side + axis, other + 2] = 0.5 * sign * pull[axis]
-                rates[side + 2, other + axis] = against * by_place[axis]
-            rates[side + 2, other + 2] = by_angle + sign * against * by_turn
+    (c, s), (c1, s1), (x, y), (shrunk, falls), by_turn = step
+    f, g = force[0], force[1]
+    ax, ay = -f * s - g * c, f * c - g * s  # f_g t_m - f_s n_m
+    by_angle = 0.125 * (falls * (ax * x + ay * y) + shrunk * (ax * y - ay * x))
+    by_turn *= force[2]
+    pull = (-0.25 * (f * s1 + g * c1), 0.25 * (f * c1 - g * s1))
+    place = (0.25 * shrunk * ax, 0.25 * shrunk * ay)
+    for axis in range(2):
+        for side in range(2, 4):
+            rates[axis, side] += pull[axis]
+            rates[side, axis] += place[axis]
+    rates[2, 2] += by_angle + by_turn
+    rates[3, 3] += by_angle + by_turn
+    rates[2, 3] += by_angle - by_turn
+    rates[3, 2] += by_angle - by_turn

@@ -11,9 +11,9 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import bend, discrete, gradient, measures
+from archfem.joints.moving.frames import bend, follow, measures
 from archfem.joints.moving.overlap import Faces, lap, press_faces, stored
-from archfem.joints.moving.poses import Sides, pose, pose_bend, pose_gradient, stretched
+from archfem.joints.moving.poses import Sides, pose, stretched, swing, swing_bend
 from archfem.joints.moving.rubbing import limit_faces, rub_faces
 
 
@@ -177,103 +177,114 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         found: `Answer`, filled.
     """
     sides, size = joints.sides, found.force.shape[2]
-    poses, ends = np.empty((2, 2, 3)), np.empty((2, 4))
-    rates, now, curved = np.empty((3, 6)), np.empty((3, 6)), np.empty((6, 6))
-    own, last = np.empty((2, 3, size)), np.empty((2, 3, size))
-    turned, force, rate = np.empty((size, size)), np.empty(4), np.empty((4, 4))
-    pushed = np.empty(6)
-    normals = np.empty((len(slid), 4))
+    poses, moves, ends = np.empty((2, 2, 3)), np.empty((2, 2, 3, size)), np.empty((2, 4))
+    by_faces, curved, pushed = np.empty((2, 3, 4)), np.empty((4, 4)), np.empty((2, 3))
+    force, rate, normals = np.empty(4), np.empty((4, 4)), np.empty((len(slid), 4))
+    stretches = sides.stretch.shape[2] > 0
+    longer = np.empty((2, 2, size if stretches else 0))
     found.resultants[:] = 0.0
     for joint in range(len(joints.angle)):
-        for side in range(2):
-            pose(sides, joint, side, before, poses[0, side])
-            pose(sides, joint, side, after, poses[1, side])
-            pose_gradient(sides, joint, side, before, after, own[side])
-            pose_gradient(sides, joint, side, after, after, last[side])
-        angle = joints.angle[joint]
-        for end in range(2):
-            measures(poses[end, 0], poses[end, 1], angle, ends[end])
+        swings = (
+            swing(sides, joint, 0, before, after, poses, moves),
+            swing(sides, joint, 1, before, after, poses, moves),
+        )
+        step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
         ends[0, 3], ends[1, 3] = stretched(sides, joint, before), stretched(sides, joint, after)
-        discrete(poses[0], poses[1], angle, rates)
-        gradient(poses[1], angle, now)
         lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
         limit_faces(joints.faces, joint, ends, late, normals)
         shear, rubbing = rub_faces(
             joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
         )
         found.lost[joint] = lagging + rubbing
-        _sum_up(joints, joint, force, shear, found.resultants)
-        bend(poses[0], poses[1], angle, force, curved)
-        _between(rates, rate, now, curved)
-        _pushed(rates, force, pushed)
+        whole, hand = joints.whole[joint], joints.hand[joint]
+        found.resultants[whole, 0] -= force[0]
+        found.resultants[whole, 1] += hand * shear
+        found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
+        _between(by_faces, rate, curved)
+        bend(step, force, curved)
         for side in range(2):
-            pushing = pushed[3 * side : 3 * side + 3]
-            _pushed(own[side], pushing, found.force[joint, side])
-            pose_bend(sides, joint, side, before, after, pushing, turned)
+            _push(by_faces, force, side, pushed)
+            count = sides.size[joint, side]
+            _gather(joint, side, count, moves, pushed, found.force)
             for other in range(2):
-                block = found.rate[joint, side, :, other, :]
-                block[:] = 0.0
-                if other == side:
-                    block[:] = turned
-                part = curved[3 * side : 3 * side + 3, 3 * other : 3 * other + 3]
-                _between(own[side], part, last[other], block)
-        if sides.stretch.shape[2] > 0:
-            _stretch(sides, joint, (force, rate), (rates, now), (own, last), found)
+                counts = count, sides.size[joint, other]
+                _spread((joint, side, other), counts, moves, curved, found.rate)
+            if sides.turns[joint, side]:
+                swing_bend(sides, joint, side, swings[side], pushed, found.rate)
+        if stretches:
+            _stretch(sides, joint, (force, rate), by_faces, moves, longer, found)
 
 
 @numba.njit(cache=True)
-def _sum_up(joints, joint, force, shear, resultants):  # type: ignore
-    """Add a joint's, or a piece's, forces to N, V, M of the whole."""
-    whole, hand = joints.whole[joint], joints.hand[joint]
-    resultants[whole, 0] -= force[0]
-    resultants[whole, 1] += hand * shear
-    resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
+def _between(by_faces, rate, found):  # type: ignore
+    """Dᵀ rate B, of all that faces can do to the joint (4, 4)."""
+    for column in range(4):
+        for row in range(4):
+            found[row, column] = 0.0
+        for k in range(3):
+            value = 0.0
+            for j in range(3):
+                value += rate[k, j] * by_faces[1, j, column]
+            for row in range(4):
+                found[row, column] += by_faces[0, k, row] * value
 
 
 @numba.njit(cache=True)
-def _stretch(sides, joint, law, frame, poses, found):  # type: ignore
+def _push(by_faces, force, side, found):  # type: ignore
+    """Forces on the pose of a face."""
+    sign, turn = 2.0 * side - 1.0, 0.0
+    for row in range(3):
+        turn += by_faces[0, row, 2 + side] * force[row]
+    found[side, 0] = sign * (by_faces[0, 0, 0] * force[0] + by_faces[0, 1, 0] * force[1])
+    found[side, 1] = sign * (by_faces[0, 0, 1] * force[0] + by_faces[0, 1, 1] * force[1])
+    found[side, 2] = turn
+
+
+@numba.njit(cache=True)
+def _gather(joint, side, count, moves, pushed, found):  # type: ignore
+    """Forces on the coordinates of a block."""
+    x, y, turn = pushed[side, 0], pushed[side, 1], pushed[side, 2]
+    for k in range(count):
+        value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
+        found[joint, side, k] = value + moves[0, side, 2, k] * turn
+
+
+@numba.njit(cache=True)
+def _spread(where, counts, moves, curved, found):  # type: ignore
+    """Derivative of the forces on a block by the coordinates of one."""
+    joint, side, other = where
+    toward, against, row, last = 2.0 * side - 1.0, 2.0 * other - 1.0, 2 + side, 2 + other
+    for column in range(counts[1]):
+        a, b = against * moves[1, other, 0, column], against * moves[1, other, 1, column]
+        c = moves[1, other, 2, column]
+        x = toward * (curved[0, 0] * a + curved[0, 1] * b + curved[0, last] * c)
+        y = toward * (curved[1, 0] * a + curved[1, 1] * b + curved[1, last] * c)
+        turn = curved[row, 0] * a + curved[row, 1] * b + curved[row, last] * c
+        for k in range(counts[0]):
+            value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
+            found[joint, side, k, other, column] = value + moves[0, side, 2, k] * turn
+
+
+@numba.njit(cache=True)
+def _stretch(sides, joint, law, by_faces, moves, longer, found):  # type: ignore
     """Add what the stretch of the faces does: its force, and how all forces change with it."""
-    (force, rate), (rates, now), (own, last) = law, frame, poses
-    size = own.shape[2]
-    by_after, by_first = np.zeros((2, size)), np.zeros((2, size))
-    for side in range(2):
-        for pose_part in range(3):
-            column = 3 * side + pose_part
-            by_now = rate[3, 0] * now[0, column] + rate[3, 1] * now[1, column]
-            by_now += rate[3, 2] * now[2, column]
-            for k in range(sides.size[joint, side]):
-                by_after[side, k] += by_now * last[side, pose_part, k]
-                by_first[side, k] += rates[1, column] * rate[1, 3] * own[side, pose_part, k]
+    force, rate = law
+    for side, sign in ((0, -1.0), (1, 1.0)):  # of the stretch by all, of all by the stretch
+        for k in range(sides.size[joint, side]):
+            longer[0, side, k] = longer[1, side, k] = 0.0
+            for end in range(2):
+                x, y, turn = moves[end, side, 0, k], moves[end, side, 1, k], moves[end, side, 2, k]
+                for row in range(3):
+                    value = sign * (by_faces[end, row, 0] * x + by_faces[end, row, 1] * y)
+                    value += by_faces[end, row, 2 + side] * turn
+                    factor = rate[3, row] if end else rate[row, 3]
+                    longer[1 - end, side, k] += factor * value
     for side, sign in ((0, -1.0), (1, 1.0)):
         for k in range(sides.size[joint, side]):
             pulled = sign * sides.stretch[joint, side, k]
             found.force[joint, side, k] += force[3] * pulled
             for other, against in ((0, -1.0), (1, 1.0)):
                 for m in range(sides.size[joint, other]):
-                    longer = against * sides.stretch[joint, other, m]
-                    found.rate[joint, side, k, other, m] += (
-                        pulled * (by_after[other, m] + rate[3, 3] * longer)
-                        + by_first[side, k] * longer
-                    )
-
-
-@numba.njit(cache=True)
-def _pushed(rates, force, found):  # type: ignore
-    """Ratesᵀ force, filled."""
-    for column in range(len(found)):
-        found[column] = 0.0
-        for row in range(3):
-            found[column] += rates[row, column] * force[row]
-
-
-@numba.njit(cache=True)
-def _between(left, middle, right, found):  # type: ignore
-    """Leftᵀ middle right, added."""
-    for column in range(left.shape[1]):
-        for k in range(3):
-            value = 0.0
-            for row in range(3):
-                value += left[row, column] * middle[row, k]
-            if value != 0.0:
-                for other in range(right.shape[1]):
-                    found[column, other] += value * right[k, other]
+                    more = against * sides.stretch[joint, other, m]
+                    value = pulled * (longer[0, other, m] + rate[3, 3] * more)
+                    found.rate[joint, side, k, other, m] += value + longer[1, side, k] * more

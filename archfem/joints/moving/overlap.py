@@ -134,14 +134,12 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     Returns:
         Energy that the lag takes [J].
     """
-    (l0, _), (l1, shrinks) = (
-        lap(faces, joint, ends[0, 1]),
-        lap(faces, joint, ends[1, 1]),
-    )
+    first, last = lap(faces, joint, ends[0, 1]), lap(faces, joint, ends[1, 1])
+    l0, (l1, shrinks) = first[0], last
     mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
     widens = 0.5 * shrinks
     total = moment = lost = 0.0
-    total_by, moment_by = np.zeros(3), np.zeros(3)
+    rate[:] = 0.0  # in the rows of opening and turn, derivatives of total and moment at first
     stride = 2 if faces.facets else 1
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
         x0 = faces.place[point]
@@ -163,29 +161,26 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
         for k in range(3):
             by_b, by_d = gap_rate(k, x0, l1, shrinks, ends), gap_rate(k, x1, l1, shrinks, ends)
             near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            total_by[k] += share * (near + far)
-            moment_by[k] += share * (x0 * near + x1 * far)
+            rate[0, k] += share * (near + far)
+            rate[2, k] += share * (x0 * near + x1 * far)
             wider = widens if k == 1 else 0.0
             normals[point, 1 + k] = scale * (mean * near + wider * n0)
             if faces.facets:
                 normals[point + 1, 1 + k] = scale * (mean * far + wider * n1)
     before = stored(faces, joint, l0, ends[0, 0], ends[0, 2])[0]
     after, whole, tilted = stored(faces, joint, l1, ends[1, 0], ends[1, 2])
-    slope, bends = _slope(
-        ends[0, 1], ends[1, 1], lap(faces, joint, ends[0, 1]), lap(faces, joint, ends[1, 1])
-    )
+    slope, bends = _slope(ends[0, 1], ends[1, 1], first, last)
     push = 0.5 * (before + after) - mean * turn * moment
-    rate[3, :], rate[:, 3], force[3] = 0.0, 0.0, 0.0
     force[0] = stiff * mean * total
     force[1] = stiff * slope * push
-    force[2] = -stiff * mean * mean * moment
+    force[2], force[3] = -stiff * mean * mean * moment, 0.0
     by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
     for k in range(3):
-        wider, turns = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0
-        rate[0, k] = stiff * (mean * total_by[k] + wider * total)
-        rate[2, k] = -stiff * mean * (mean * moment_by[k] + 2.0 * wider * moment)
+        wider, turns, tilts = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0, rate[2, k]
+        rate[0, k] = stiff * (mean * rate[0, k] + wider * total)
+        rate[2, k] = -stiff * mean * (mean * tilts + 2.0 * wider * moment)
         change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
-        change -= mean * turn * moment_by[k]
+        change -= mean * turn * tilts
         rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
     return stiff * mean * lost
 

@@ -15,10 +15,9 @@ E ξ.
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import sinc, sinc_rate
+from archfem.joints.moving.frames import added, both, small_turn
 
 
 class Sides(NamedTuple):
@@ -34,7 +33,7 @@ class Sides(NamedTuple):
         shapes: U and Θ, x, y and angle of the face per coordinate, 0 of the frame (j, 2, 3, s).
         stretch: how much longer the face gets per coordinate (j, 2, s); without a last axis to
             speak of, (j, 2, 0), where no face stretches.
-        held: pose where the block does not move (j, 2, 3) [m, m, rad].
+        held: pose where the block does not move, 0 where it does (j, 2, 3) [m, m, rad].
     """
 
     index: Any
@@ -47,37 +46,25 @@ class Sides(NamedTuple):
 
 
 @numba.njit(cache=True)
-def _first(sides, joint, side):  # type: ignore
-    """The first of the coordinates that is not of the frame."""
-    return 3 if sides.turns[joint, side] else 0
+def _shaped(shapes, index, span, q):  # type: ignore
+    """U ξ and Θ ξ of a face."""
+    x = y = turn = 0.0
+    for k in range(span[0], span[1]):
+        own = q[index[k]]
+        x += shapes[0, k] * own
+        y += shapes[1, k] * own
+        turn += shapes[2, k] * own
+    return x, y, turn
 
 
 @numba.njit(cache=True)
-def _strained(sides, joint, side, q):  # type: ignore
-    """U ξ."""
-    x = y = 0.0
-    for k in range(_first(sides, joint, side), sides.size[joint, side]):
-        own = q[sides.index[joint, side, k]]
-        x += sides.shapes[joint, side, 0, k] * own
-        y += sides.shapes[joint, side, 1, k] * own
-    return x, y
-
-
-@numba.njit(cache=True)
-def _reach(sides, joint, side, q):  # type: ignore
-    """R + U ξ."""
-    x, y = _strained(sides, joint, side, q)
-    return sides.arm[joint, side, 0] + x, sides.arm[joint, side, 1] + y
-
-
-@numba.njit(cache=True)
-def _midway(sides, joint, side, before, after):  # type: ignore
-    """Half-way through a step: r + U ξ on the mean, half the turn, and cosine and sine there."""
-    turn = sides.index[joint, side, 2]
-    (x0, y0), (x1, y1) = _reach(sides, joint, side, before), _reach(sides, joint, side, after)
-    half = 0.5 * (after[turn] - before[turn])
-    middle = before[turn] + half
-    return (0.5 * (x0 + x1), 0.5 * (y0 + y1)), half, (np.cos(middle), np.sin(middle))
+def _turned(arm, shift, half):  # type: ignore
+    """R r - r + R u, of cosine and sine of half the angle; and cosine and sine of the angle."""
+    (rx, ry), (dx, dy), (ch, sh) = arm, shift, half
+    less, s = -2.0 * sh * sh, 2.0 * sh * ch  # cos θ - 1, sin θ
+    c = 1.0 + less
+    x, y = less * rx - s * ry + c * dx - s * dy, s * rx + less * ry + s * dx + c * dy
+    return (x, y), (c, s)
 
 
 @numba.njit(cache=True)
@@ -109,79 +96,100 @@ def pose(sides, joint, side, q, found):  # type: ignore
         q: coordinates (n,).
         found: filled (3,) [m, m, rad].
     """
-    size, index = sides.size[joint, side], sides.index[joint, side]
-    if size == 0:
-        found[:] = sides.held[joint, side]
+    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
+    size = sides.size[joint, side]
+    if not sides.turns[joint, side]:
+        dx, dy, turn = _shaped(shapes, index, (0, size), q)
+        found[0] = sides.held[joint, side, 0] + dx
+        found[1] = sides.held[joint, side, 1] + dy
+        found[2] = sides.held[joint, side, 2] + turn
         return
-    dx, dy = _strained(sides, joint, side, q)
+    dx, dy, turn = _shaped(shapes, index, (3, size), q)
+    arm = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
+    (x, y), _ = _turned(arm, (dx, dy), both(0.5 * q[index[2]]))
+    found[0], found[1], found[2] = q[index[0]] + x, q[index[1]] + y, q[index[2]] + turn
+
+
+@numba.njit(cache=True)
+def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
+    """Find the poses of a face at both ends of a step, and their derivatives.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        before: coordinates at the start (n,).
+        after: coordinates at the end (n,).
+        poses: at the start and at the end, of both sides, filled for this one (2, 2, 3).
+        moves: what takes the change of coordinates over the step to that of the pose, and the
+            derivative at the end, filled for this side in the first columns (2, 2, 3, s).
+
+    Returns:
+        What `swing_bend` needs to know of the step, of a block that turns.
+    """
+    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
+    size = sides.size[joint, side]
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
-    if sides.turns[joint, side]:
-        turn = q[index[2]]
-        c, s = np.cos(turn), np.sin(turn)
-        less = -2.0 * np.sin(0.5 * turn) ** 2  # cos θ - 1
-        found[0] = q[index[0]] + less * rx - s * ry + c * dx - s * dy
-        found[1] = q[index[1]] + s * rx + less * ry + s * dx + c * dy
-        found[2] = turn
-    else:
-        found[0], found[1], found[2] = dx, dy, 0.0
-    for k in range(_first(sides, joint, side), size):
-        found[2] += sides.shapes[joint, side, 2, k] * q[index[k]]
+    if not sides.turns[joint, side]:
+        pose(sides, joint, side, before, poses[0, side])
+        pose(sides, joint, side, after, poses[1, side])
+        for k in range(size):
+            for row in range(3):
+                moves[0, side, row, k] = moves[1, side, row, k] = shapes[row, k]
+        return (1.0, 0.0), (rx, ry), (1.0, 0.0, 1.0, 0.0)
+    x, y, turn = index[0], index[1], index[2]
+    half = 0.5 * (after[turn] - before[turn])
+    mean, shrunk, falls = small_turn(half)
+    start = both(0.5 * before[turn])
+    u0, v0, tilt = _shaped(shapes, index, (3, size), before)
+    (dx, dy), (c, s) = _turned((rx, ry), (u0, v0), start)
+    poses[0, side, 0], poses[0, side, 1] = before[x] + dx, before[y] + dy
+    poses[0, side, 2] = before[turn] + tilt
+    u1, v1, tilt = _shaped(shapes, index, (3, size), after)
+    end = added(start[0], start[1], mean, half * shrunk)
+    (dx, dy), last = _turned((rx, ry), (u1, v1), end)
+    poses[1, side, 0], poses[1, side, 1] = after[x] + dx, after[y] + dy
+    poses[1, side, 2] = after[turn] + tilt
+    _turning(shapes, size, (last, 1.0, 1.0), (rx + u1, ry + v1), moves[1, side])
+    middle = added(c, s, mean, half * shrunk)
+    reach = rx + 0.5 * (u0 + u1), ry + 0.5 * (v0 + v1)
+    _turning(shapes, size, (middle, mean, shrunk), reach, moves[0, side])
+    return middle, reach, (mean, half * shrunk, shrunk, falls)
 
 
 @numba.njit(cache=True)
-def pose_gradient(sides, joint, side, before, after, rates):  # type: ignore
-    """Find what takes the change of coordinates over a step to that of the pose of a face.
+def _turning(shapes, size, turn, reach, moves):  # type: ignore
+    """Write down a derivative of a pose by the frame and by the shapes."""
+    ((c, s), mean, shrunk), (x, y) = turn, reach
+    moves[0, 0], moves[0, 1], moves[0, 2] = 1.0, 0.0, -shrunk * (s * x + c * y)
+    moves[1, 0], moves[1, 1], moves[1, 2] = 0.0, 1.0, shrunk * (c * x - s * y)
+    moves[2, 0], moves[2, 1], moves[2, 2] = 0.0, 0.0, 1.0
+    for k in range(3, size):
+        u, v = shapes[0, k], shapes[1, k]
+        moves[0, k], moves[1, k] = mean * (c * u - s * v), mean * (s * u + c * v)
+        moves[2, k] = shapes[2, k]
 
-    With both ends the same it is the derivative there.
+
+@numba.njit(cache=True)
+def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
+    """Add the derivative of generalised forces on a face by the coordinates at the end.
 
     Args:
         sides: `Sides`.
         joint: its number.
-        side: 0 of the lower block, 1 of the higher.
-        before: coordinates at the start (n,).
-        after: coordinates at the end (n,).
-        rates: filled in its first columns (3, s).
+        side: 0 of the lower block, 1 of the higher, of one that turns.
+        step: as `swing` returned it.
+        force: on the poses of both faces, which is held (2, 3) [N, N, N m].
+        rates: of all joints, added to (j, 2, s, 2, s).
     """
-    size = sides.size[joint, side]
-    rates[:] = 0.0
-    if not sides.turns[joint, side]:
-        rates[:, :size] = sides.shapes[joint, side, :, :size]
-        return
-    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
-    shrunk, mean = sinc(half), np.cos(half)
-    rates[0, 0] = rates[1, 1] = rates[2, 2] = 1.0
-    rates[0, 2], rates[1, 2] = -shrunk * (s * x + c * y), shrunk * (c * x - s * y)
-    for k in range(3, size):
+    (c, s), (x, y), (mean, sine, shrunk, falls) = step
+    fx, fy = force[side, 0], force[side, 1]
+    along = fx * (c * x - s * y) + fy * (s * x + c * y)  # F·R x
+    across = -fx * (s * x + c * y) + fy * (c * x - s * y)  # F·J R x
+    rates[joint, side, 2, side, 2] += 0.5 * (falls * across - shrunk * along)
+    for k in range(3, sides.size[joint, side]):
         u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
-        rates[0, k], rates[1, k] = mean * (c * u - s * v), mean * (s * u + c * v)
-        rates[2, k] = sides.shapes[joint, side, 2, k]
-
-
-@numba.njit(cache=True)
-def pose_bend(sides, joint, side, before, after, force, rates):  # type: ignore
-    """Find the derivative of generalised forces on a face by the coordinates at the end.
-
-    Args:
-        sides: `Sides`.
-        joint: its number.
-        side: 0 of the lower block, 1 of the higher.
-        before: coordinates at the start (n,).
-        after: coordinates at the end (n,).
-        force: on the pose, which is held (3,) [N, N, N m].
-        rates: filled in its first rows and columns (s, s).
-    """
-    size = sides.size[joint, side]
-    rates[:] = 0.0
-    if not sides.turns[joint, side]:
-        return
-    (x, y), half, (c, s) = _midway(sides, joint, side, before, after)
-    shrunk, mean = sinc(half), np.cos(half)
-    along = force[0] * (c * x - s * y) + force[1] * (s * x + c * y)  # F·R x
-    across = -force[0] * (s * x + c * y) + force[1] * (c * x - s * y)  # F·J R x
-    rates[2, 2] = 0.5 * (sinc_rate(half) * across - shrunk * along)
-    for k in range(3, size):
-        u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
-        straight = force[0] * (c * u - s * v) + force[1] * (s * u + c * v)
-        turned = -force[0] * (s * u + c * v) + force[1] * (c * u - s * v)
-        rates[k, 2] = 0.5 * (mean * turned - np.sin(half) * straight)
-        rates[2, k] = 0.5 * shrunk * turned
+        straight = fx * (c * u - s * v) + fy * (s * u + c * v)
+        turned = -fx * (s * u + c * v) + fy * (c * u - s * v)
+        rates[joint, side, k, side, 2] += 0.5 * (mean * turned - sine * straight)
+        rates[joint, side, 2, side, k] += 0.5 * shrunk * turned

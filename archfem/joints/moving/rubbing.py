@@ -30,8 +30,9 @@ def limit_faces(faces, joint, ends, late, limits):  # type: ignore
     if friction == np.inf:
         return
     for point in range(faces.first[joint], faces.first[joint + 1]):
-        limits[point] *= friction
-        limits[point, 0] = max(limits[point, 0], 0.0)
+        limits[point, 0] = friction * max(limits[point, 0], 0.0)
+        for k in range(1, 4):
+            limits[point, k] *= friction
     if cohesion == 0.0:
         return
     l0, (l1, shrinks) = (
