@@ -23,9 +23,9 @@ from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
 
 KINDS = (
+    "large displacements",
     "compliance, Conserving",
     "contact, Conserving",
-    "large displacements",
     "compliance, Newmark",
     "contact, Newmark",
     "chain, Newmark",
