@@ -46,7 +46,7 @@ def drift(energies):
     return np.abs(balance).max() / largest, energy[:, 3].min() / largest
 
 
-@pytest.mark.parametrize("dt", [8e-3, 2e-3])
+@pytest.mark.parametrize("dt", [8e-3, pytest.param(2e-3, marks=pytest.mark.slow)])
 def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
     """m (g + t s̈) = N and m s̈ = -μ N: it stops after v² (1 + μ t) / (2 μ g), risen by t of that.
 

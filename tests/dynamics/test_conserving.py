@@ -226,7 +226,15 @@ def shaken(fidelity, rule, method):
 
 @pytest.mark.parametrize("method", ["contact", "compliance"])
 @pytest.mark.parametrize("rule", ["lobatto", "exact"])
-@pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
+@pytest.mark.parametrize(
+    "fidelity",
+    [
+        "rigid",
+        pytest.param("faces", marks=pytest.mark.slow),
+        pytest.param("condensed", marks=pytest.mark.slow),
+        "full",
+    ],
+)
 def test_strategies_step_as_snes_does(fidelity, rule, method):
     """To 1e-8 over 60 steps in which joints open and slide; some are glued."""
     slow, fast = (shaken(fidelity, rule, each) for each in ("snes", method))

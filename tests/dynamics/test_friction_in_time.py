@@ -92,7 +92,10 @@ def test_a_block_below_its_limit_does_not_slide():
     assert energy[:, 3].sum() < 0.1 * elastic * 0.3 * 2e3
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.2, 0.3])
+@pytest.mark.parametrize(
+    "friction",
+    [pytest.param(0.1, marks=pytest.mark.slow), 0.2, pytest.param(0.3, marks=pytest.mark.slow)],
+)
 def test_newmarks_block_under_an_earthquake(friction):
     """A synthetic motion: within 1e-3 of the way that it slides to and fro.
 

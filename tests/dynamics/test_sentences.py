@@ -94,7 +94,7 @@ def test_the_verdict_of_files(run, tmp_path):
     assert moved.startswith("verified: local")
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
 def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelity, scheme):
     """Of every method those of SNES, and at each frame those that the coordinates give."""
@@ -139,6 +139,7 @@ def paced(model, motion):
     return af.time_history(model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)))
 
 
+@pytest.mark.slow
 def test_mechanisms_too_short_to_count_are_told(paced):
     """By a loop over the record: what counts lasts long enough, and what came before is named."""
     step = np.diff(paced.time, prepend=0.0)

@@ -17,7 +17,7 @@ DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
+@pytest.mark.parametrize("rule", [pytest.param("lobatto", marks=pytest.mark.slow), "exact"])
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
 def test_contact_stepper_falls_back(ring, rule, scheme):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""

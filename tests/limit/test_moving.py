@@ -130,7 +130,7 @@ def test_more_cover_spreads_axles_and_carries_more():
     assert (np.diff(worst) > 0.0).all()
 
 
-@pytest.mark.parametrize("friction", ["nonassociated", None])
+@pytest.mark.parametrize("friction", [pytest.param("nonassociated", marks=pytest.mark.slow), None])
 def test_options_are_those_of_collapse_factor(friction, monkeypatch):
     monkeypatch.setattr("archfem.limit.sliding.STARTS", 2)  # both search from the same ones
     structure = arch_bridge(voussoirs=9)

@@ -192,7 +192,9 @@ HALVES = [[0.5, 0.5], [1.0]]
     [
         pytest.param(wall(HALVES * 2, 0.5), 0.01, marks=pytest.mark.slow),
         pytest.param(wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0, marks=pytest.mark.slow),
-        (ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0),
+        pytest.param(
+            ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0, marks=pytest.mark.slow
+        ),
         (ring(voussoirs=7, thickness=0.8, contact=rough(0.3, 1e3)), 0.0),
     ],
     ids=["pile", "corner", "ring", "glued ring"],

@@ -147,7 +147,16 @@ def scaled_jacobians(cells):
 
 @pytest.mark.parametrize("make", [viaduct, one_arch])
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize(
+    "count",
+    [
+        pytest.param(1, marks=pytest.mark.slow),
+        2,
+        3,
+        pytest.param(4, marks=pytest.mark.slow),
+        pytest.param(6, marks=pytest.mark.slow),
+    ],
+)
 def test_meshes_of_bridges_are_sound(make, cell, count):
     """Sharp wedges and strips between stones included; slender triangles lie in slender stones."""
     structure = make(paving=af.shapes.Paving(thickness=0.2))

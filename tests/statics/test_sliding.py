@@ -87,7 +87,10 @@ def groove(friction):
 
 
 @pytest.mark.parametrize("control", ["displacement", "arc length", "force"])
-@pytest.mark.parametrize("friction", [0.0, 0.2, 0.45])
+@pytest.mark.parametrize(
+    "friction",
+    [pytest.param(0.0, marks=pytest.mark.slow), 0.2, pytest.param(0.45, marks=pytest.mark.slow)],
+)
 def test_a_wedge_slides_out_of_its_groove(friction, control):
     """Pushed sideways it slides up the one face and leaves the other: λ = tan(45° + φ).
 

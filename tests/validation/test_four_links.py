@@ -125,7 +125,7 @@ def test_published_points_of_the_four_links():
     ("normal", "peak"),
     [
         (1e9, 0.2863),
-        (1e10, 0.3301),
+        pytest.param(1e10, 0.3301, marks=pytest.mark.slow),
         pytest.param(1e11, 0.3512, marks=pytest.mark.slow),
         pytest.param(1e12, 0.3612, marks=pytest.mark.slow),
     ],

@@ -4,6 +4,14 @@ import pytest
 from hard.table import CASES
 
 LONG = (
+    "time step 20 ms",
+    "filled segment of 30°",
+    "cells 1 × 1",
+    "soil joints 100 × softer",
+    "60 s of nothing",
+    "60 s of nothing, undamped",
+    "width 100 m",
+    "bare bridge of thin rings",
     "fill of 0.5 MPa",
     "0.98 × least thickness, rigid",
     "filled span at 0.8 g, 0.4 s",

@@ -56,7 +56,7 @@ def scene(request):
     return structure, motion, damping, peaks(finest, motion, damping, 0.00125)
 
 
-@pytest.mark.parametrize("tolerance", [0.02, 0.005])
+@pytest.mark.parametrize("tolerance", [0.02, pytest.param(0.005, marks=pytest.mark.slow)])
 def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
     """Predicted over actual error, the actual one over a whole motion and on a finer model.
 

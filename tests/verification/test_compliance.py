@@ -42,7 +42,7 @@ def filled():
     return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4))
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
+@pytest.mark.parametrize("rule", [pytest.param("lobatto", marks=pytest.mark.slow), "exact"])
 @pytest.mark.parametrize(
     ("joints", "scheme"),
     [
@@ -241,6 +241,7 @@ def test_released_forces_leave_no_tension(rule):
     assert closed @ gap - force == pytest.approx(law.forces(gap), abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("others", [1, 20])
 def test_a_facet_that_hardly_opens_is_released(others):
     """By so little that the integral of its nearer end is all rounding; directly and by CG."""

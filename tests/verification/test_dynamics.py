@@ -38,7 +38,7 @@ def swinging(model, dead, mode):
 
 @pytest.mark.parametrize(
     ("scheme", "bound"),
-    [(NEWMARK, 1.05), (CONSERVING, 1.05), (af.HHT(-0.1), 2.5)],
+    [pytest.param(NEWMARK, 1.05, marks=pytest.mark.slow), (CONSERVING, 1.05), (af.HHT(-0.1), 2.5)],
     ids=["newmark", "conserving", "hht"],
 )
 def test_second_order_in_time(model, dead, scheme, bound):
