@@ -9,31 +9,17 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-from archfem.cases.case import Case
-from archfem.cases.run import Rest, shaken
+from archfem.dynamics.compiling import compile_kind
 
-RING = {
-    "structure": {
-        "shape": "circular_arch",
-        "radius": 3.0,
-        "thickness": 0.5,
-        "embrace": 150.0,
-        "voussoirs": 3,
-    },
-    "model": {"fidelity": "rigid"},
-    "analysis": {"dt": 0.005, "damping": {"ratio": 0.05, "frequency": 8.0}},
-    "motion": {"synthetic": {"seed": 1, "duration": 0.3, "pga": 1.0}},
-}
-"""Case that needs what most cases do."""
+USUAL = "compliance, Conserving"
+"""What most cases step by, of the kinds that are compiled apart from each other."""
 
 
 @cache
 def warm() -> None:
-    """Shake a ring for a moment; where code is to be compiled for it, one process goes first."""
-    case = Case.of(RING)
+    """Step a small arch once; where code is to be compiled for it, one process goes first."""
     with _alone():
-        rest = Rest.of(case)
-        shaken(case, case.ground_motion(), rest.dead, rest.damping[0], method="compliance")
+        compile_kind(USUAL)
 
 
 @contextmanager
