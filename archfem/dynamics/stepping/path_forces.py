@@ -63,8 +63,6 @@ def _open_point(point, passed, means, end, shares):  # type: ignore
 @numba.njit(cache=True)
 def _means(ends, rates, facets):  # type: ignore
     """What `facet_means` gives of a facet, or with zeros `point_means` of a spring."""
-    if facets and (max(ends) <= 0.0 or min(ends) > 0.0):
-        return _whole_means(ends, 0.5 * (rates[0] + rates[1]))
     if facets:
         return facet_means(ends, rates[0], rates[1])
     normal, taken, rate, time = point_means(ends[0], ends[2], rates[0], rates[1])
@@ -80,17 +78,6 @@ def between(ends, share):  # type: ignore
         share: of the far one [-].
     """
     return (1.0 - share) * ends[0] + share * ends[1]
-
-
-@numba.njit(cache=True)
-def _whole_means(ends, rate):  # type: ignore
-    """The same of a facet that is closed, or open, everywhere and all the way."""
-    a, c, b, d = ends
-    near, far = (a + b) / 12.0, (c + d) / 12.0
-    means, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
-    if max(ends) <= 0.0:
-        return means, none, (0.0, 0.0, 0.0), (0.5, 0.5)
-    return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
 
 
 @numba.njit(cache=True)

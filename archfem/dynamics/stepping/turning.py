@@ -41,6 +41,9 @@ none does."""
 WIDE = 40
 """Half-width of the band from which factors are kept while they serve."""
 
+COARSER = 10.0
+"""Of `ENOUGH`, where the band is wide: there passes by kept factors round to about as much."""
+
 SETUP = 0.05
 """Estimate of the time until the first step can be taken [s]."""
 
@@ -124,7 +127,7 @@ class Turning(Reordered):
         )
         effective = (2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks
         room, half = answer(model.joints), half_width(closed)
-        balance = ENOUGH * (10.0 if half >= WIDE else 1.0)
+        balance = ENOUGH * (COARSER if half >= WIDE else 1.0)
         return TurningSystem(
             model.joints._replace(sides=self._sides()),
             room,

@@ -43,9 +43,9 @@ def facet_means(ends, first, second):  # type: ignore
         second: change of the end with it [-].
     """
     a, c, b, d = ends
-    low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
-    high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
-    breaks = (0.0, min(low, high), max(low, high), 1.0)
+    if max(ends) <= 0.0 or min(ends) > 0.0:
+        return _whole_means(ends, 0.5 * (first + second))
+    _, _, breaks = _cut(ends)
     n0 = n1 = t0 = t1 = r00 = r01 = r11 = s0 = s1 = 0.0
     for piece in range(3):
         length = breaks[piece + 1] - breaks[piece]
@@ -71,6 +71,26 @@ def facet_means(ends, first, second):  # type: ignore
 
 
 @numba.njit(cache=True)
+def _cut(ends):  # type: ignore
+    """Where a facet opens or closes at the start and at the end, 0 if nowhere; and its pieces."""
+    a, c, b, d = ends
+    low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
+    high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
+    return low, high, (0.0, min(low, high), max(low, high), 1.0)
+
+
+@numba.njit(cache=True)
+def _whole_means(ends, rate):  # type: ignore
+    """What `facet_means` returns of a facet that is closed, or open, everywhere and all the way."""
+    a, c, b, d = ends
+    near, far = (a + b) / 12.0, (c + d) / 12.0
+    means, none = (2.0 * near + far, near + 2.0 * far), (0.0, 0.0)
+    if max(ends) <= 0.0:
+        return means, none, (0.0, 0.0, 0.0), (0.5, 0.5)
+    return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
+
+
+@numba.njit(cache=True)
 def closed_means(ends, first, second, facet):  # type: ignore
     """Return the mean time for which a facet of unit length is closed, or a place, and its rate.
 
@@ -88,9 +108,7 @@ def closed_means(ends, first, second, facet):  # type: ignore
     if not facet:
         time, rate = _closed_rate(a, b, first, second)
         return (time, 0.0), (rate, 0.0, 0.0)
-    low = a / (a - c) if (a <= 0.0) != (c <= 0.0) else 0.0
-    high = b / (b - d) if (b <= 0.0) != (d <= 0.0) else 0.0
-    breaks = (0.0, min(low, high), max(low, high), 1.0)
+    low, high, breaks = _cut(ends)
     s0 = s1 = r00 = r01 = r11 = 0.0
     for piece in range(3):
         length = breaks[piece + 1] - breaks[piece]

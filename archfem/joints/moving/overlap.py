@@ -215,17 +215,10 @@ def _carried(ends, first, second, facet):  # type: ignore
         At both ends, and derivatives of the first by the first and by the second gap, and of the
         second by the second.
     """
-    a, c, b, d = ends
     half = 0.5 * (first + second)
     if not facet:
-        normal, _, rate, _ = point_means(a, b, first, second)
+        normal, _, rate, _ = point_means(ends[0], ends[2], first, second)
         return (normal, 0.0), (half - rate, 0.0, 0.0)
-    if max(a, c, b, d) <= 0.0:
-        near, far = 0.5 * (a + b), 0.5 * (c + d)
-        normal = ((2.0 * near + far) / 6.0, (near + 2.0 * far) / 6.0)
-        return normal, (half / 3.0, half / 6.0, half / 3.0)
-    if min(a, c, b, d) > 0.0:
-        return (0.0, 0.0), (0.0, 0.0, 0.0)
     normal, _, rates, _ = facet_means(ends, first, second)
     return normal, (half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2])
 
