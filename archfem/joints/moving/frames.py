@@ -27,7 +27,7 @@ SMALL = 0.25
 of sin x / x below 1e-14 of it."""
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def small_turn(x):  # type: ignore
     """Return cos x, sin x / x and the derivative of the latter.
 
@@ -45,7 +45,7 @@ def small_turn(x):  # type: ignore
     return c, s, x * (-1 / 3 + y * (1 / 30 + y * (-1 / 840 + y * (1 / 45360 - y * (1 / 3991680)))))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def both(x):  # type: ignore
     """Return cos x and sin x.
 
@@ -56,7 +56,7 @@ def both(x):  # type: ignore
     return c, x * s
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def added(c, s, more_c, more_s):  # type: ignore
     """Return cosine and sine of the sum of two angles.
 
@@ -69,7 +69,7 @@ def added(c, s, more_c, more_s):  # type: ignore
     return c * more_c - s * more_s, s * more_c + c * more_s
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def measures(lower, higher, angle, found):  # type: ignore
     """Find opening, slip and turn of a joint.
 
@@ -86,7 +86,7 @@ def measures(lower, higher, angle, found):  # type: ignore
     found[2] = 2.0 * np.sin(0.5 * (higher[2] - lower[2]))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def follow(before, after, angle, ends, rates, now):  # type: ignore
     """Find the measures at both ends of a step, and their derivatives.
 
@@ -127,7 +127,7 @@ def follow(before, after, angle, ends, rates, now):  # type: ignore
     return (c, s), (c1, s1), (x, y), (shrunk, falls), by_turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _fill(rates, normal, arms, turn):  # type: ignore
     """Write down a derivative."""
     (c, s), (along, across) = normal, arms
@@ -136,7 +136,7 @@ def _fill(rates, normal, arms, turn):  # type: ignore
     rates[2, 0], rates[2, 1], rates[2, 2], rates[2, 3] = 0.0, 0.0, -turn, turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def bend(step, force, rates):  # type: ignore
     """Add the derivative of Dᵀ f by the jump and the angles at the end, with f held.
 

@@ -76,7 +76,7 @@ def answer(joints: Moved) -> Answer:
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def find_measures(joints, joint, q, found):  # type: ignore
     """Find opening, slip and turn of a joint, positive to the left of its normal.
 
@@ -92,7 +92,7 @@ def find_measures(joints, joint, q, found):  # type: ignore
     measures(poses[0], poses[1], joints.angle[joint], found)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def all_measures(joints, q):  # type: ignore
     """Return opening, slip and turn of the joints of the structure (n_joints, 3) [m, m, -].
 
@@ -126,7 +126,7 @@ def all_measures(joints, q):  # type: ignore
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def paired_slips(joints, q):  # type: ignore
     """Return how far pieces have slid whose places stay opposite, over their length (j,) [-].
 
@@ -142,7 +142,7 @@ def paired_slips(joints, q):  # type: ignore
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def joint_energy(joints, q, slid):  # type: ignore
     """Return the energy stored in all joints [J].
 
@@ -164,7 +164,7 @@ def joint_energy(joints, q, slid):  # type: ignore
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def pass_joints(joints, before, after, late, slid, found):  # type: ignore
     """Find what joints do over a step.
 
@@ -215,7 +215,7 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
             _stretch(sides, joint, (force, rate), by_faces, moves, longer, found)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _between(by_faces, rate, found):  # type: ignore
     """Dᵀ rate B, of all that faces can do to the joint (4, 4)."""
     for column in range(4):
@@ -229,7 +229,7 @@ def _between(by_faces, rate, found):  # type: ignore
                 found[row, column] += by_faces[0, k, row] * value
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _push(by_faces, force, side, found):  # type: ignore
     """Forces on the pose of a face."""
     sign, turn = 2.0 * side - 1.0, 0.0
@@ -240,7 +240,7 @@ def _push(by_faces, force, side, found):  # type: ignore
     found[side, 2] = turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _gather(joint, side, count, moves, pushed, found):  # type: ignore
     """Forces on the coordinates of a block."""
     x, y, turn = pushed[side, 0], pushed[side, 1], pushed[side, 2]
@@ -249,7 +249,7 @@ def _gather(joint, side, count, moves, pushed, found):  # type: ignore
         found[joint, side, k] = value + moves[0, side, 2, k] * turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _spread(where, counts, moves, curved, found):  # type: ignore
     """Derivative of the forces on a block by the coordinates of one."""
     joint, side, other = where
@@ -265,7 +265,7 @@ def _spread(where, counts, moves, curved, found):  # type: ignore
             found[joint, side, k, other, column] = value + moves[0, side, 2, k] * turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _stretch(sides, joint, law, by_faces, moves, longer, found):  # type: ignore
     """Add what the stretch of the faces does: its force, and how all forces change with it."""
     force, rate = law

@@ -50,7 +50,7 @@ class Faces(NamedTuple):
     paired: Any
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def overlap(depth, slip):  # type: ignore
     """Return the length on which the faces overlap, and its derivative by the slip.
 
@@ -64,7 +64,7 @@ def overlap(depth, slip):  # type: ignore
     return length, -np.sign(slip)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def lap(faces, joint, slip):  # type: ignore
     """Return the length on which the law of a joint acts, and its derivative by the slip.
 
@@ -78,7 +78,7 @@ def lap(faces, joint, slip):  # type: ignore
     return overlap(faces.depth[joint], slip)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def stored(faces, joint, length, opening, turn):  # type: ignore
     """Return Φ, half the mean square of the closing over the overlap, and its derivatives.
 
@@ -117,7 +117,7 @@ def stored(faces, joint, length, opening, turn):  # type: ignore
     return 0.5 * (first * whole + step * tilted), whole, tilted - 0.5 * whole
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     """Find the mean force of the gaps over a step, and its derivative by the measures at the end.
 
@@ -185,7 +185,7 @@ def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
     return stiff * mean * lost
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def gap_rate(measure, place, length, shrinks, ends):  # type: ignore
     """Return the derivative of the gap at a place by a measure at the end of the step.
 
@@ -201,7 +201,7 @@ def gap_rate(measure, place, length, shrinks, ends):  # type: ignore
     return -place * (shrinks * ends[1, 2] if measure == 1 else length)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _carried(ends, first, second, facet):  # type: ignore
     """Mean of ∫φ_i <gap>₋ over a step on a facet of unit length, or of <gap>₋, and its derivative.
 
@@ -223,7 +223,7 @@ def _carried(ends, first, second, facet):  # type: ignore
     return normal, (half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _slope(before, after, first, last):  # type: ignore
     """Δℓ/Δs over a step, and its derivative by the slip at the end, from ℓ and its derivatives."""
     (l0, r0), (l1, r1) = first, last

@@ -45,7 +45,7 @@ class Sides(NamedTuple):
     held: Array
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _shaped(shapes, index, span, q):  # type: ignore
     """U ξ and Θ ξ of a face."""
     x = y = turn = 0.0
@@ -57,7 +57,7 @@ def _shaped(shapes, index, span, q):  # type: ignore
     return x, y, turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _turned(arm, shift, half):  # type: ignore
     """R r - r + R u, of cosine and sine of half the angle; and cosine and sine of the angle."""
     (rx, ry), (dx, dy), (ch, sh) = arm, shift, half
@@ -67,7 +67,7 @@ def _turned(arm, shift, half):  # type: ignore
     return (x, y), (c, s)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def stretched(sides, joint, q):  # type: ignore
     """Return by how much the higher face of a joint has become longer than the lower [m].
 
@@ -85,7 +85,7 @@ def stretched(sides, joint, q):  # type: ignore
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def pose(sides, joint, side, q, found):  # type: ignore
     """Find the pose of a face.
 
@@ -110,7 +110,7 @@ def pose(sides, joint, side, q, found):  # type: ignore
     found[0], found[1], found[2] = q[index[0]] + x, q[index[1]] + y, q[index[2]] + turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
     """Find the poses of a face at both ends of a step, and their derivatives.
 
@@ -157,7 +157,7 @@ def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
     return middle, reach, (mean, half * shrunk, shrunk, falls)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _turning(shapes, size, turn, reach, moves):  # type: ignore
     """Write down a derivative of a pose by the frame and by the shapes."""
     ((c, s), mean, shrunk), (x, y) = turn, reach
@@ -170,7 +170,7 @@ def _turning(shapes, size, turn, reach, moves):  # type: ignore
         moves[2, k] = shapes[2, k]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
     """Add the derivative of generalised forces on a face by the coordinates at the end.
 

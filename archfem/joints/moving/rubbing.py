@@ -13,7 +13,7 @@ from archfem.joints.moving.overlap import gap_rate, lap
 from archfem.joints.operator import TOUCHING
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def limit_faces(faces, joint, ends, late, limits):  # type: ignore
     """Turn the pressing forces of a joint over a step into Coulomb's limits, μ N + c A.
 
@@ -59,7 +59,7 @@ def limit_faces(faces, joint, ends, late, limits):  # type: ignore
                 limits[point + 1, 1 + k] += scale * closing
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _rubbed(first, change, late, limit):  # type: ignore
     """What `shear_means` gives of a point whether it slides or not, also over no step at all."""
     trial = first + (0.5 + late) * change
@@ -72,7 +72,7 @@ def _rubbed(first, change, late, limit):  # type: ignore
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def rub_faces(faces, joint, ends, late, limits, slid, found):  # type: ignore
     """Add the shear of a joint over a step, and what its points remember at the end.
 
