@@ -7,6 +7,7 @@ the right. The matrix need not be symmetric.
 import numba
 import numpy as np
 
+
 @numba.njit(cache=True)
 def eliminate(band, vector):  # type: ignore
     """Solve a system in place.
