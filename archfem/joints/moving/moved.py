@@ -91,37 +91,46 @@ def find_measures(joints, joint, q):  # type: ignore
 
 
 @numba.njit(cache=True)
-def all_measures(joints, q):  # type: ignore
-    """Return opening, slip and turn of the joints of the structure (n_joints, 3) [m, m, -].
+def all_measures(joints, states):  # type: ignore
+    """Return opening, slip and turn of the joints of the structure (k, n_joints, 3) [m, m, -].
 
     Slip and turn with their signs. Of a joint in pieces, the plane nearest to the openings, and the
     mean slip, as `faces.face_matrix` has them.
 
     Args:
         joints: `Moved`.
-        q: coordinates (n,).
+        states: coordinates (k, n).
     """
-    found, depths = np.zeros((joints.wholes, 3)), joints.faces.depth
-    sums = np.zeros((joints.wholes, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
+    found, sums = np.zeros((len(states), joints.wholes, 3)), np.empty((joints.wholes, 4))
+    for k in range(len(states)):
+        _all_measures(joints, states[k], sums, found[k])
+    return found
+
+
+@computing
+def _all_measures(joints, q, sums, found):  # type: ignore
+    """Find the measures in one state; sums are Σd, Σd a, Σd a² with the pieces' own, Σd a g."""
+    for whole in range(joints.wholes):
+        for k in range(4):
+            sums[whole, k] = 0.0
     for joint in range(len(joints.angle)):
-        own = find_measures(joints, joint, q)
-        whole, depth, place = joints.whole[joint], depths[joint], joints.aside[joint]
+        own, hand = find_measures(joints, joint, q), joints.hand[joint]
+        whole, depth, place = joints.whole[joint], joints.faces.depth[joint], joints.aside[joint]
         spread = 0.25 * depth**3
         found[whole, 0] += depth * own[0]
-        found[whole, 1] += depth * joints.hand[joint] * own[1]
+        found[whole, 1] += depth * hand * own[1]
         sums[whole, 0] += depth
         sums[whole, 1] += depth * place
         sums[whole, 2] += depth * place**2 + spread
-        sums[whole, 3] += depth * place * own[0] - spread * joints.hand[joint] * own[2]
+        sums[whole, 3] += depth * place * own[0] - spread * hand * own[2]
     for whole in range(joints.wholes):
-        total, first, second, tilted = sums[whole]
+        total, first = sums[whole, 0], sums[whole, 1]
         middle = first / total
-        turn = middle * found[whole, 0] - tilted
-        turn /= second - middle * first
+        turn = middle * found[whole, 0] - sums[whole, 3]
+        turn /= sums[whole, 2] - middle * first
         found[whole, 0] = found[whole, 0] / total + turn * middle
         found[whole, 1] /= total
         found[whole, 2] = turn
-    return found
 
 
 @numba.njit(cache=True)
