@@ -19,7 +19,6 @@ from archfem.view.films.colours import check_colour
 from archfem.view.films.page import Page
 from archfem.view.films.setup import Setup
 from archfem.view.films.shots import falling, moving, still
-from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, swung
 from archfem.view.moved import Falls, fields_at, kept_fields
@@ -116,10 +115,7 @@ def picture(
     model, q = drawn(model, q)
     joints = joints_at(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    page = Page(setup, size)
-    with Stage(setup, page.room) as stage:
-        shot = still(setup, q, joints)
-        return page.compose(stage.photograph(shot), shot)
+    return Page(setup, size).compose(still(setup, q, joints))[..., :3].copy()
 
 
 def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
@@ -141,10 +137,8 @@ def _shots(
     shown = moving(setup, run, held, fields_at(run, held))
     if falls is not None:
         shown = chain(shown, falling(setup, falls, loose))
-    bar = tqdm(shown, total=len(times), unit="frame", disable=None, leave=False)
-    with Stage(setup, page.room) as stage:
-        for shot in bar:
-            yield page.compose(stage.photograph(shot), shot)
+    for shot in tqdm(shown, total=len(times), unit="frame", disable=None, leave=False):
+        yield page.compose(shot)
 
 
 def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
