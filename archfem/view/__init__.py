@@ -20,7 +20,7 @@
     studies    factors at first mechanism, case by case
     incremental  curves of incremental dynamic analysis; fragility
     sensitivity  tornado and convergence
-    films      films and stills: all that knows pyvista and imageio
+    films      films and stills: all that knows imageio and its encoder
 
 It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
 """

@@ -40,8 +40,12 @@ class Page:
         self._canvas = FigureCanvasAgg(self._figure)
         self._inches = np.array(size) / dense
         below = FOOT + (STRIP if run else 0.0)
-        window = round(EDGE_ROOM * dense), round(below * dense)
-        window += size[0] - round(SIDE * dense), size[1] - round(HEAD * dense)
+        window = (
+            round(EDGE_ROOM * dense),
+            round(below * dense),
+            size[0] - round(SIDE * dense),
+            size[1] - round(HEAD * dense),
+        )
         self._still(setup, run, below)
         self._said = self._write(0.985, "", ha="right", animated=True)
         self._cursor = self._strip(run) if run else None
@@ -49,18 +53,19 @@ class Page:
         self._stage, self._speed = Stage(setup, pen), 1.0
         self._lay()
 
-    def compose(self, shot: Shot) -> Image:
+    def compose(self, shot: Shot, speed: float = 1.0) -> Image:
         """Draw a picture, with the time and the count of what has failed.
 
         Args:
             shot: what it shows.
+            speed: at which a film shows it, relative to the real one [-].
 
         Returns:
             The page (height, width, 4), red, green, blue and opacity from 0 to 255; the next call
             draws over it.
         """
-        if shot.speed != self._speed:
-            self._speed = shot.speed
+        if speed != self._speed:
+            self._speed = speed
             self._lay()
         self._canvas.restore_region(self._background)
         self._stage.draw(shot)

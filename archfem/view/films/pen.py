@@ -1,8 +1,8 @@
 """A pen that draws many pieces at once, in metres, into a window of a page of pixels."""
 
 import numpy as np
-from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.backend_bases import GraphicsContextBase
+from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.path import Path
 from matplotlib.transforms import Bbox, IdentityTransform
 
@@ -51,7 +51,9 @@ class Pen:
         style.set_capstyle("round")
         for first in range(0, len(pieces), TOGETHER):
             own = self._pixels(pieces[first : first + TOGETHER]).reshape(-1, 2)
-            codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=Path.code_type), len(own) // 2)
+            codes = np.tile(
+                np.array([Path.MOVETO, Path.LINETO], dtype=Path.code_type), len(own) // 2
+            )
             self._renderer.draw_path(style, _path(own, codes), self._whole)
 
     def fill(self, outlines: Array, colour: str, opacity: float = 1.0) -> None:

@@ -30,7 +30,6 @@ class Shot:
         shades: what the blocks are coloured by, by point (m,) or by cell.
         time: of the picture [s]; None where it is not known.
         words: how many joints fail, and how, or that blocks are loose.
-        speed: at which it is shown, relative to the real one.
         marks: of the joints, as moved.
         past: where hinges have been, as moved (n, 2) [m].
         outlines: of blocks as a mechanism moves them, each (k, 2) [m].
@@ -40,7 +39,6 @@ class Shot:
     shades: Array
     time: float | None = None
     words: Sequence[str] = ()
-    speed: float = 1.0
     marks: Marks = NO_MARKS
     past: Array = field(default_factory=lambda: NOWHERE)
     outlines: Sequence[Array] = ()
@@ -76,7 +74,11 @@ def moving(setup: Setup, run: History, times: Array, fields: Array) -> Iterator[
     structure, carried, joints = setup.model.structure, carrier(setup.model), run.joints
     steps = joints.indexes["time"].get_indexer(times, method="nearest")
     told = {key: joints[key].transpose("time", "joint").values for key in TOLD}
-    marker, been, counts = Marker(structure, joints["judged"].values), _been(joints), _counts(joints)
+    marker, been, counts = (
+        Marker(structure, joints["judged"].values),
+        _been(joints),
+        _counts(joints),
+    )
     for time, step, q in zip(times, steps, fields, strict=True):
         shift = setup.magnification * carried(q)
         yield Shot(

@@ -56,7 +56,7 @@ class Stage:
         """
         pen, marks = self._pen, shot.marks
         pen.shade(self._triangles.corners(shot.places), self._colours(shot.shades))
-        pen.lines(np.concatenate([shot.places[self._rims], self._edges]), EDGE, 1.5)
+        pen.lines(np.concatenate([shot.places[self._rims], self._edges]), EDGE, 1.2)
         pen.lines(_around(shot.outlines), MOVED, 3.0)
         self._discs(shot.past, HINGE, 1.0, 0.3)
         pen.lines(marks.links, "white", 6.0)

@@ -59,14 +59,8 @@ def _grid(pieces: int) -> tuple[Array, Numbers]:
 
 
 def _cut(cell: Numbers, places: Array) -> Numbers:
-    """Cut a polygon, which may be concave, into triangles of its corners (n - 2, 3).
-
-    Ears are cut off, the roundest first, so that slivers are few.
-
-    Args:
-        cell: numbers of its corners, in order (n,).
-        places: of them (n, 2) [m].
-    """
+    """Triangles of a polygon (n,) with corners at places (n, 2), which may be concave (n - 2, 3)."""
+    # ears are cut off, the roundest first, so that slivers are few
     left, found = list(range(len(cell))), []
     if _area(places) < 0.0:
         left.reverse()
@@ -78,7 +72,8 @@ def _cut(cell: Numbers, places: Array) -> Numbers:
         found.append(ears[best])
         del left[best]
     found.append(np.array(left))
-    return cell[np.array(found)]
+    numbers: Numbers = cell[np.array(found)]
+    return numbers
 
 
 def _area(places: Array) -> float:
