@@ -2,6 +2,7 @@
 
     line     words as a command, and its exit code
     cases    commands for one case, and for records
+    films    the command for films
     studies  the command for studies
 
 It imports from all rooms. Start reading at `line`.

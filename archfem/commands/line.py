@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
-from archfem.commands import cases, studies
+from archfem.commands import cases, films, studies
 from archfem.errors import ArchfemError
 
 INTERRUPTED = 130
@@ -85,6 +85,8 @@ def _parser() -> argparse.ArgumentParser:
     ready = chosen.add_parser("compile", help="compile once what time steps need: about a minute")
     ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
     ready.set_defaults(command=cases.compile_steps)
+    about = "film the history of a run"
+    _film_command(chosen.add_parser("animate", help=about, description=about))
     _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
 
@@ -108,6 +110,21 @@ def _study_command(command: argparse.ArgumentParser) -> None:
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
     command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
     command.set_defaults(command=studies.study)
+
+
+def _film_command(command: argparse.ArgumentParser) -> None:
+    command.add_argument("history", metavar="HISTORY.nc", help="the history, which has fields")
+    command.add_argument("--case", metavar="CASE.toml", help="its case (the one beside it)")
+    command.add_argument("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
+    command.add_argument(
+        "--window", metavar="auto|FROM,TO", help="slow motion around the mechanism, or a time [s]"
+    )
+    command.add_argument("--colour", help="displacement or stress (displacement)")
+    command.add_argument("--magnification", type=float, help="of displacements (chosen)")
+    command.add_argument("--fps", type=float, help="frames a second, at most (20)")
+    command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
+    command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    command.set_defaults(command=films.animate)
 
 
 def _motion_command(command: argparse.ArgumentParser) -> None:
