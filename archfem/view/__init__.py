@@ -2,6 +2,7 @@
 
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
+    loads      live loads as arrows
     states     what a state's joints carry
     moved      where ends of joints and loose blocks are at some time of a run
     structure  a structure at an instant; several side by side

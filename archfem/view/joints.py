@@ -13,7 +13,7 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, sliding_limits
 from archfem.view.envelopes import draw_faces
-from archfem.view.style import COLUMN, INK, LINES, NORMAL, SLIP, SMALL, WIDE, dress
+from archfem.view.style import COLUMN, INK, LINES, SLIP, SMALL, WIDE, Page, dress, entitle
 
 LETTERS = 20
 """That fit beside a panel."""
@@ -42,7 +42,7 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
     chosen, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
-    figure = Figure(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
+    figure = Page(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     _ground(ground, run)
@@ -80,7 +80,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = Figure(figsize=(0.8 * WIDE, 4.2), layout="constrained")
+    figure = Page(figsize=(0.8 * WIDE, 4.2), layout="constrained")
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
@@ -88,7 +88,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
         _friction(column[0], own, criteria)
         dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
         _eccentricity(column[1], own, criteria)
-        column[0].set_title(f"{label}: {own['name'].values!s}", fontsize=NORMAL, color=INK)
+        entitle(column[0], f"{label}: {own['name'].values!s}")
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()

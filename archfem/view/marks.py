@@ -239,3 +239,15 @@ def displaced(structure: Structure, motion: Array) -> list[Array]:
         if np.abs(by).max() > STILL * structure.size:
             outlines.append(block.drawn() + by)
     return outlines
+
+
+def round_magnification(displacement: float) -> float:
+    """Return one of 1, 2, 5, 10, … that brings a displacement nearest to `SWING`.
+
+    Args:
+        displacement: the largest, relative to the size of the structure [-].
+    """
+    if displacement * 1.5 >= SWING or displacement == 0.0:
+        return 1.0
+    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])

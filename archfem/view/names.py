@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from archfem.arrays import Array
 from archfem.masonry.structure import Joint, Structure
 from archfem.view.structure import draw_blocks
-from archfem.view.style import INK, NORMAL, SLIP, SMALL, canvas, dress
+from archfem.view.style import INK, SLIP, SMALL, canvas, entitle, stand
 
 TINY = 4.5
 """Smallest size of type that can be read on paper [points]."""
@@ -57,8 +57,7 @@ def draw_names(structure: Structure) -> Figure:
     """
     page = canvas(structure)
     axes = page.add_subplot()
-    dress(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    stand(axes, structure)
     draw_blocks(axes, structure)
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
     axes.margins(*ROOM)
@@ -70,7 +69,7 @@ def draw_names(structure: Structure) -> Figure:
         _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
     title = f"{structure.name}: names of joints, such as '{example}'"
-    axes.set_title(title, fontsize=NORMAL, color=INK)
+    entitle(axes, title)
     return page
 
 

@@ -59,7 +59,7 @@ def _grid(pieces: int) -> tuple[Array, Numbers]:
 
 
 def _cut(cell: Numbers, places: Array) -> Numbers:
-    """Triangles (n - 2, 3) of a polygon (n,), concave or not, whose corners are at places (n, 2)."""
+    """Triangles (n - 2, 3) of a polygon (n,), concave or not, with corners at places (n, 2)."""
     # ears are cut off, the roundest first, so that slivers are few
     left, found = list(range(len(cell))), []
     if _area(places) < 0.0:
