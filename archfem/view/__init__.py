@@ -6,6 +6,7 @@
     states     what a state's joints carry
     moved      where ends of joints and loose blocks are at some time of a run
     structure  a structure at an instant; several side by side
+    dead       the dead load with its numbers
     displaced  a structure where its blocks have gone
     names      which joint is which
     joints     joints over time

@@ -37,7 +37,8 @@ def draw_loads(
             "", tuple(tip), tuple(start), zorder=9,
             arrowprops={"arrowstyle": "-|>", "color": LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
-        axes.plot(*np.array([start, tip]).T, lw=0.0, label="_")  # the view has room for it
+        room = [start, tip, start + np.array([0.0, AWAY * structure.size])]
+        axes.plot(*np.array(room).T, lw=0.0, label="_")  # the view has room for it
         label = "_" if number else "live load"
         axes.plot([], [], color=LOAD, lw=2.2, marker=">", ms=5, label=label)
         away = (0, 5) if way[1] < 0.5 or abs(way[0]) > 0.5 else (6, 0)
@@ -57,7 +58,8 @@ def _arrow(structure: Structure, action: Action) -> tuple[Array, Array, str]:
         low, high = points.min(axis=0), points.max(axis=0)
         start = np.array([0.5 * (low[0] + high[0]), high[1] + 2.0 * AWAY * structure.size])
         start -= 0.5 * REACH * structure.size * way * [1.0, 0.0]
-        return start, way, f"{np.linalg.norm(size):.3g} weight"
+        share = float(np.linalg.norm(size))
+        return start, way, "weight" if share == 1.0 else f"{share:.3g} weight"
     if isinstance(action, PointLoad):
         force = np.array(action.force)
         way = force / np.linalg.norm(force)

@@ -112,10 +112,11 @@ def stand(axes: Axes, structure: Structure) -> None:
     """
     dress(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
-    points = np.concatenate([block.drawn() for block in structure.blocks])
-    wide, high = np.ptp(points, axis=0)
-    broad = _scale(wide, high) * wide
-    axes.xaxis.set_major_locator(MaxNLocator(int(np.clip(broad / TICK, 1, 9))))
+    wide = np.ptp(np.concatenate([block.drawn()[:, 0] for block in structure.blocks]))
+    broad = scale_of(structure) * wide
+    axes.xaxis.set_major_locator(
+        MaxNLocator(int(np.clip(broad / TICK, 1, 9)), steps=[1, 2, 2.5, 5, 10])
+    )
 
 
 def dress(axes: Axes, x: str = "", y: str = "") -> None:
@@ -156,15 +157,21 @@ def canvas(structure: Structure) -> Figure:
     """
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
-    scale = _scale(wide, high)
+    scale = scale_of(structure)
     size = max(0.5 * COLUMN, scale * wide + 0.8), max(0.35 * COLUMN, scale * high + 1.2)
     return Page(figsize=size, layout="constrained")
 
 
-def _scale(wide: float, high: float) -> float:
-    """Of a structure on a page [inch / m]."""
+def scale_of(structure: Structure) -> float:
+    """Return how large a structure is drawn on a page of its own, about [inch / m].
+
+    Args:
+        structure: to be drawn.
+    """
+    points = np.concatenate([block.drawn() for block in structure.blocks])
+    wide, high = np.ptp(points, axis=0)
     room = COLUMN if wide < LONG * high else WIDE
-    return min((room - 0.8) / wide, (TALL - 1.2) / high)
+    return float(min((room - 0.8) / wide, (TALL - 1.2) / high))
 
 
 def save(figure: Figure, path: str | Path) -> Path:
