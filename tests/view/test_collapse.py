@@ -28,7 +28,7 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
 def test_a_load_that_never_overturns_shows_no_mechanism(ring):
     found = af.collapse_factor(ring, live=[af.PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
     axes = draw_collapse(ring, found).axes[0]
-    assert set(lines_of(axes)) == {"thrust line"}
+    assert set(lines_of(axes)) == {"thrust line", "live load"}
     assert len(axes.collections) == 1
     assert "never overturns" in axes.get_title()
 
@@ -36,7 +36,7 @@ def test_a_load_that_never_overturns_shows_no_mechanism(ring):
 def test_an_arch_that_falls_has_no_thrust_line():
     thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
     axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
-    assert set(lines_of(axes)) == {"hinge"}
+    assert set(lines_of(axes)) == {"hinge", "live load"}
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):
