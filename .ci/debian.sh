@@ -37,6 +37,7 @@ if [ ! -f "$folder/made" ]; then
 	printf '#!/bin/sh\nexit 101\n' >"$folder/usr/sbin/policy-rc.d"  # no service starts
 	chmod +x "$folder/usr/sbin/policy-rc.d"
 fi
+leave  # what a killed run has left
 trap leave EXIT
 mount -t proc proc "$folder/proc"
 mount -t sysfs -o ro sysfs "$folder/sys"
