@@ -36,7 +36,7 @@ FROM = (
 
 NEEDS = {
     "FEniCSx": Need(
-        "every model but fidelity = 'rigid', and meshes",
+        "meshes, and all models but those of fidelity = 'rigid',",
         FROM,
     ),
     "PETSc": Need("options of PETSc", "it comes with FEniCSx, " + FROM),
@@ -73,20 +73,18 @@ def needed(name: str) -> Iterator[None]:
     try:
         yield
     except (ImportError, OSError) as error:
-        raise lacking(name, str(error)) from error
+        raise NotInstalled(lacking(name, str(error))) from error
 
 
-def lacking(name: str, why: str) -> NotInstalled:
-    """Return the error of a package that is not there.
+def lacking(name: str, why: str) -> str:
+    """Return what to say of a package that is not there.
 
     Args:
         name: of the package, in `NEEDS`.
         why: it is missed.
     """
     need = NEEDS[name]
-    return NotInstalled(
-        f"{name} is not there for {sys.executable} ({why}); {need.what} need it: {need.get}"
-    )
+    return f"{name} is missing for {sys.executable} ({why}); {need.what} need it: {need.get}"
 
 
 def can_draw() -> bool:

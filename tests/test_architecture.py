@@ -14,6 +14,7 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 GROUND = {"errors", "arguments", "arrays", "units", "files", "tables", "_petsc"}
+GROUND |= {"packages", "compiled"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}
@@ -27,7 +28,7 @@ ONLY_IN = {
     "basix": "models.fem",
     "petsc4py": "_petsc",
     "slepc4py": "_petsc",
-    "numba": ("dynamics.stepping", "dynamics.falling", "joints.moving"),
+    "numba": ("compiled", "dynamics.stepping", "dynamics.falling", "joints.moving"),
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",

@@ -5,7 +5,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 
 from archfem.arrays import Array
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, NotInstalled
 from archfem.packages import lacking
 
 ROUNDING = 1e-13
@@ -34,12 +34,12 @@ def lowest(
     """
     size = mass.shape[0]
     if size > MOST:
-        raise lacking("SLEPc", f"{size} coordinates are too many for LAPACK")
+        raise NotInstalled(lacking("SLEPc", f"{size} coordinates are too many for LAPACK"))
     dense = stiffness.toarray()
     squares, shapes = eigh(0.5 * (dense + dense.T), mass.toarray(), subset_by_index=(0, count - 1))
     zero = nothing(stiffness, mass)
     if squares[0] <= zero:
-        raise mechanism(float(squares[0]), zero)
+        raise DidNotConverge(mechanism(float(squares[0]), zero))
     return squares, shapes
 
 
@@ -53,14 +53,14 @@ def nothing(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix) -> float:
     return ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
 
 
-def mechanism(square: float, zero: float) -> DidNotConverge:
-    """Return the error of a structure that something holds by no stiffness.
+def mechanism(square: float, zero: float) -> str:
+    """Return what to say of a structure that something holds by no stiffness.
 
     Args:
         square: its lowest ω² [1/s²].
         zero: what rounding may make of a zero [1/s²].
     """
-    return DidNotConverge(
+    return (
         f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
         f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
     )

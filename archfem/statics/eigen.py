@@ -68,7 +68,7 @@ def lowest(
     """
     zero = nothing(stiffness, mass)
     if zero <= 0.0:
-        raise mechanism(0.0, zero)
+        raise DidNotConverge(mechanism(0.0, zero))
     solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
     solver.solve()
@@ -82,7 +82,7 @@ def lowest(
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
-        raise mechanism(float(squares[0]), zero)
+        raise DidNotConverge(mechanism(float(squares[0]), zero))
     edge = float(squares[-1]) * (1.0 - APART)
     below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
     if there != below:
