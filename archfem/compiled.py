@@ -40,11 +40,11 @@ def prepare() -> None:
     from numba.core import event
 
     folder = _chosen()
-    if folder is not None:
-        # Processes that this one starts take it from the environment.
-        os.environ[GIVEN] = numba.config.CACHE_DIR = str(folder)
+    if folder is not None:  # processes that this one starts take it from the environment
+        os.environ[GIVEN] = str(folder)
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
-    class Notice(event.Listener):  # type: ignore[misc]
+    class Notice(event.Listener):
         """Says once that something is compiled that was kept nowhere."""
 
         def on_start(self, event: Any) -> None:
@@ -56,7 +56,7 @@ def prepare() -> None:
             pass
 
     if parent_process() is None:
-        event.register("numba:compile", Notice())
+        event.register("numba:compile", Notice())  # type: ignore[no-untyped-call]
 
 
 @cache

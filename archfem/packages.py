@@ -3,6 +3,7 @@
 Everything that archfem needs comes with `pip install archfem`, but FEniCSx: that has no wheels.
 """
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,6 +42,7 @@ NEEDS = {
     ),
     "PETSc": Need("options of PETSc", "it comes with FEniCSx, " + FROM),
     "SLEPc": Need("modes of large models", "it comes with FEniCSx, " + FROM),
+    "EGL": Need("films", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"),
     "gmsh": Need(
         "meshes",
         "'pip install gmsh'; where libGLU or another library is what it lacks, 'apt-get install "
@@ -52,9 +54,6 @@ NEEDS = {
 
 DISPLAYS = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
 """Libraries of which VTK takes the first that is there, to draw without a screen."""
-
-GET_DISPLAY = "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
-"""How one of them is had."""
 
 
 @contextmanager
@@ -87,14 +86,28 @@ def lacking(name: str, why: str) -> str:
     return f"{name} is missing for {sys.executable} ({why}); {need.what} need it: {need.get}"
 
 
+def check_drawing() -> None:
+    """Refuse to draw films where VTK finds no library for it, which would end the process.
+
+    Raises:
+        NotInstalled: there is none.
+    """
+    if not can_draw():
+        raise NotInstalled(lacking("EGL", f"none of {', '.join(DISPLAYS)} is there"))
+
+
 def can_draw() -> bool:
     """Return whether VTK finds a library to draw with; without one it ends the process."""
     if sys.platform != "linux":
         return True
-    for name in DISPLAYS:
-        try:
-            CDLL(name)
-        except OSError:
-            continue
-        return True
-    return False
+    screen = ("libGL.so.1",) if os.environ.get("DISPLAY") else ()
+    return any(map(_loads, (*DISPLAYS, *screen)))
+
+
+def _loads(library: str) -> bool:
+    """Whether a library is there, with all that it needs itself."""
+    try:
+        CDLL(library)
+    except OSError:
+        return False
+    return True

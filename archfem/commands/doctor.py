@@ -124,7 +124,7 @@ def _drawing() -> Finding:
     """The library with which films are drawn."""
     if packages.can_draw():
         return Finding("library to draw films", "found")
-    return Finding("library to draw films", "missing", packages.GET_DISPLAY)
+    return Finding("library to draw films", "missing", packages.NEEDS["EGL"].get)
 
 
 def _ffmpeg() -> Finding:
