@@ -92,7 +92,8 @@ def _chosen() -> Path | None:
     own = f"archfem-{_digest()}"
     places = [Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / own]
     if given is not None:
-        places.insert(0, Path(given) if Path(given).name == own else Path(given) / own)
+        base = Path(given)  # or what a process chose that started this one
+        places.insert(0, (base.parent if base.name.startswith("archfem-") else base) / own)
     for place in places:
         if _writable(place):
             return place

@@ -37,7 +37,7 @@ FROM = (
 
 NEEDS = {
     "FEniCSx": Need(
-        "meshes, and all models but those of fidelity = 'rigid',",
+        "meshes, and all models but those of fidelity = 'rigid' (--set model.fidelity=rigid),",
         FROM,
     ),
     "PETSc": Need("options of PETSc", "it comes with FEniCSx, " + FROM),
