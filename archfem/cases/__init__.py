@@ -11,6 +11,7 @@
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
     inputs      files that a case reads besides its own
+    shipped     the cases that archfem brings
 
 It imports from all rooms to its left. Start reading at `case`, then at `run`.
 """

@@ -5,9 +5,11 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 
-from archfem.commands import cases, studies
 from archfem.errors import ArchfemError
+
+Command = Callable[[argparse.Namespace], None]
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
@@ -56,6 +58,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="archfem", description="Does a dry-stone arch or bridge survive an earthquake?"
     )
+    release = import_module("archfem").__version__
+    parser.add_argument("--version", action="version", version=f"archfem {release}")
     chosen = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def case_command(name: str, about: str) -> argparse.ArgumentParser:
@@ -67,26 +71,40 @@ def _parser() -> argparse.ArgumentParser:
     run = case_command("run", "dead load, time histories, tables and pictures")
     run.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     run.add_argument("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
-    run.set_defaults(command=cases.run)
+    run.set_defaults(command=_later("cases", "run"))
     check = case_command("check", "read a case, build its model and find its dead load")
-    check.set_defaults(command=cases.check)
+    check.set_defaults(command=_later("cases", "check"))
     modes = case_command("modes", "frequencies, masses and shapes of vibrations about dead load")
     modes.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
-    modes.set_defaults(command=cases.modes)
+    modes.set_defaults(command=_later("cases", "modes"))
     mesh = case_command("mesh", "write the mesh of a case as a gmsh file")
     mesh.add_argument("--out", required=True, metavar="FILE.msh", help="the mesh file")
-    mesh.set_defaults(command=cases.mesh)
+    mesh.set_defaults(command=_later("cases", "mesh"))
     accuracy = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
     accuracy.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    accuracy.set_defaults(command=cases.accuracy)
+    accuracy.set_defaults(command=_later("cases", "accuracy"))
     about = "many cases: a table of what is found of each, on all cores or a cluster"
     _study_command(chosen.add_parser("study", help=about, description=about))
     ready = chosen.add_parser("compile", help="compile once what time steps need: about a minute")
     ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
-    ready.set_defaults(command=cases.compile_steps)
+    ready.set_defaults(command=_later("cases", "compile_steps"))
+    shipped = chosen.add_parser("examples", help="the cases that archfem brings, a line each")
+    shipped.set_defaults(command=_later("examples", "examples"))
+    _example_command(chosen.add_parser("example", help="print one of them, or copy it"))
+    health = chosen.add_parser("doctor", help="what is installed, what is missing, how to get it")
+    health.set_defaults(command=_later("doctor", "doctor"))
     _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
+
+
+def _later(module: str, name: str) -> Command:
+    """A command that is imported when it is given: most import all rooms."""
+
+    def command(given: argparse.Namespace) -> None:
+        getattr(import_module(f"archfem.commands.{module}"), name)(given)
+
+    return command
 
 
 def _changes(command: argparse.ArgumentParser) -> None:
@@ -107,7 +125,14 @@ def _study_command(command: argparse.ArgumentParser) -> None:
     command.add_argument("--workers", type=int, help="processes (one a core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
     command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
-    command.set_defaults(command=studies.study)
+    command.set_defaults(command=_later("studies", "study"))
+
+
+def _example_command(command: argparse.ArgumentParser) -> None:
+    command.description = "Print a case, as in `archfem example ring > ring.toml`, or copy it."
+    command.add_argument("name", metavar="NAME", help="as `archfem examples` lists them")
+    command.add_argument("--out", metavar="DIR", help="copy it there, with all that it refers to")
+    command.set_defaults(command=_later("examples", "example"))
 
 
 def _motion_command(command: argparse.ArgumentParser) -> None:
@@ -119,4 +144,4 @@ def _motion_command(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
     )
-    command.set_defaults(command=cases.motion)
+    command.set_defaults(command=_later("cases", "motion"))

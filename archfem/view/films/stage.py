@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from archfem.arrays import Array
 from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
+from archfem.packages import check_drawing
 from archfem.view.films.colours import shade
 from archfem.view.films.setup import Setup
 from archfem.view.films.shots import Shot
@@ -55,6 +56,7 @@ class Stage:
         self._blocks = _surface(cells)
         self._edges = cells.rims
         self._outlines = _lines(self._flat(cells.places, EDGES), self._edges)
+        check_drawing()
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size))
         self._plotter.background_color = pv.Color("white")
         self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
