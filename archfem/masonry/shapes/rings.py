@@ -12,7 +12,7 @@ from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
-from archfem.units import G
+from archfem.units import G, in_degrees
 
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -20,7 +20,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     thickness: float,
     voussoirs: int,
     radius: float | None = None,
-    embrace: float | None = None,
+    embrace: float | str | None = None,
     span: float | None = None,
     rise: float | None = None,
     width: float = 1.0,
@@ -38,7 +38,8 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         thickness: ring depth t, from intrados to extrados [m].
         voussoirs: number of stones.
         radius: of the centre line [m]; goes with `embrace`.
-        embrace: angle that the ring subtends, between its springing joints [degrees].
+        embrace: angle that the ring subtends, between its springing joints [degrees];
+            a small one is given with its unit, "5 degree".
         span: clear span, at the intrados [m]; goes with `rise`, instead of the two above.
         rise: clear rise, at the intrados, at most half the span [m].
         width: out of plane [m].
@@ -50,6 +51,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         gravity: acceleration of gravity [m/s²].
 
     Raises:
+        InvalidInput: an angle looks like radians.
         InvalidStructure: the lengths do not make a ring.
     """
     real(thickness, "thickness [m]")
@@ -222,18 +224,18 @@ def _pier(
 
 def _circle(
     radius: float | None,
-    embrace: float | None,
+    embrace: float | str | None,
     span: float | None,
     rise: float | None,
     thickness: float,
 ) -> tuple[float, float]:
     """Radius of the centre line and embrace, from whichever pair was given."""
-    given = {"radius [m]": radius, "embrace [°]": embrace, "span [m]": span, "rise [m]": rise}
+    given = {"radius [m]": radius, "span [m]": span, "rise [m]": rise}
     for name, value in given.items():
         if value is not None:
             real(value, name)
     if radius is not None and embrace is not None and span is None and rise is None:
-        return radius, embrace
+        return radius, in_degrees(embrace, "embrace")
     if span is None or rise is None or radius is not None or embrace is not None:
         raise InvalidStructure("give a ring either radius and embrace, or span and rise")
     if not 0.0 < rise <= span / 2.0:
