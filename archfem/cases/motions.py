@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum, Eurocode8, TableSpectrum, Tbec2018
@@ -13,7 +15,18 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
 SYNTHETIC = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
-SOURCE = {"file": str, "column": int, "units": str, "dt": "s", "synthetic": dict}
+SOURCE = {
+    **{"file": str, "column": int, "units": str, "dt": "s"},
+    "synthetic": dict,
+    "samples": ["m/s**2"],
+}
+IDLE: dict[str, set[str]] = {
+    "file": set(),
+    "synthetic": {"column", "units", "dt"},
+    "samples": {"column", "units"},
+}
+"""Keys that say nothing of a motion from elsewhere than a file."""
+
 MOTION = {
     **SOURCE,
     "vertical": (str, dict),
@@ -168,22 +181,28 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
 
 
 def _source_settings(given: Any, keys: Table, section: str) -> dict[str, Any]:
-    """Check a table that says where a motion is from: either a file, or made from a seed."""
+    """Check a table that says where a motion is from: a file, its own samples, or a seed."""
     settings = checked(given, keys, section)
-    if ("synthetic" in settings) == ("file" in settings):
+    sources = sorted({"file", "synthetic", "samples"} & set(settings))
+    if len(sources) != 1:
         raise InvalidInput(
-            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one"
+            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one, or "
+            f"samples = [ … ] and dt; it has {sources or 'none of them'}"
         )
     if "synthetic" in settings:
         settings["synthetic"] = checked(settings["synthetic"], SYNTHETIC, f"{section}.synthetic")
-        idle = sorted({"column", "units", "dt"} & set(settings))
-        if idle:
-            raise InvalidInput(f"{section}.{idle[0]} belongs to a file, not to a synthetic motion")
+    idle = sorted(IDLE[sources[0]] & set(settings))
+    if idle:
+        raise InvalidInput(f"{section}.{idle[0]} belongs to a file, not to {sources[0]}")
+    if sources == ["samples"] and "dt" not in settings:
+        raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
     return settings
 
 
 def _from_source(settings: Table, folder: Path) -> Motion:
-    """Read a file by its own keywords, or make a motion."""
+    """Read a file by its own keywords, take the samples that are given, or make a motion."""
+    if "samples" in settings:
+        return Motion(np.array(settings["samples"]), settings["dt"])
     if "synthetic" in settings:
         return Motion.synthetic(**settings["synthetic"])
     options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.motions import ground_suite, suite_settings
+from archfem.cases.motions import ground_motion, ground_suite, motion_settings, suite_settings
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
 
@@ -57,6 +57,14 @@ def test_targets_are_those_of_the_codes(small, target, expected):
     )
 
 
+def test_samples_may_stand_in_the_case():
+    upright = {"samples": ["0.1 g", 0.0, -1.0], "dt": "10 ms"}
+    given = {"samples": [0.5, 1.0], "dt": 0.01, "vertical": upright, "scale": 2.0}
+    motion = ground_motion(motion_settings(given))
+    assert motion.horizontal.tolist() == [1.0, 2.0]
+    assert motion.vertical.tolist() == [0.2 * 9.80665, 0.0, -2.0]
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -66,6 +74,8 @@ def test_targets_are_those_of_the_codes(small, target, expected):
         ("suite.pairs.third={}", "suite.pairs.third needs either a file, or synthetic"),
         ("suite.pairs.third={synthetic={sed=1}}", "unknown key 'suite.pairs.third.synthetic.sed'"),
         ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
+        ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
+        ("suite.pairs.third={samples=[0.0, 1.0], synthetic={}}", "it has .'samples', 'synthetic'."),
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
         ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
         ("suite.matched=true", "suite.matched = true needs a target"),
