@@ -74,10 +74,12 @@ def in_degrees(value: Any, key: str) -> float:
         key: what to call the value in an error.
 
     Raises:
-        InvalidInput: it is no angle, not finite, or a bare number of so few degrees.
+        InvalidInput: it is no angle, text without a unit, or a bare number of so few degrees.
     """
     if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
         return float(plain[1])
+    if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
+        raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
     number = in_unit(value, "degree", key)
     if not isinstance(value, str) and 0.0 < abs(number) <= 2.0 * pi:
         raise InvalidInput(

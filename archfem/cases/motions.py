@@ -153,6 +153,23 @@ def target_spectrum(settings: Table) -> DesignSpectrum | None:
         raise InvalidInput(f"suite.target of {code}: {error}") from error
 
 
+def ground_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
+    """Return the pairs of a suite, read or made, under their own names, not matched yet.
+
+    Args:
+        settings: as checked by `suite_settings`.
+        folder: where relative file names start, or the name of the suite's own folder.
+
+    Raises:
+        InvalidInput: a file cannot be read.
+    """
+    files = folder / settings.get("folder", "")
+    return tuple(
+        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
+        for name, pair in settings["pairs"].items()
+    )
+
+
 def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
     """Return a suite of pairs, read or made, under their own names, and matched where asked.
 
@@ -164,14 +181,9 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
         InvalidInput: a file cannot be read or a pair not be matched.
         DidNotConverge: a pair did not come near the target.
     """
-    files = folder / settings.get("folder", "")
-    pairs = tuple(
-        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
-        for name, pair in settings["pairs"].items()
-    )
     suite = Suite(
         settings.get("name", "suite"),
-        pairs,
+        ground_pairs(settings, folder),
         scale=settings.get("scale", 1.0),
         reduction=settings.get("reduction", 1.0),
     )

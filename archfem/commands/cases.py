@@ -29,7 +29,7 @@ def check(given: argparse.Namespace) -> None:
     print(case.title)
     if case.limit is not None:
         print(collapse_words(case.structure, case.limit.of(case.structure)))
-    case.check_files()
+    case.check_ground()
     rest = Rest.of(case)
     _tell_rest(rest)
     if case.suite is not None:
@@ -58,7 +58,9 @@ def motion(given: argparse.Namespace) -> None:
     print(motion_table(motions))
     _tell_written(write_motions(motions, folder))
     if refused:
-        raise InvalidInput(f"{len(refused)} of {len(given.files)} files were refused, as said above")
+        raise InvalidInput(
+            f"{len(refused)} of {len(given.files)} files were refused, as said above"
+        )
 
 
 def accuracy(given: argparse.Namespace) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, degrees, radians
+from math import asin, degrees, pi, radians, sin
 
 import numpy as np
 
@@ -79,8 +79,9 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         _stone(faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre)
         for k in range(voussoirs)
     ]
-    left = _abutment(faces[0], -1.0, thickness / 2.0, material, "left abutment")
-    right = _abutment(faces[-1], 1.0, thickness / 2.0, material, "right abutment")
+    depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
+    left = _abutment(faces[0], -1.0, depth, material, "left abutment")
+    right = _abutment(faces[-1], 1.0, depth, material, "right abutment")
     joints = [
         Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
         for k in range(voussoirs + 1)
