@@ -12,6 +12,7 @@ from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum, Eurocode8, TableSpectrum, Tbec2018
 from archfem.motion.motion import Motion
+from archfem.motion.newer_codes import Asce2022, Eurocode2024, Ntc2018
 from archfem.motion.suite import Suite
 
 SYNTHETIC = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
@@ -49,6 +50,15 @@ SUITE = {
 TARGETS: dict[str, tuple[Callable[..., DesignSpectrum], Table]] = {
     "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
     "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
+    "NTC-2018": (
+        Ntc2018,
+        {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
+    ),
+    "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
+    "EC8-2024": (
+        Eurocode2024,
+        {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
+    ),
     "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
 }
 """Design spectra by name, for 5 % damping; accelerations are in g."""
