@@ -29,8 +29,9 @@ class Ntc2018:
     """Elastic spectra of the Italian technical standards for constructions of 2018.
 
     Horizontal: a_g S η F_0 (T/T_B + (1 - T/T_B)/(η F_0)), a_g S η F_0 from T_B = T_C/3, times T_C/T
-    from T_C = C_C T_C* and T_C T_D/T² from T_D = 4 a_g/g + 1.6 s to 4 s, with S = S_S S_T. Vertical:
-    the same with F_v = 1.35 F_0 √(a_g/g) in place of F_0 as factor, S_S = 1 and its own periods.
+    from T_C = C_C T_C* and T_C T_D/T² from T_D = 4 a_g/g + 1.6 s to 4 s, with S = S_S S_T.
+    Vertical: the same with the factor F_v = 1.35 F_0 √(a_g/g) in place of F_0, S_S = 1 and periods
+    of its own.
     η = √(10/(5 + ξ)) >= 0.55 with the damping ξ in per cent.
 
     Args:
@@ -108,7 +109,7 @@ class Ntc2018:
         """
         top = self._reduction * self.f0
         shape = branches(checked_periods(periods, 4.0), _UPRIGHT, lowest=1.0 / top)
-        return self.ag * self.topography * 1.35 * np.sqrt(self.ag) * top * shape
+        return 1.35 * self.ag**1.5 * self.topography * top * shape
 
     @property
     def _reduction(self) -> float:
@@ -191,7 +192,7 @@ class Eurocode2024:
     1 + S_β,RP/(m/s²) s where that is more, to 4 s; F_A = 2.5 and χ = 4.
 
     The site factors F_α and F_β depend on category, depth and stiffness of the ground and on the
-    accelerations themselves: they are to be taken from the standard, and are 1 on rock (category A).
+    accelerations themselves: they are to be taken from the standard; on rock, category A, they are 1.
     There is no vertical spectrum here: give one by points, as a `TableSpectrum`.
 
     Args:
@@ -245,8 +246,9 @@ class Eurocode2024:
         corners = (rise - _CUT, np.inf, np.inf)
         shape = branches(natural, corners, lowest=1.0 / _PEAK)
         beyond = np.maximum(natural + _CUT, falls)
-        shape = shape * (falls / beyond) * np.minimum(1.0, far / beyond)
-        return self.topography * self.f_alpha * self.s_alpha * shape
+        level = self.topography * self.f_alpha * self.s_alpha
+        found: Array = level * shape * (falls / beyond) * np.minimum(1.0, far / beyond)
+        return found
 
     def vertical(self, periods: float | Array) -> Array:
         """Refuse: the vertical spectrum has to be given by points.
