@@ -109,7 +109,9 @@ class Ntc2018:
         """
         top = self._reduction * self.f0
         shape = branches(checked_periods(periods, 4.0), _UPRIGHT, lowest=1.0 / top)
-        return 1.35 * self.ag**1.5 * self.topography * top * shape
+        factor = 1.35 * float(self.ag) ** 1.5 * self.topography
+        found: Array = factor * top * shape
+        return found
 
     @property
     def _reduction(self) -> float:
@@ -192,7 +194,7 @@ class Eurocode2024:
     1 + S_β,RP/(m/s²) s where that is more, to 4 s; F_A = 2.5 and χ = 4.
 
     The site factors F_α and F_β depend on category, depth and stiffness of the ground and on the
-    accelerations themselves: they are to be taken from the standard; on rock, category A, they are 1.
+    accelerations themselves: they are to be taken from the standard; on rock (A) they are 1.
     There is no vertical spectrum here: give one by points, as a `TableSpectrum`.
 
     Args:

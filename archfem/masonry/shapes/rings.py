@@ -76,12 +76,14 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     faces = [(_on_circle(inner, a), _on_circle(outer, a)) for a in angles]
     centre = (0.0, 0.0) if chords is None else None
     stones = [
-        _stone(faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre)
+        stone_between(
+            faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre
+        )
         for k in range(voussoirs)
     ]
     depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
-    left = _abutment(faces[0], -1.0, depth, material, "left abutment")
-    right = _abutment(faces[-1], 1.0, depth, material, "right abutment")
+    left = abutment_behind(faces[0], -1.0, depth, material, "left abutment")
+    right = abutment_behind(faces[-1], 1.0, depth, material, "right abutment")
     joints = [
         Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
         for k in range(voussoirs + 1)
@@ -253,10 +255,17 @@ def _on_circle(radius: float, angle: float) -> Point:
     return (float(radius * np.sin(angle)), float(radius * np.cos(angle)))
 
 
-def _stone(
+def stone_between(
     faces: Sequence[tuple[Point, Point]], material: Material, name: str, centre: Point | None
 ) -> Block:
-    """Voussoir from its radial sections, left to right."""
+    """Return a voussoir from its radial sections.
+
+    Args:
+        faces: intrados and extrados of each section, left to right [m].
+        material: of the stone.
+        name: of the stone.
+        centre: of the arcs, or None for straight faces [m].
+    """
     intrados = [face[0] for face in faces]
     extrados = [face[1] for face in reversed(faces)]
     n = len(faces)
@@ -265,10 +274,18 @@ def _stone(
     return Block(outline, material, name, corners=corners, part="arch", centre=centre, role="ring")
 
 
-def _abutment(
+def abutment_behind(
     face: tuple[Point, Point], side: float, depth: float, material: Material, name: str
 ) -> Block:
-    """Fixed block behind a springing joint; side is -1 at the left and 1 at the right."""
+    """Return the fixed block behind a springing joint.
+
+    Args:
+        face: the joint's intrados and extrados [m].
+        side: -1 at the left and 1 at the right.
+        depth: of the block, across the joint [m].
+        material: of the block.
+        name: of the block and its part.
+    """
     inner, outer = np.array(face[0]), np.array(face[1])
     radial = (outer - inner) / np.linalg.norm(outer - inner)
     shift = side * depth * np.array([radial[1], -radial[0]])
