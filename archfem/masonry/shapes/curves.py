@@ -25,7 +25,7 @@ FINE = 4001
 """Points of a curve between which its length is summed: for an ellipse to 1e-7 of it."""
 
 
-def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
+def pointed_arch(
     *,
     span: float,
     rise: float,
@@ -78,7 +78,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     return _ring(_mirrored(left, voussoirs), width, material, contact, gravity, "pointed arch")
 
 
-def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
+def elliptical_arch(
     *,
     span: float,
     rise: float,
@@ -122,7 +122,7 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     return _ring(stones, width, material, contact, gravity, "elliptical arch")
 
 
-def flat_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
+def flat_arch(
     *,
     span: float,
     thickness: float,
@@ -164,7 +164,7 @@ def flat_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     return _ring(stones, width, material, contact, gravity, "flat arch")
 
 
-def arch_along(  # noqa: PLR0913  (all are lengths and properties of one ring)
+def arch_along(
     intrados: Sequence[Point] | Array,
     *,
     thickness: float,

@@ -77,11 +77,11 @@ class Arch:
 class Pier:
     """A pier of stone courses, flush with the intrados of the rings that spring from it.
 
-    Its top course is one skewback between the two springing joints, or behind that of the only ring.
+    Its top course is one skewback between the two springing joints, or behind the only one.
 
     Attributes:
-        gap: between the springings of the neighbouring centre lines, or from that of the only one to
-            the outer face [m].
+        gap: between the springings of the neighbouring centre lines, or from that of the only
+            one to the outer face [m].
         height: from foundation to springing level [m].
         course: height of a course, about; courses of a pier are equally high [m].
         name: of the part.
