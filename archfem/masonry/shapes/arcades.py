@@ -15,7 +15,7 @@ Numbers = float | Sequence[float]
 """One for all, or one for each, from left to right."""
 
 
-def buttressed_arch(
+def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     span: float,
     thickness: float,
@@ -70,7 +70,7 @@ def buttressed_arch(
     )
 
 
-def arcade(
+def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     spans: Sequence[float],
     heights: Numbers,

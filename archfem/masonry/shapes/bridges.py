@@ -23,7 +23,7 @@ THIN = 0.02
 """Least fill above rings and sidewalls [m]."""
 
 
-def bridge(
+def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
     *,
     arches: Sequence[Arch],
     piers: Sequence[Pier] = (),

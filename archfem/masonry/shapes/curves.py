@@ -5,6 +5,7 @@ intrados, or converge in a flat arch; block 0 is the left abutment and joint 0 t
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from math import acos, atan2, tan
 
 import numpy as np
@@ -25,7 +26,7 @@ FINE = 4001
 """Points of a curve between which its length is summed: for an ellipse to 1e-7 of it."""
 
 
-def pointed_arch(
+def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
     rise: float,
@@ -72,13 +73,13 @@ def pointed_arch(
         return np.column_stack([centre - size * np.cos(angles), size * np.sin(angles)])
 
     left = []
-    for start, end in zip(turns, turns[1 : (voussoirs + 1) // 2 + 1], strict=False):
+    for start, end in pairwise(turns[: (voussoirs + 1) // 2 + 1]):
         far = outer_top if end == top else end
         left.append((arc(start, end, radius), arc(start, far, radius + thickness)))
     return _ring(_mirrored(left, voussoirs), width, material, contact, gravity, "pointed arch")
 
 
-def elliptical_arch(
+def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     span: float,
     rise: float,

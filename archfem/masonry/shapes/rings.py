@@ -15,7 +15,7 @@ from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
 
 
-def circular_arch(
+def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
     thickness: float,
     voussoirs: int,
@@ -142,7 +142,7 @@ def column(
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
 
 
-def arch_on_piers(
+def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
     *,
     radius: float,
     thickness: float,

@@ -115,7 +115,7 @@ def read_outlines(
     return survey
 
 
-def surveyed(
+def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how they touch)
     path: str | Path,
     *,
     unit: str | None = None,
