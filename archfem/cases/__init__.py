@@ -10,6 +10,7 @@
     run         carry out a case; go on where an earlier run ended
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
+    told        warnings that name case and motion
     inputs      files that a case reads besides its own
     shipped     the cases that archfem brings
 

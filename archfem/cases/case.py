@@ -249,6 +249,18 @@ class Case:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
         return ground.ground_suite(self.suite, self.folder)
 
+    def check_ground(self) -> None:
+        """Refuse motions that cannot be read, before anything is computed to be shaken by them.
+
+        Raises:
+            InvalidInput: a file is missing or no record; or horizontal and vertical do not go
+                together.
+        """
+        if self.motion is not None:
+            self.ground_motion()
+        if self.suite is not None:
+            ground.ground_pairs(self.suite, self.folder)
+
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""

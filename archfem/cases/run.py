@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
@@ -135,6 +136,7 @@ def carried_out(
             first step of a run could be made.
     """
     shake, folder = shake or shaken, None if folder is None else Path(folder)
+    (case if pairs is None else case.alone(*pairs)).check_ground()
     if case.limit is not None:
         yield case.limit.of(case.structure)
     rest = Rest.of(case)
@@ -248,20 +250,21 @@ def shaken(
     output = case.output
     animated = FRAMES if output.get("animation", False) else None
     try:
-        run = time_history(
-            dead.model,
-            motion,
-            dt=case.analysis.get("dt"),
-            start=dead,
-            damping=damping or damping_of(case, dead)[0],
-            scheme=case.scheme,
-            record=Record(
-                every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-            ),
-            until=CountedMechanism() if case.analysis.get("halt", False) else None,
-            criteria=case.criteria,
-            method=method,
-        )
+        with told_of(case.title, motion.name):
+            run = time_history(
+                dead.model,
+                motion,
+                dt=case.analysis.get("dt"),
+                start=dead,
+                damping=damping or damping_of(case, dead)[0],
+                scheme=case.scheme,
+                record=Record(
+                    every=output.get("every", 1), fields_every=output.get("fields_every", animated)
+                ),
+                until=CountedMechanism() if case.analysis.get("halt", False) else None,
+                criteria=case.criteria,
+                method=method,
+            )
     except DidNotConverge as error:
         if error.history is not None:
             error.history.dataset.attrs["case"] = case.text()

@@ -104,3 +104,16 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
     assert motion.pga == pytest.approx(0.980665)
     with pytest.raises(af.InvalidInput, match=r'suite\.pairs\.one\.resample = "0\.01 s"'):
         ground_suite(suite_settings({"pairs": {"one": given}}), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("target", "period", "value"),
+    [
+        ('{code="NTC-2018", ag=0.25, f0=2.5, tc_star="0.35 s", site="A"}', 0.2, 0.625),
+        ('{code="ASCE-7-22", sds=1.2, sd1=0.6, tl="8 s"}', 1.0, 0.6),
+        ('{code="EC8-2024", s_alpha=0.5, s_beta=0.15, f_alpha=1.2, f_beta=1.6}', 0.2, 0.6),
+    ],
+)
+def test_codes_by_name(small, target, period, value):
+    spectrum = af.Case.read(small, [f"suite.target={target}"]).target
+    assert spectrum.horizontal(period) == pytest.approx(value)
