@@ -15,6 +15,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.strength import use_sentence
 
+DOUBTFUL = 3
+"""Exit code of a command whose answer is in doubt."""
+
 
 def check(given: argparse.Namespace) -> None:
     """Read a case, do its limit analysis, find its dead load, read its motions.
@@ -122,11 +125,14 @@ def modes(given: argparse.Namespace) -> None:
     _tell_written(write_modes(found, text, Path(given.out)))
 
 
-def run(given: argparse.Namespace) -> None:
+def run(given: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
     Args:
         given: `case`, a file, `changes` to it, the folder `out`, and `workers` for pairs.
+
+    Returns:
+        `DOUBTFUL` where a run has doubts, else 0.
     """
     case, folder = Case.read(given.case, given.changes), Path(given.out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -136,16 +142,19 @@ def run(given: argparse.Namespace) -> None:
         from archfem.studies.pairs import run_pairs
 
         run_pairs(case, folder, workers=given.workers)
-    tell(case, carried_out(case, folder), folder)
+    return DOUBTFUL if tell(case, carried_out(case, folder), folder) else 0
 
 
-def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
+def tell(case: Case, results: Iterable[Result], folder: Path) -> bool:
     """Print the results of a case as they come, and write their tables and pictures.
 
     Args:
         case: what was asked.
         results: as by `carried_out`.
         folder: for the files.
+
+    Returns:
+        Whether any run has doubts; its summary begins with them.
 
     Raises:
         DidNotConverge: a step of a run failed.
@@ -174,6 +183,7 @@ def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _tell_pairs(suite, runs, rest, folder)
+    return any(run.doubts for run in runs.values())
 
 
 def _tell_run(done: Run, rest: Rest) -> None:

@@ -7,10 +7,18 @@ import sys
 from collections.abc import Callable, Sequence
 
 from archfem.commands import cases, studies
+from archfem.commands.cases import DOUBTFUL
 from archfem.errors import ArchfemError
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
+
+CODES = f"""\
+exit codes: 0, an answer; 1, an error in words, no answer; 2, the words of the command are not
+understood; {DOUBTFUL}, an answer that is in doubt: summary.txt begins with why (energy that drifts,
+displacements that are not small, a rung that is wrong or errs by more than was asked for); 130,
+ended by Ctrl-C.
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,17 +35,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: given.command(given))
 
 
-def exit_code(command: Callable[[], None]) -> int:
+def exit_code(command: Callable[[], int | None]) -> int:
     """Run a command, print the error that ends it, if one does, and return its exit code.
 
     Args:
-        command: what to do.
+        command: what to do; may return an exit code of its own.
 
     Returns:
-        0 for success, 1 for an error of the case or of a file, 130 after Ctrl-C.
+        0 for success, 1 for an error of the case or of a file, 3 for an answer that is in doubt,
+        130 after Ctrl-C.
     """
     try:
-        command()
+        return command() or 0
     except ArchfemError as error:
         print(f"archfem: {error}", file=sys.stderr)
         return 1
@@ -54,12 +63,14 @@ def exit_code(command: Callable[[], None]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="archfem", description="Does a dry-stone arch or bridge survive an earthquake?"
+        prog="archfem",
+        description="Does a dry-stone arch or bridge survive an earthquake?",
+        epilog=CODES,
     )
     chosen = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def case_command(name: str, about: str) -> argparse.ArgumentParser:
-        command = chosen.add_parser(name, help=about, description=about)
+        command = chosen.add_parser(name, help=about, description=about, epilog=CODES)
         command.add_argument("case", metavar="CASE.toml", help="the case file")
         _changes(command)
         return command
