@@ -10,7 +10,7 @@
     run         carry out a case; go on where an earlier run ended
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
-    inputs      files that a case reads besides its own
+    inputs      what an answer hangs on besides: the files a case reads, the program
 
 It imports from all rooms to its left. Start reading at `case`, then at `run`.
 """

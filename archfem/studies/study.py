@@ -13,13 +13,14 @@ from threadpoolctl import threadpool_limits
 
 from archfem.arguments import whole
 from archfem.cases.case import Case
+from archfem.cases.inputs import package_version
 from archfem.cases.settings import checked, refuse_unknown
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.studies.asking import Asked
 from archfem.studies.comparison import Comparison
 from archfem.studies.files import study_tables
 from archfem.studies.over import Axis, axes_over, changes_along, ends
-from archfem.studies.points import Point, package_version
+from archfem.studies.points import Point
 from archfem.studies.processes import on_processes, serially
 from archfem.studies.progress import Progress, status
 from archfem.studies.store import Store
@@ -189,9 +190,16 @@ class Study:
             for number, row in found:
                 rows[digests[number]] = row
                 if store is not None:
-                    store.keep(digests[number], row)
+                    self._keep(store, number, digests[number], row)
                 progress.add(failed=bool(row["error"]))
         return [rows[digest] for digest in digests]
+
+    def _keep(self, store: Store, number: int, digest: str, row: Row) -> None:
+        """Keep the row of a point, unless a file was changed since the study was begun."""
+        if self.points[number].digest(self.asked.text) == digest:
+            store.keep(digest, row)
+        else:
+            logger.warning("point %d: a file it reads was changed meanwhile: not kept", number)
 
     def _answers(
         self,
