@@ -117,6 +117,9 @@ def _study_command(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for the results")
     command.add_argument("--workers", type=int, help="processes (one a core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
+    command.add_argument(
+        "--own-code", action="store_true", help="let the study's find run a function of its own"
+    )
     command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
     command.set_defaults(command=studies.study)
 

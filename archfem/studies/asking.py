@@ -84,6 +84,23 @@ class Asked:
         return {str(key): _value(key, value) for key, value in found.items()}
 
 
+def refuse_code(given: Any) -> None:
+    """Refuse what a file says is to be found if that is code of its own.
+
+    Args:
+        given: as for `Asked.of`.
+
+    Raises:
+        InvalidInput: it names a function of a module.
+    """
+    name = given.get("name") if isinstance(given, Mapping) else given
+    if isinstance(name, str) and ":" in name:
+        raise InvalidInput(
+            f"find = '{name}' is code, which no file runs by itself: if you trust it, say so, "
+            "archfem study --own-code, or Study.read(…, own_code=True)"
+        )
+
+
 def _source(find: Find) -> str:
     """Source of the module that a function is of; of the function alone where it has no file."""
     file = inspect.getsourcefile(find)

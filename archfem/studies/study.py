@@ -16,7 +16,7 @@ from archfem.cases.case import Case
 from archfem.cases.inputs import package_version
 from archfem.cases.settings import checked, refuse_unknown
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.studies.asking import Asked
+from archfem.studies.asking import Asked, refuse_code
 from archfem.studies.comparison import Comparison
 from archfem.studies.files import study_tables
 from archfem.studies.over import Axis, axes_over, changes_along, ends
@@ -96,7 +96,9 @@ class Study:
         return study
 
     @classmethod
-    def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Study":
+    def read(
+        cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False
+    ) -> "Study":
         """Read a study: a TOML file with a case and what it goes over, or with cases side by side.
 
         Args:
@@ -104,6 +106,8 @@ class Study:
                 of "section.key=value". Or with a table [cases."name"] for each of some cases, as
                 for `Comparison.read`.
             changes: made to every case.
+            own_code: whether `find` may name a function of a module, which is code that runs;
+                without it only our own are taken, since a file may come from anywhere.
 
         Returns:
             The study.
@@ -123,11 +127,14 @@ class Study:
                 f'{path} says nothing of {missing[0]}: write case = "file.toml", and over, keys of '
                 "the case with lists of values or distributions"
             )
+        find = given.get("find", "history")
+        if not own_code:
+            refuse_code(find)
         case = Case.read(path.parent / given["case"], [*given.get("set", []), *changes])
         return cls.of(
             case,
             given["over"],
-            given.get("find", "history"),
+            find,
             samples=given.get("samples"),
             title=given.get("title", path.stem),
         )
