@@ -32,6 +32,11 @@ ANGLES = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "millia
 
 _DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
 """Degrees as most write them, read without the registry of units."""
+LONGEST, FACTORS = 100, 4
+"""Letters and powers that a quantity has at most."""
+
+POWERS = re.compile(r"\*\*(?![-+]?\d(?![\d.eE]|\*\*))|[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
+"""A power that is more than a digit, or has one of its own: "9**9**9" would never be done."""
 
 
 @cache
@@ -92,6 +97,12 @@ def in_degrees(value: Any, key: str) -> float:
 def _converted(text: str, unit: str, key: str) -> float:
     import pint
 
+    plain = re.sub(r"\s", "", text).replace("^", "**")
+    if len(text) > LONGEST or POWERS.search(plain) or plain.count("**") > FACTORS:
+        raise InvalidInput(
+            f"{key} = {text[:LONGEST]!r} is not a quantity: write a number and a unit with small "
+            'whole powers, e.g. "20 kN/m**3"'
+        )
     registry = _registry()
     wanted = "dimensionless" if unit == "1" else unit
     if unit == ACCELERATION:

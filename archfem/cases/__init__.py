@@ -11,7 +11,7 @@
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
     told        warnings that name case and motion
-    inputs      files that a case reads besides its own
+    inputs      what an answer hangs on besides: the files a case reads, the program
     shipped     the cases that archfem brings
 
 It imports from all rooms to its left. Start reading at `case`, then at `run`.

@@ -11,6 +11,7 @@ import xarray as xr
 
 from archfem.cases.case import Case
 from archfem.cases.told import told_of
+from archfem.cases.inputs import inputs_digest
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
@@ -248,6 +249,7 @@ def shaken(
         DidNotConverge: a step failed; `history` is the record up to it.
     """
     output = case.output
+    of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
     animated = FRAMES if output.get("animation", False) else None
     try:
         with told_of(case.title, motion.name):
@@ -267,14 +269,16 @@ def shaken(
             )
     except DidNotConverge as error:
         if error.history is not None:
-            error.history.dataset.attrs["case"] = case.text()
+            error.history.dataset.attrs |= of_case
         raise
-    run.dataset.attrs["case"] = case.text()
+    run.dataset.attrs |= of_case
     return run
 
 
 def finished(path: Path, case: Case, motion: Motion) -> History | None:
     """Return what an earlier run left, where it ended by itself, of the same case and motion.
+
+    The files that the case reads, and archfem itself, must be those of then, to the letter.
 
     Args:
         path: file of the history.
@@ -289,7 +293,8 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
         whole = run.ended.by_itself
     except InvalidInput:
         return None
-    if not whole or run.dataset.attrs.get("case") != case.text():
+    told = run.dataset.attrs
+    if not whole or told.get("inputs") != inputs_digest(case.settings, case.folder):
         return None
     before, now = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
@@ -300,7 +305,9 @@ def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> R
     case = rest.case.alone(motion.name)
     path = None if folder is None else folder / motion.name / HISTORY
     if path is not None and (history := finished(path, case, motion)) is not None:
-        return Run(case, motion, history, path, kept=True)
+        chosen = rest.dead.model.prediction  # by the first pair, which this one may not be
+        if chosen is None or history.dataset.attrs.get("predicted_error") == chosen.error:
+            return Run(case, motion, history, path, kept=True)
     return _run(case, motion, rest, path, shake)
 
 

@@ -9,10 +9,20 @@ from importlib import import_module
 
 from archfem.errors import ArchfemError
 
-Command = Callable[[argparse.Namespace], None]
+Command = Callable[[argparse.Namespace], int | None]
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
+
+DOUBTFUL = 3
+"""What a command ends with whose answer is in doubt."""
+
+CODES = f"""\
+exit codes: 0, an answer; 1, an error in words, no answer; 2, the words of the command are not
+understood; {DOUBTFUL}, an answer that is in doubt: summary.txt begins with why (energy that drifts,
+displacements that are not small, a rung that is wrong or errs by more than was asked for); 130,
+ended by Ctrl-C.
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,17 +39,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: given.command(given))
 
 
-def exit_code(command: Callable[[], None]) -> int:
+def exit_code(command: Callable[[], int | None]) -> int:
     """Run a command, print the error that ends it, if one does, and return its exit code.
 
     Args:
-        command: what to do.
+        command: what to do; may return an exit code of its own.
 
     Returns:
-        0 for success, 1 for an error of the case or of a file, 130 after Ctrl-C.
+        0 for success, 1 for an error of the case or of a file, 3 for an answer that is in doubt,
+        130 after Ctrl-C.
     """
     try:
-        command()
+        return command() or 0
     except ArchfemError as error:
         print(f"archfem: {error}", file=sys.stderr)
         return 1
@@ -56,14 +67,16 @@ def exit_code(command: Callable[[], None]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="archfem", description="Does a dry-stone arch or bridge survive an earthquake?"
+        prog="archfem",
+        description="Does a dry-stone arch or bridge survive an earthquake?",
+        epilog=CODES,
     )
     release = import_module("archfem").__version__
     parser.add_argument("--version", action="version", version=f"archfem {release}")
     chosen = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def case_command(name: str, about: str) -> argparse.ArgumentParser:
-        command = chosen.add_parser(name, help=about, description=about)
+        command = chosen.add_parser(name, help=about, description=about, epilog=CODES)
         command.add_argument("case", metavar="CASE.toml", help="the case file")
         _changes(command)
         return command
@@ -101,8 +114,9 @@ def _parser() -> argparse.ArgumentParser:
 def _later(module: str, name: str) -> Command:
     """A command that is imported when it is given: most import all rooms."""
 
-    def command(given: argparse.Namespace) -> None:
-        getattr(import_module(f"archfem.commands.{module}"), name)(given)
+    def command(given: argparse.Namespace) -> int | None:
+        code: int | None = getattr(import_module(f"archfem.commands.{module}"), name)(given)
+        return code
 
     return command
 
@@ -124,6 +138,9 @@ def _study_command(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for the results")
     command.add_argument("--workers", type=int, help="processes (one a core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
+    command.add_argument(
+        "--own-code", action="store_true", help="let the study's find run a function of its own"
+    )
     command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
     command.set_defaults(command=_later("studies", "study"))
 
