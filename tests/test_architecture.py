@@ -32,6 +32,7 @@ ONLY_IN = {
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",
+    "imageio_ffmpeg": "view.films",
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
-from archfem.cases.told import told_of
 from archfem.cases.inputs import inputs_digest
+from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of

@@ -107,6 +107,8 @@ def _parser() -> argparse.ArgumentParser:
     _example_command(chosen.add_parser("example", help="print one of them, or copy it"))
     health = chosen.add_parser("doctor", help="what is installed, what is missing, how to get it")
     health.set_defaults(command=_later("doctor", "doctor"))
+    about = "film the history of a run"
+    _film_command(chosen.add_parser("animate", help=about, description=about))
     _motion_command(chosen.add_parser("motion", help="measures and pictures of ground motions"))
     return parser
 
@@ -150,6 +152,21 @@ def _example_command(command: argparse.ArgumentParser) -> None:
     command.add_argument("name", metavar="NAME", help="as `archfem examples` lists them")
     command.add_argument("--out", metavar="DIR", help="copy it there, with all that it refers to")
     command.set_defaults(command=_later("examples", "example"))
+
+
+def _film_command(command: argparse.ArgumentParser) -> None:
+    command.add_argument("history", metavar="HISTORY.nc", help="the history, which has fields")
+    command.add_argument("--case", metavar="CASE.toml", help="its case (the one beside it)")
+    command.add_argument("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
+    command.add_argument(
+        "--window", metavar="auto|FROM,TO", help="slow motion around the mechanism, or a time [s]"
+    )
+    command.add_argument("--colour", help="displacement or stress (displacement)")
+    command.add_argument("--magnification", type=float, help="of displacements (chosen)")
+    command.add_argument("--fps", type=float, help="frames a second, at most (20)")
+    command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
+    command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    command.set_defaults(command=_later("films", "animate"))
 
 
 def _motion_command(command: argparse.ArgumentParser) -> None:
