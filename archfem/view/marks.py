@@ -80,7 +80,7 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
     slipping = np.flatnonzero(shown & joints["slide"].values)
     arrows = [_slip(structure, k, ends[k], joints["V"].values[k]) for k in slipping]
     thrust = np.where(shown[:, None], carried + thrust_line(structure, joints).values, np.nan)
-    links = thrust[_neighbours(structure, shown)]
+    links = thrust[linked(structure, shown)]
     return Marks(
         thrust=thrust,
         links=links[np.isfinite(links).all(axis=(1, 2))],
@@ -90,8 +90,13 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
     )
 
 
-def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Pairs of joints with a block between them that has no other shown joint (n_links, 2)."""
+def linked(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return pairs of joints with a block between them that has no other shown joint (n_links, 2).
+
+    Args:
+        structure: whose joints they are.
+        shown: whether each joint is (n_joints,).
+    """
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
