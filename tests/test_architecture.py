@@ -31,6 +31,8 @@ ONLY_IN = {
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",
+    "jinja2": "view.pages",
+    "markupsafe": "view.pages",
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",

@@ -11,6 +11,8 @@
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
     inputs      files that a case reads besides its own
+    folders     result folders opened again
+    dossier     the report of a case, one page to hand in and to print
 
 It imports from all rooms to its left. Start reading at `case`, then at `run`.
 """
