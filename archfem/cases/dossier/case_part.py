@@ -65,6 +65,8 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
             yield from _flat(f"{name}.{key}", inner)
     elif isinstance(value, list | tuple):
         yield name, ", ".join(str(each) for each in value)
+    elif isinstance(value, bool):
+        yield name, "yes" if value else "no"
     else:
         yield name, str(value)
 
@@ -163,7 +165,7 @@ def _materials(structure: Structure) -> list[Grid]:
     materials = [
         [
             each.name,
-            f"{each.young / MPa:.4g}",
+            f"{each.young / MPa:.6g}",
             f"{each.poisson:g}",
             f"{each.unit_weight / kN:g}",
             "not known" if each.strength is None else f"{each.strength / MPa:g}",

@@ -60,10 +60,20 @@ def _response(results: Results, name: str, players: int) -> list[Any]:
     pieces.append(player_of(case, run, title, players))
     if case.suite is None:
         pieces.append(Plate.of(draw_envelope({name: run}, dead=results.dead), STEADY))
-    pieces.append(Grid(*joint_rows(run.joints, results.dead), JOINTS))
+    pieces.append(_grid_of_joints(run, results))
     strength = utilisation_sentence(case.structure, run.joints)
     pieces.append(Words(_sentence(strength)))
     return pieces
+
+
+def _grid_of_joints(run: History, results: Results) -> Grid:
+    """Criteria per joint, without columns of what no joint did."""
+    head, rows = joint_rows(run.joints, results.dead)
+    kept = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
+    never = {head[k].split()[0] for k in range(len(head)) if k not in kept}
+    words = {"hinge": "No joint hinged.", "slide": "No joint slid.", "open": "None came apart."}
+    caption = " ".join([JOINTS, *(words[key] for key in words if key in never)])
+    return Grid([head[k] for k in kept], [[row[k] for k in kept] for row in rows], caption)
 
 
 def _mechanism(run: History) -> list[Any]:

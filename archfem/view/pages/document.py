@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from re import sub
 from typing import Any
 
 import matplotlib
@@ -15,12 +16,16 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 
+DENSE = 300.0
+"""Dots per inch of the pictures that `archfem.view.save` writes."""
+
+
 @dataclass(frozen=True)
 class Words:
     """A paragraph, or lines of text as they are.
 
     Attributes:
-        text: the words; they are escaped.
+        text: the words; they are escaped, and what stands between ` is set as code.
         manner: "plain", "missing" for what the results do not hold, "doubt" for what is to be
             looked at, or "lines" for text whose columns matter.
     """
@@ -55,10 +60,12 @@ class Plate:
     Attributes:
         source: the picture itself, as a data URI.
         caption: below it.
+        inches: its width; it is made smaller where the page is narrower.
     """
 
     source: str
     caption: str
+    inches: float
 
     kind = "plate"
 
@@ -75,7 +82,7 @@ class Plate:
         buffer = BytesIO()
         with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-        return cls(_uri("image/svg+xml", buffer.getvalue()), caption)
+        return cls(_uri("image/svg+xml", buffer.getvalue()), caption, float(figure.get_figwidth()))
 
     @classmethod
     def read(cls, path: Path, caption: str) -> "Plate":
@@ -85,7 +92,9 @@ class Plate:
             path: a .png file.
             caption: below it.
         """
-        return cls(_uri("image/png", path.read_bytes()), caption)
+        content = path.read_bytes()
+        pixels = int.from_bytes(content[16:20], "big")  # where the header of the format has it
+        return cls(_uri("image/png", content), caption, round(pixels / DENSE, 2))
 
 
 @dataclass(frozen=True)
@@ -152,7 +161,13 @@ def _templates() -> Environment:
     source = found.loader.get_source
     found.globals["plain"] = lambda name: Markup(source(found, name)[0])  # noqa: S704
     found.globals["raw"] = Markup
+    found.filters["typeset"] = _typeset
     return found
+
+
+def _typeset(cell: str) -> str:
+    """A cell with the minus of a number, and the dash of what there is not, as print has them."""
+    return "–" if cell == "-" else sub(r"^-(?=\d)", "−", cell)
 
 
 def _uri(media: str, content: bytes) -> str:

@@ -249,7 +249,7 @@ class Scene:
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
-            "note": "" if self.moved is not None else self.why_still or WHY_STILL,
+            "note": "" if self.moved is not None else self.why_still or _still(run),
             "pack": pack.head,
             "bytes": pack.text,
         }
@@ -260,11 +260,13 @@ class Scene:
         return json.dumps(self.data, separators=(",", ":")).replace("<", "\\u003c")
 
 
-WHY_STILL = (
-    "No displacements were kept of this run: stones are drawn where they stand, and joints open "
-    "between them. With fields_every = 8 in [output] of its case the run keeps them."
-)
-"""What a reader is told where blocks do not move."""
+def _still(run: History) -> str:
+    """What a reader is told where blocks do not move."""
+    opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
+    return (
+        f"The run kept no displacements: stones are drawn where they stand{opening}. With "
+        "fields_every = 8 in [output] of its case it keeps them."
+    )
 
 
 def _around(points: list[Array], room: float) -> tuple[Array, Array]:

@@ -181,6 +181,7 @@
       time.max = scene.end;
       time.addEventListener("input", () => { this.pause(); this.show(Number(time.value)); });
       this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
+      this.find("by").hidden = !(this.arrays.frame_time || this.arrays.opening);
       this.most = Math.max(10 * scene.magnification, 10);
       by.value = Math.log(this.by) / Math.log(this.most);
       by.addEventListener("input", () => {
