@@ -33,6 +33,8 @@ ONLY_IN = {
     "pyvista": "view.films",
     "imageio": "view.films",
     "imageio_ffmpeg": "view.films",
+    "jinja2": "view.pages",
+    "markupsafe": "view.pages",
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",

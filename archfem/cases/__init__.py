@@ -13,6 +13,8 @@
     told        warnings that name case and motion
     inputs      what an answer hangs on besides: the files a case reads, the program
     shipped     the cases that archfem brings
+    folders     result folders opened again
+    dossier     the report of a case, one page to hand in and to print
 
 It imports from all rooms to its left. Start reading at `case`, then at `run`.
 """

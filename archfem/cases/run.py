@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -26,6 +27,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.strength import strength_use
+
+if TYPE_CHECKING:
+    from archfem.view.pages.player import Player
 
 HISTORY = "history.nc"
 """Name of a history's file."""
@@ -100,6 +104,27 @@ class Run:
     kept: bool = False
     seconds: float = 0.0
     error: DidNotConverge | None = None
+
+    def report(self, path: str | Path) -> Path:
+        """Write a report of the run: one HTML file, to hand in and to print.
+
+        Args:
+            path: the file, .html; folders are made.
+
+        Returns:
+            The file.
+        """
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+        from archfem.cases.dossier.writing import write_report
+
+        folder = None if self.path is None else self.path.parent
+        return write_report(Results(self.case, {self.motion.name: self.history}, folder), path)
+
+    def player(self) -> "Player":
+        """Return the player of the run, which shows itself in a notebook."""
+        from archfem.cases.dossier.display import player_of
+
+        return player_of(self.case, self.history, self.case.title)
 
 
 Result = Collapse | Rest | Suite | Run

@@ -130,6 +130,18 @@ def modes(given: argparse.Namespace) -> None:
     _tell_written(write_modes(found, text, folder))
 
 
+def report(given: argparse.Namespace) -> None:
+    """Write one page of what a result folder holds.
+
+    Args:
+        given: `folder`, the page `out`, and `inputs`, the folder of the case's drawing, or None.
+    """
+    from archfem.cases.folders import opened
+
+    path = opened(given.folder, inputs=given.inputs).report(given.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
 def run(given: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 

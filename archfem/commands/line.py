@@ -97,6 +97,12 @@ def _parser() -> argparse.ArgumentParser:
     accuracy = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
     accuracy.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     accuracy.set_defaults(command=_later("cases", "accuracy"))
+    report = chosen.add_parser("report", help="one HTML page of a result folder, to print")
+    report.description = "Write one self-contained HTML page of what a result folder holds."
+    report.add_argument("folder", metavar="FOLDER", help="that `archfem run` has written")
+    report.add_argument("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    report.add_argument("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
+    report.set_defaults(command=_later("cases", "report"))
     about = "many cases: a table of what is found of each, on all cores or a cluster"
     _study_command(chosen.add_parser("study", help=about, description=about))
     ready = chosen.add_parser("compile", help="compile once what time steps need: about a minute")
