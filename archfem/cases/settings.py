@@ -4,11 +4,11 @@ What a key may hold is written as a unit for a number, `NumberOr` for a number o
 words, a Python type or several, or a list of one unit or type for a list.
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from archfem.cases.toml import tables_of
 from archfem.errors import InvalidInput
 from archfem.masonry.naming import did_you_mean
 from archfem.units import in_unit
@@ -133,8 +133,8 @@ def change(settings: dict[str, Any], text: str) -> None:
     if not equals or not path.strip():
         raise InvalidInput(f"'{text}' is not a change: write section.key=value")
     try:
-        value = tomllib.loads(f"value = {words}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = tables_of(f"value = {words}")["value"]
+    except InvalidInput:
         value = words.strip()
     put(settings, path.strip(), value)
 

@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
+from archfem.annotated import as_annotated
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
 from archfem.dynamics.schemes import Viscous
@@ -35,6 +36,7 @@ FINEST = 1e-4
 """Smallest tolerance of |e| by which steps are tried: 0.5 ms or so where a ring is shaken [-]."""
 
 
+@as_annotated
 def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice needs)
     structure: Structure,
     *,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill import Fill
@@ -13,6 +14,7 @@ THINNEST = 1e-4
 """Thickness at which the search for one that stands begins, relative to the structure's size."""
 
 
+@as_annotated
 def minimum_thickness(
     build: Callable[[float], Structure],
     *,

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.annotated import check_fields
 from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
@@ -96,6 +97,7 @@ class Structure:
 
     def __post_init__(self) -> None:
         """Fill in roles, and refuse what does not hang together."""
+        check_fields(self)
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
         if not 0.0 < real(self.width, "width [m]") < 1e4:

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput
 from archfem.masonry.softness import soft_blocks, softness
 from archfem.masonry.structure import Structure
@@ -14,6 +15,7 @@ from archfem.models.rigid import rigid
 logger = logging.getLogger("archfem")
 
 
+@as_annotated
 def build(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of a structure.
 

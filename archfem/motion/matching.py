@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.motion import oscillator, signals
@@ -42,6 +43,7 @@ class Match:
     after: dict[str, Measures]
 
 
+@as_annotated
 def matched(
     motion: Motion,
     spectrum: DesignSpectrum,

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.annotated import methods_as_annotated
+from archfem.arguments import instance, is_number, said
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import signals
@@ -17,9 +17,10 @@ from archfem.motion.records.read import read_components
 from archfem.motion.synthetic import accelerogram
 from archfem.units import STANDARD_GRAVITY
 
-COMPONENTS = ("horizontal", "vertical", "transverse")
+COMPONENTS = "horizontal", "vertical", "transverse"
 
 
+@methods_as_annotated
 @dataclass(frozen=True, eq=False)
 class Motion:
     """The acceleration of the ground in up to three directions, which begin together.
@@ -45,8 +46,10 @@ class Motion:
     transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
-            raise InvalidInput(f"dt {self.dt!r} s: the time between samples is a positive number")
+        if not (is_number(self.dt) and self.dt > 0.0):
+            raise InvalidInput(
+                f"dt {said(self.dt)} s: the time between samples is a positive number"
+            )
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
@@ -177,9 +180,9 @@ class Motion:
         """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
 
         Args:
-            times: times (n,) [s]; straight between samples, zero outside the record.
+            times: of any shape (n in all) [s]; straight between samples, zero outside the record.
         """
-        moments = np.atleast_1d(np.asarray(times, dtype=float))
+        moments = np.asarray(times, dtype=float).ravel()
         both = np.zeros((len(moments), 2))
         for axis, name in enumerate(COMPONENTS[:2]):
             if name in self.components:
@@ -325,5 +328,5 @@ class Motion:
             )
 
     def _each(self, change: Callable[[Array], Array]) -> "Motion":
-        changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
-        return replace(self, **changed)
+        rows: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
+        return replace(self, **rows)
