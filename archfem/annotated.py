@@ -2,8 +2,9 @@
 
 import inspect
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from functools import cache, wraps
+from math import isfinite
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -15,13 +16,13 @@ from archfem.errors import InvalidInput
 Function = TypeVar("Function", bound=Callable[..., Any])
 Kind = TypeVar("Kind", bound=type)
 
-_WORDS = {float: "a finite number", int: "a whole number", bool: "True or False", str: "words"}
+_WORDS = {float: "a number", int: "a whole number", bool: "True or False", str: "words"}
 
 
 def as_annotated(function: Function) -> Function:
     """Make a function refuse what its annotations do not allow, before it does anything.
 
-    Numbers must be finite, whole numbers whole, and rows hold what they say; a bool is no number.
+    Whole numbers must be whole, arrays finite, and rows hold what they say; a bool is no number.
     What an annotation cannot say, such as the sign of a length, is left to the function.
 
     Args:
@@ -64,7 +65,7 @@ def check_fields(instance: Any) -> None:
     Raises:
         InvalidInput: names the field, what was given and what to give.
     """
-    hints = _hints(type(instance))
+    hints = _hints(instance.__class__)
     _check({name: getattr(instance, name) for name in hints}, hints)
 
 
@@ -76,7 +77,7 @@ def _check(given: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
 
 
 @cache
-def _hints(annotated: Any) -> dict[str, Any]:
+def _hints(annotated: Hashable) -> dict[str, Any]:
     return get_type_hints(annotated)
 
 
@@ -109,8 +110,8 @@ _TABLES = (Mapping, dict)
 
 def _is_plain(value: Any, kind: Any) -> bool:
     """Whether a value is of a class, or a number that can be meant."""
-    if kind is float:
-        return is_number(value)
+    if kind is float:  # what is beyond all bounds, or none, is left to the function
+        return is_number(value) or (isinstance(value, float) and not isfinite(value))
     if kind is int:
         return is_number(value) and value == int(value) and not isinstance(value, float)
     if kind in (None, NoneType):
@@ -125,7 +126,7 @@ def _is_plain(value: Any, kind: Any) -> bool:
 
 def _is_array(value: Any) -> bool:
     """Whether a value is an array of finite numbers, none of them masked, or a row of such."""
-    if isinstance(value, str) or np.ma.isMaskedArray(value):
+    if isinstance(value, str | np.ma.MaskedArray):
         return False
     try:
         return bool(np.isfinite(np.asarray(value, dtype=float)).all())
@@ -139,7 +140,7 @@ def _is_row(value: Any, kind: type, inner: tuple[Any, ...]) -> bool:
         return False
     if not isinstance(value, Collection) or (isinstance(value, np.ndarray) and not value.ndim):
         return False
-    if np.ma.isMaskedArray(value):
+    if isinstance(value, np.ma.MaskedArray):
         return False
     if kind is tuple and inner[-1] is not ...:
         return len(value) == len(inner) and all(map(fits, value, inner))

@@ -72,7 +72,7 @@ def whole(value: Any, name: str, *, least: int = 1, most: int = 2**62) -> int:
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InvalidInput(f"{name} = {said(value)} is not a whole number of at least {least}")
-    if value > most:
+    if int(value) > most:
         raise InvalidInput(f"{name} = {said(value)} is above {most}, the most there is room for")
     return int(value)
 

@@ -67,7 +67,7 @@ def _check(value: Any, key: str, depth: int) -> None:
         raise InvalidInput(f"{key:.80} has more than {DEEPEST} tables or lists in each other")
     if isinstance(value, int) and not -WHOLE <= value < WHOLE:
         raise InvalidInput(f"{key} is a whole number beyond ±2⁶³")
-    inner = value.items() if isinstance(value, Mapping) else ()
-    inner = enumerate(value) if isinstance(value, list) else inner
-    for name, each in inner:
+    if isinstance(value, list):
+        value = dict(enumerate(value))
+    for name, each in value.items() if isinstance(value, Mapping) else ():
         _check(each, f"{key}.{name}".removeprefix("."), depth + 1)

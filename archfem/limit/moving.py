@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from archfem.annotated import as_annotated
 from archfem.arguments import reals
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
@@ -53,7 +52,6 @@ class MovingLoad:
         return f"worst at x = {self.position:.3g} m, driving {self.direction}: {self.worst}"
 
 
-@as_annotated
 def moving_load(
     structure: Structure,
     axles: float | Sequence[float],

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Mapping, Sequence
 
-from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput
 from archfem.masonry.softness import soft_blocks, softness
 from archfem.masonry.structure import Structure
@@ -15,7 +14,6 @@ from archfem.models.rigid import rigid
 logger = logging.getLogger("archfem")
 
 
-@as_annotated
 def build(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of a structure.
 
