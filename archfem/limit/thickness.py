@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill import Fill
@@ -16,6 +17,7 @@ LIMIT = 1e-9
 """Relative width of the bracket of the thickness beyond which nothing can be built."""
 
 
+@as_annotated
 def minimum_thickness(
     build: Callable[[float], Structure],
     *,

@@ -75,7 +75,7 @@ class Marker:
 
     def __init__(self, structure: Structure, shown: NDArray[np.bool_]) -> None:
         self._structure, self._shown = structure, shown
-        self._pairs = _neighbours(structure, shown)
+        self._pairs = linked(structure, shown)
         self._line = structure.tangents * structure.depths[:, None]
 
     def at(self, joints: xr.Dataset | Mapping[str, Array], shift: Array | None = None) -> Marks:

@@ -14,6 +14,9 @@ from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
 
+MOST = 10_000
+"""Voussoirs, or chords of each, beyond which nobody means it."""
+
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
@@ -64,8 +67,9 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
     pieces = 1 if chords is None else chords
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if real(count, key) < 1 or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number of 1 or more")
+        if not 1 <= real(count, key) <= MOST or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MOST}")
+    voussoirs, pieces = int(voussoirs), int(pieces)
     turn = embrace / voussoirs / pieces
     if turn > 120.0:
         raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
