@@ -46,7 +46,8 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 toc_object_entries = False
 autodoc_mock_imports = [
-    name for name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "ufl", "basix", "gmsh")
+    name
+    for name in ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "ufl", "basix", "gmsh")
     if find_spec(name) is None
 ]
 

@@ -24,7 +24,10 @@ def executed(script: Path) -> nbformat.NotebookNode:
     """The notebook of a script, run from the start in a fresh kernel, outside of the checkout."""
     notebook = jupytext.read(script)
     client = NotebookClient(
-        notebook, timeout=None, kernel_name="python3", record_timing=False,
+        notebook,
+        timeout=None,
+        kernel_name="python3",
+        record_timing=False,
         resources={"metadata": {"path": os.environ.get("TMPDIR", "/tmp")}},
     )
     client.execute()

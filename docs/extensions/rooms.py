@@ -34,8 +34,27 @@ PLAIN = {
     "errors": "what can go wrong, one class for each remedy",
     "units": "multipliers into SI, and quantities as people write them",
 }
-FOREIGN = ("numpy", "scipy", "xarray", "matplotlib", "collections", "pathlib", "typing", "enum",
-           "pandas", "dolfinx", "petsc4py", "mpi4py", "np", "xr", "abc", "types", "datetime", "os", "dataclasses")
+FOREIGN = (
+    "numpy",
+    "scipy",
+    "xarray",
+    "matplotlib",
+    "collections",
+    "pathlib",
+    "typing",
+    "enum",
+    "pandas",
+    "dolfinx",
+    "petsc4py",
+    "mpi4py",
+    "np",
+    "xr",
+    "abc",
+    "types",
+    "datetime",
+    "os",
+    "dataclasses",
+)
 """Packages whose names are written out and lead nowhere: pages need no network."""
 
 
@@ -62,7 +81,10 @@ def public() -> dict[str, dict[str, Any]]:
     shapes = importlib.import_module("archfem.masonry.shapes")
     known = {id(value) for value in found["masonry"].values()}
     for name, value in vars(shapes).items():
-        if getattr(value, "__module__", "").startswith("archfem.masonry") and id(value) not in known:
+        if (
+            getattr(value, "__module__", "").startswith("archfem.masonry")
+            and id(value) not in known
+        ):
             found["masonry"][f"archfem.shapes.{name}"] = value
     return found
 
@@ -105,7 +127,9 @@ def keep(path: Path, lines: list[str]) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def plain(_app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]) -> None:
+def plain(
+    _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
+) -> None:
     """Make a docstring reStructuredText: formulas as they stand, and no mark-up but backticks."""
     told, before = [], ""
     inside = section = False
