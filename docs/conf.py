@@ -22,8 +22,9 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_copybutton",
     "rooms",
+    "verification",
 ]
-exclude_patterns = ["build", "extensions", "templates", "notebooks/figures"]
+exclude_patterns = ["build", "extensions", "templates", "made", "notebooks/figures"]
 nitpicky = True
 default_role = "py:obj"
 suppress_warnings = ["mystnb.unknown_mime_type"]

@@ -1,4 +1,4 @@
-"""Run notebooks and keep what they show: `python docs/execute.py [notebooks/01_an_arch_stands.py …]`.
+"""Run notebooks and keep what they show: `python docs/execute.py [SCRIPT …]`, `make notebooks`.
 
 The scripts `notebooks/*.py` are the source. Each becomes a notebook of the same name beside it,
 with its tables and pictures in it, so that it can be read where nothing is installed. Pictures are
@@ -19,10 +19,23 @@ from PIL import Image
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 
+QUICK = ("06_a_roman_bridge", "07_from_first_hinge_to_the_ground")
+"""What takes many minutes, and is shipped as it runs in tests: coarse, and on short motions."""
 
-def executed(script: Path) -> nbformat.NotebookNode:
+NOTE = """```{note}
+What this notebook shows was computed on coarse settings (`ARCHFEM_QUICK`), to be run in half a
+minute. Its words tell of the whole settings, which take it many minutes.
+```"""
+
+
+def executed(script: Path, whole: bool) -> nbformat.NotebookNode:
     """The notebook of a script, run from the start in a fresh kernel, outside of the checkout."""
     notebook = jupytext.read(script)
+    if script.stem in QUICK and not whole:
+        notebook.cells.insert(1, nbformat.v4.new_markdown_cell(NOTE))
+        os.environ["ARCHFEM_QUICK"] = "1"
+    else:
+        os.environ.pop("ARCHFEM_QUICK", None)
     client = NotebookClient(
         notebook,
         timeout=None,
@@ -61,12 +74,13 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return notebook
 
 
-def main(scripts: list[str]) -> None:
-    """Run the scripts that are named, or all, and say what each cost."""
+def main(words: list[str]) -> None:
+    """Run the scripts that are named, or all, and say what each cost; `--whole` makes none quick."""
+    scripts = [word for word in words if word != "--whole"]
     for script in map(Path, scripts or sorted(FOLDER.glob("*.py"))):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         kept = script.with_suffix(".ipynb")
-        nbformat.write(cleaned(executed(script)), kept)
+        nbformat.write(cleaned(executed(script, "--whole" in words)), kept)
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
         print(f"{kept.name}: {cpu:.0f} s of CPU, {kept.stat().st_size / 1e3:.0f} kB", flush=True)

@@ -127,23 +127,25 @@ def keep(path: Path, lines: list[str]) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def plain(
-    _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
-) -> None:
+def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
     """Make a docstring reStructuredText: formulas as they stand, and no mark-up but backticks."""
-    told, before = [], ""
-    inside = section = False
+    told, before, outer, inside, section = [], "", 0, 0, False
     for line in without_types(lines):
-        indented, blank = line.startswith("    "), not line.strip()
-        if not blank and not indented:
+        indent, blank = len(line) - len(line.lstrip()), not line.strip()
+        if not blank and not indent:
             section = bool(re.fullmatch(r"[A-Z]\w*( \w+)?:", line.strip()))
-            inside = False
-        if indented and not section and not inside and not before.strip():
-            told += ["::", ""]
-            inside = True
+        if not blank and indent < inside:
+            inside = 0
+        if not blank and not section and not inside and indent >= outer + 4 and not before.strip():
+            told += [" " * outer + "::", ""]
+            inside = indent
+        if not blank and not inside:
+            outer = indent
         told.append(line if inside or line.lstrip().startswith((">>>", "...")) else escaped(line))
         before = line
-    lines[:] = told
+    if kind == "data":
+        told = [f"A `{type(value).__name__}`."]
+    lines[:] = ["", *told]  # a first line that is empty names no type before a colon
 
 
 def without_types(lines: list[str]) -> list[str]:
