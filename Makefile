@@ -13,7 +13,7 @@ export OMP_NUM_THREADS := 1
 # A worker a core, and whoever is done takes over from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow hard bench lint clean
+.PHONY: help setup demo test test-slow hard bench docs notebooks verification lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -54,6 +54,19 @@ bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled 
 
 .venv/bench: .venv/ready
 	.venv/bin/pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev,bench]'
+	@touch $@
+
+docs: .venv/docs  ## the documentation as pages: docs/build/html/index.html
+	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/build/html
+
+notebooks: .venv/docs .venv/compiled  ## run the notebooks, and keep what they show
+	$(PYTHON) docs/execute.py
+
+verification: .venv/compiled  ## the table of what tests verify, for the documentation
+	$(PYTHON) -m pytest $(SPREAD) -m "" --verified docs/verification.json
+
+.venv/docs: .venv/ready
+	.venv/bin/pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev,docs,notebooks]'
 	@touch $@
 
 lint: .venv/ready  ## style and types

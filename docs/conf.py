@@ -67,4 +67,8 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars = {"index": []}
+# Pages without pages below them need no column for these.
+html_sidebars = {
+    name: []
+    for name in ("index", "install", "tutorial", "gallery", "verification", "speed", "limits")
+}

@@ -75,7 +75,7 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 
 def main(words: list[str]) -> None:
-    """Run the scripts that are named, or all, and say what each cost; `--whole` makes none quick."""
+    """Run the scripts that are named, or all; `--whole` makes none quick. Say what each cost."""
     scripts = [word for word in words if word != "--whole"]
     for script in map(Path, scripts or sorted(FOLDER.glob("*.py"))):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

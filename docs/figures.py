@@ -14,8 +14,15 @@ FOLDER = Path(__file__).parent / "figures"
 STONE, EDGE, RED, BLUE = "#e8e2d6", "#5c5648", "#c0392b", "#2e6da4"
 ARROW = {"arrowstyle": "-|>", "lw": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
 
-mpl.rcParams.update({"svg.hashsalt": "archfem", "font.size": 9.0, "axes.spines.top": False,
-                     "axes.spines.right": False, "mathtext.fontset": "cm"})
+mpl.rcParams.update(
+    {
+        "svg.hashsalt": "archfem",
+        "font.size": 9.0,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "mathtext.fontset": "cm",
+    }
+)
 
 
 def save(figure: Figure, name: str) -> None:
@@ -246,7 +253,9 @@ def programme() -> None:
     moment.plot(n, -0.5 * n, color=RED)
     moment.plot(n, -0.5 * n + 0.5 * n**2, color=BLUE)
     moment.legend(frameon=False, fontsize=8, loc="lower left")
-    moment.set(xlabel="$N / (\\sigma w h)$", ylabel="$M / (\\sigma w h^2)$", xticks=[0, 1], yticks=[0])
+    moment.set(
+        xlabel="$N / (\\sigma w h)$", ylabel="$M / (\\sigma w h^2)$", xticks=[0, 1], yticks=[0]
+    )
     shear.fill_between(n, -0.1 - 0.6 * n, 0.1 + 0.6 * n, color=RED, alpha=0.1, lw=0.0)
     for sign in (1.0, -1.0):
         shear.plot(n, sign * (0.1 + 0.6 * n), color=RED)

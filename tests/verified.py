@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-DIGITS = 4
+DIGITS = 5
 """Of numbers in the table."""
 
 ROUND_OFF = 1e-5

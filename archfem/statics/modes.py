@@ -87,6 +87,11 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         InvalidInput: there are not so many modes, or the state is another model's.
         DidNotConverge: the structure is a mechanism there and does not vibrate, or modes were not
             found; `last` is the state.
+
+    Example:
+        >>> model = af.build(af.column(breadth=0.6, heights=[2.4]), fidelity="rigid")
+        >>> af.modes(model, 3).frequencies.round(2).tolist()
+        [10.56, 79.23, 87.53]
     """
     from archfem.statics.eigen import lowest  # SLEPc is needed from here on only
 

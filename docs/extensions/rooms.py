@@ -12,9 +12,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import archfem
 from docutils import nodes
 from sphinx.application import Sphinx
+
+import archfem
 
 PACKAGE = Path(archfem.__file__).parent
 ROOMS = {
@@ -30,6 +31,9 @@ ROOMS = {
     "studies": "many cases: sweeps, incremental dynamic analysis, fragility, convergence",
     "commands": "the command line",
 }
+COLON = "\ue000"
+"""Stands for a colon while docstrings are taken apart."""
+
 PLAIN = {
     "errors": "what can go wrong, one class for each remedy",
     "units": "multipliers into SI, and quantities as people write them",
@@ -108,11 +112,11 @@ def write_pages(folder: Path) -> None:
     """
     folder.mkdir(exist_ok=True)
     for room, values in public().items():
-        lines = title(room) + [f"``archfem.{room}``: {ROOMS[room]}.", ""]
+        lines = [*title(room), f"``archfem.{room}``: {ROOMS[room]}.", ""]
         lines += table(sorted(values, key=lambda name: (name.count("."), name.lower())))
         told = inspect.getdoc(importlib.import_module(f"archfem.{room}")) or ""
         modules = [line for line in told.splitlines() if line.startswith("    ")]
-        lines += title("Its modules", "-") + ["::", "", *modules, ""]
+        lines += [*title("Its modules", "-"), "::", "", *modules, ""]
         keep(folder / f"{room}.rst", lines)
     for name, says in PLAIN.items():
         module = f"archfem.{name}"
@@ -145,7 +149,16 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
         before = line
     if kind == "data":
         told = [f"A `{type(value).__name__}`."]
-    lines[:] = ["", *told]  # a first line that is empty names no type before a colon
+    if kind in {"property", "attribute"}:  # what stands before a colon there is no type
+        told = [line.replace(":", COLON) for line in told]
+    lines[:] = told
+
+
+def restored(
+    _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
+) -> None:
+    """Put back the colons of properties."""
+    lines[:] = [line.replace(COLON, ":") for line in lines]
 
 
 def without_types(lines: list[str]) -> list[str]:
@@ -216,5 +229,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     write_pages(Path(app.srcdir) / "api")
     app.archfem_names = aliases()  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", plain, priority=400)
+    app.connect("autodoc-process-docstring", restored, priority=600)
     app.connect("missing-reference", resolved, priority=400)
     return {"parallel_read_safe": True}

@@ -12,7 +12,7 @@ def number(value: object) -> str:
     """A number, a row of numbers, or words, as a cell shows them."""
     if isinstance(value, list):
         return ", ".join(number(each) for each in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def difference(row: dict[str, object]) -> str:

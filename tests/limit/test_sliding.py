@@ -205,7 +205,8 @@ def test_a_mixed_integer_programme_finds_nothing_weaker(structure, drop, verifie
     assert len(structure.joints) <= 12
     known = least_by_integers(structure, SIDEWAYS)
     assert found.factor == pytest.approx(known, rel=1e-5)
-    case = f"sliding without dilatancy, {structure.name}, {len(structure.joints)} joints: factor"
+    what = f"{len(structure.joints)} joints, cohesion up to {glue(structure).max():g} N"
+    case = f"sliding without dilatancy, {what}: factor"
     verified(case, known, "mixed-integer programme", found.factor)
     upper = af.collapse_factor(structure, live=SIDEWAYS).factor
     assert found.factor <= (1.0 - drop) * upper * (1.0 + EXACT)

@@ -64,7 +64,7 @@ def test_section_law(e, verified):
         rotation = 2.0 * normal / (stiffness * width * compressed**2)
     assert float(found.joints["eccentricity"][0]) == pytest.approx(e, rel=1e-9)
     assert -found.q[2] == pytest.approx(rotation, rel=1e-3)
-    case = f"its turn under N at e = {e:.3g} [rad]"
+    case = f"block 0.6 × 2.4 m, turn under N at e = {e:.3g} [rad]"
     verified(case, rotation, "no-tension section, closed form", -found.q[2])
 
 
@@ -141,5 +141,5 @@ def test_rocking_period(verified):
     period = 4.0 * np.sqrt(2.0 * (4.0 / 3.0) * mass * radius**2 * theta / (mass * GRAVITY * 0.3))
     assert period == pytest.approx(0.737, abs=5e-4)
     assert 4.0 * landed == pytest.approx(period, rel=2e-3)
-    case = "its rocking period from 0.1 α, linear kinematics [s]"
+    case = "block 0.6 × 2.4 m, rocking period from 0.1 α, linear kinematics [s]"
     verified(case, period, "4 √(2 I θ / W b)", 4.0 * landed)

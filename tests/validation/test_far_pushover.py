@@ -69,5 +69,5 @@ def test_exact_joints_are_followed_until_nothing_is_borne(verified):
     assert found.factor <= 0.0
     end = np.interp(0.0, found.curve["factor"][:-3:-1], found.curve["displacement"][:-3:-1])
     assert end == pytest.approx(0.118, rel=0.02)
-    case = "the same, exact joints: way at which nothing is borne [m]"
+    case = "ring pushed far, exact joints: way at which nothing is borne [m]"
     verified(case, 0.118, "trial programme apart from archfem", end)

@@ -80,7 +80,7 @@ def test_semicircle_with_a_joint_where_it_hinges(least, verified):
     assert angles == pytest.approx([54.5, 0.0, -54.5], abs=0.1)
     source = "Milankovitch (1907)"
     verified("semicircle, least t/R, a joint where it hinges", 0.10748, source, least)
-    verified("angle of its hinges at the haunches [degree]", 54.48, source, angles[0])
+    verified("semicircle, angle of hinges at the haunches [degree]", 54.48, source, angles[0])
     assert [side for _, side in spread.hinges] == ["intrados", "extrados", "intrados"]
 
 
@@ -107,7 +107,10 @@ def test_friction_that_a_semicircle_needs(least, verified):
     centre_line = 1.0 - (2.0 / np.pi) / (1.0 + 0.107426 / 2.0)
     assert centre_line == pytest.approx(0.3958, abs=5e-5)
     verified(
-        "friction that it needs", 0.3953, "thrust over weight at the springing, by statics", high
+        "semicircle, friction that it needs",
+        0.3953,
+        "thrust over weight at the springing, by statics",
+        high,
     )
 
 

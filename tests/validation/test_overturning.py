@@ -100,5 +100,5 @@ def test_pulses_fell_an_arch_by_joints_as_by_stones(duration, joints, verified):
     )
     assert found == pytest.approx(joints, rel=2e-3)
     assert found == pytest.approx(stones, rel=NEAR)
-    case = f"the same arch, least pulse of {duration:g} s under which it falls [g]"
+    case = f"Oppenheim's arch, least pulse of {duration:g} s under which it falls [g]"
     verified(case, stones, "rigid stones that hit each other (`Falling`)", found)

@@ -57,7 +57,7 @@ def scene(request):
 
 
 @pytest.mark.parametrize("tolerance", [0.02, pytest.param(0.005, marks=pytest.mark.slow)])
-def test_prediction_is_of_the_order_of_the_error(scene, tolerance, request, verified):
+def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
     """Predicted over actual error, the actual one over a whole motion and on a finer model.
 
     What models and what steps err by is added up, though one may make up for the other.
@@ -71,10 +71,6 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance, request, veri
     actual = largest_difference(found, reference)
     assert actual <= tolerance or not predicted.met
     assert 1.0 / 2.0 < predicted.error / actual < 5.0
-    name = request.node.callspec.params["scene"]
-    case = f"predicted over actual error of |e|: {name}, tolerance {tolerance:g}"
-    ratio = f"{predicted.error / actual:.1f}"
-    verified(case, "1 to 5", "run of a finer model over the whole motion", ratio)
 
 
 def test_choice_climbs_as_the_tolerance_falls():
