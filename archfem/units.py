@@ -64,6 +64,10 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     Raises:
         InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
             number is wanted.
+
+    Example:
+        >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
+        1480000000.0
     """
     if isinstance(value, str):
         number = _converted(value, unit, key)

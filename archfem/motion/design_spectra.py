@@ -67,6 +67,11 @@ class Tbec2018:
 
     References:
         Turkish Building Earthquake Code (2018), sections 2.3.2 to 2.3.5.
+
+    Example:
+        >>> code = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
+        >>> code.horizontal([0.0, 0.5, 1.0]).round(3).tolist()
+        [0.476, 1.19, 0.625]
     """
 
     ss: float
@@ -161,6 +166,10 @@ class Eurocode8:
 
     References:
         EN 1998-1:2004, clauses 3.2.2.2 and 3.2.2.3.
+
+    Example:
+        >>> af.Eurocode8(ag=0.3, ground="C").horizontal([0.0, 0.2, 2.0]).round(4).tolist()
+        [0.345, 0.8625, 0.2588]
     """
 
     ag: float

@@ -56,6 +56,11 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     Raises:
         InvalidInput: an angle looks like radians.
         InvalidStructure: the lengths do not make a ring.
+
+    Example:
+        >>> ring = af.circular_arch(radius=2.95, embrace=159.0, thickness=0.55, voussoirs=17)
+        >>> len(ring.blocks), len(ring.joints), round(ring.weight)
+        (19, 18, 90051)
     """
     real(thickness, "thickness [m]")
     radius, embrace = _circle(radius, embrace, span, rise, thickness)
@@ -119,6 +124,10 @@ def column(
 
     Raises:
         InvalidStructure: a length is not positive.
+
+    Example:
+        >>> [joint.name for joint in af.column(breadth=0.6, heights=[1.2, 1.2]).joints]
+        ['joint 0', 'joint 1']
     """
     heights = reals(heights, "heights of the blocks [m]")
     if real(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:
