@@ -23,6 +23,7 @@
     incremental  curves of incremental dynamic analysis; fragility
     sensitivity  tornado and convergence
     films      films and stills: all that knows imageio and its encoder
+    pages      the player of a run, and documents, for a browser
 
 It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
 """

@@ -19,6 +19,8 @@ from .motions import draw_motion as draw_motion
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .names import draw_names as draw_names
+from .pages.player import Player as Player
+from .pages.player import player as player
 from .pushover import draw_pushover as draw_pushover
 from .sensitivity import draw_convergence as draw_convergence
 from .sensitivity import draw_tornado as draw_tornado

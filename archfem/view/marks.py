@@ -75,7 +75,7 @@ class Marker:
 
     def __init__(self, structure: Structure, shown: NDArray[np.bool_]) -> None:
         self._structure, self._shown = structure, shown
-        self._pairs = _neighbours(structure, shown)
+        self._pairs = linked(structure, shown)
         self._line = structure.tangents * structure.depths[:, None]
 
     def at(self, joints: xr.Dataset | Mapping[str, Array], shift: Array | None = None) -> Marks:
@@ -147,8 +147,13 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
     return Marker(structure, joints["judged"].values).at(joints, shift)
 
 
-def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Pairs of joints with a block between them that has no other shown joint (n_links, 2)."""
+def linked(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return pairs of joints with a block between them that has no other shown joint (n_links, 2).
+
+    Args:
+        structure: whose joints they are.
+        shown: whether each joint is (n_joints,).
+    """
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
