@@ -13,6 +13,7 @@
     guard         doubts about a run while it goes on
     glance        a quick look at joints at every step
     events        what ends a run: enough failed joints, or blocks that can move
+    corners       displacements of the corners of blocks
     recorder      what a run leaves behind
     sentences     what a run means, in words
     history       the record of a run, and its file

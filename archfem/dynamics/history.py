@@ -10,8 +10,9 @@ import xarray as xr
 
 from archfem.annotated import as_annotated
 from archfem.arrays import Array
+from archfem.dynamics.corners import displacement_of
 from archfem.dynamics.falling.verdict import Fall
-from archfem.dynamics.sentences import extremes, mechanism_lines
+from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
@@ -24,6 +25,7 @@ from archfem.limit.verified import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
+from archfem.shown import Shown
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -55,8 +57,8 @@ class Ending(StrEnum):
         return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+@dataclass(frozen=True, eq=False, repr=False)
+class History(Shown, picture="joints.draw_joints"):
     """The record of one run.
 
     Attributes:
@@ -78,6 +80,11 @@ class History:
         """
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
         return self.dataset[names]
+
+    @property
+    def displacement(self) -> xr.DataArray:
+        """Displacements of corners of the blocks, as by `displacement_of` (time, point, xy) [m]."""
+        return displacement_of(self.dataset)
 
     @property
     def criteria(self) -> Criteria:
@@ -208,6 +215,10 @@ class History:
         return self.judged_by(replace(self.criteria, duration=0.0))._first
 
     @as_annotated
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return in_a_line(self.dataset)
+
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.
 

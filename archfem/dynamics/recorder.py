@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem.arrays import Array
+from archfem.dynamics.corners import corner_displacements
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import SIGNS, Ending, History
 from archfem.dynamics.steps import Batch, State
@@ -239,6 +240,7 @@ class Recorder:
         if frames := self._fields.count:
             dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
             dataset["q"] = ("frame", "coordinate"), self._fields.values
+            dataset.update(corner_displacements(self.model, self._fields.values))
         for name in ("q", "velocity", "acceleration"):
             dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
         if self.state.memory is not None:

@@ -15,6 +15,7 @@ from archfem.masonry.materials import Contact
 from archfem.masonry.naming import number_of
 from archfem.masonry.overlaps import check_apart, check_simple
 from archfem.masonry.roles import judged_parts, with_roles
+from archfem.shown import Shown
 from archfem.units import G
 
 TOUCHING = 1e-6
@@ -81,8 +82,8 @@ class Joint:
         return tangent
 
 
-@dataclass(frozen=True)
-class Structure:
+@dataclass(frozen=True, repr=False)
+class Structure(Shown, picture="structure.draw_structure"):
     """Blocks in contact along dry joints.
 
     Attributes:
@@ -231,6 +232,15 @@ class Structure:
         """Weight of the blocks that move, for the whole width [N]."""
         free = (self.blocks[number] for number in self.free)
         return self.width * sum(block.area * block.material.unit_weight for block in free)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        free, count = len(self.free), len(self.blocks)
+        return (
+            f"Structure '{self.name}': {free} blocks that move, {count - free} fixed, "
+            f"{len(self.joints)} joints; size {self.size:.3g} m, width {self.width:.3g} m, "
+            f"weight {self.weight / 1e3:.4g} kN"
+        )
 
     def density(self, block: Block) -> float:
         """Return the density of a block's material under this structure's gravity [kg/m³].
