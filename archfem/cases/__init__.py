@@ -11,6 +11,7 @@
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
     inputs      files that a case reads besides its own
+    reportable  results that have a report and a player
     folders     result folders opened again
     dossier     the report of a case, one page to hand in and to print
 

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.reportable import Reportable
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
@@ -27,7 +28,7 @@ from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.strength import strength_use
 
 if TYPE_CHECKING:
-    from archfem.view.pages.player import Player
+    from archfem.cases.dossier.results import Results
 
 HISTORY = "history.nc"
 """Name of a history's file."""
@@ -82,7 +83,7 @@ class Rest:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Reportable):
     """A case under one motion.
 
     Attributes:
@@ -103,26 +104,12 @@ class Run:
     seconds: float = 0.0
     error: DidNotConverge | None = None
 
-    def report(self, path: str | Path) -> Path:
-        """Write a report of the run: one HTML file, to hand in and to print.
-
-        Args:
-            path: the file, .html; folders are made.
-
-        Returns:
-            The file.
-        """
+    def results(self) -> "Results":
+        """Return what its report is written from."""
         from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
-        from archfem.cases.dossier.writing import write_report
 
         folder = None if self.path is None else self.path.parent
-        return write_report(Results(self.case, {self.motion.name: self.history}, folder), path)
-
-    def player(self) -> "Player":
-        """Return the player of the run, which shows itself in a notebook."""
-        from archfem.cases.dossier.display import player_of
-
-        return player_of(self.case, self.history, self.case.title)
+        return Results(self.case, {self.motion.name: self.history}, folder)
 
 
 Result = Collapse | Rest | Suite | Run

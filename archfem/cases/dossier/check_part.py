@@ -12,7 +12,6 @@ from archfem.cases.dossier.results import Results, not_held
 from archfem.dynamics.history import History
 from archfem.dynamics.recorder import versions
 from archfem.masonry.structure import Structure
-from archfem.units import kN
 from archfem.view.pages.document import Grid, Section, Words
 
 DRIFT, BALANCE = 0.01, 0.01
@@ -32,15 +31,15 @@ def check_section(results: Results) -> Section:
     pieces: list[Any] = []
     if results.runs:
         rows = [_checked(results.case, name, run) for name, run in results.runs.items()]
-        about = "Checks of each run; energy relative to the largest exchanged, supports under dead load"
+        about = (
+            "Checks of each run; energy relative to the largest exchanged, supports under dead load"
+        )
         pieces += [Grid(HEAD, rows, about), *_doubts(results)]
     else:
         pieces.append(not_held("a run to check", "A case with [motion] or [suite] has one."))
     pieces.append(Grid((), _mesh(results), "Model and mesh"))
     if not any("predicted_error" in run.dataset.attrs for run in results.runs.values()):
-        pieces.append(
-            not_held("a predicted error of the model", 'fidelity = "auto" predicts one.')
-        )
+        pieces.append(not_held("a predicted error of the model", 'fidelity = "auto" predicts one.'))
     if (text := results.quoted("accuracy.txt")) is not None:
         pieces.append(Words(text, "lines"))
         pieces += results.shown("accuracy.png", "Speed against error over rungs, meshes and steps.")
@@ -133,7 +132,9 @@ def source_section(results: Results) -> Section:
     Args:
         results: of which the report is.
     """
-    made = sorted({str(run.dataset.attrs.get("versions", "not told")) for run in results.runs.values()})
+    made = sorted(
+        {str(run.dataset.attrs.get("versions", "not told")) for run in results.runs.values()}
+    )
     rows = [("computed with", words) for words in made]
     rows.append(("report written with", versions()))
     rows.append(("SHA-256 of the case", digest(results.case.text().encode())))
@@ -153,7 +154,9 @@ def source_section(results: Results) -> Section:
             [str(path.relative_to(results.folder)), f"{path.stat().st_size / 1e3:.1f}", _hash(path)]
             for path in files
         ]
-        pieces.append(Grid(["file", "kB", "SHA-256"], listed, "Files that the report was written from"))
+        pieces.append(
+            Grid(["file", "kB", "SHA-256"], listed, "Files that the report was written from")
+        )
     pieces.append(Words(results.case.text(), "lines"))
     return Section("Versions, hashes and the case as a file", pieces)
 

@@ -25,9 +25,7 @@ def ground_section(results: Results) -> Section:
         return Section("Ground motion", [not_held("a motion of the ground", remedy)])
     pieces: list[Any] = [Grid(*motion_rows(motions), AT)]
     if results.case.suite is None:
-        pieces += [
-            Plate.of(draw_motion(motion), "Ground motion as applied.") for motion in motions
-        ]
+        pieces += [Plate.of(draw_motion(motion), "Ground motion as applied.") for motion in motions]
     pieces += _spectra(results, motions)
     return Section("Ground motion" if len(motions) == 1 else "Ground motions", pieces)
 

@@ -34,7 +34,9 @@ def _dead(results: Results) -> list[Any]:
     """Thrust line, table by part, stress."""
     pieces: list[Any] = []
     if results.dead is not None:
-        figure = draw_structure(results.case.structure, results.dead, criteria=results.case.criteria)
+        figure = draw_structure(
+            results.case.structure, results.dead, criteria=results.case.criteria
+        )
         pieces += [Plate.of(figure, THRUST), _by_part(judged(results.dead))]
     elif drawn := results.shown("dead.png", THRUST):
         pieces += drawn
@@ -52,7 +54,9 @@ def _dead(results: Results) -> list[Any]:
         )
     else:
         pieces.append(
-            not_held("stress in the blocks", "A folder that `archfem run` wrote has it, unless rigid.")
+            not_held(
+                "stress in the blocks", "A folder that `archfem run` wrote has it, unless rigid."
+            )
         )
     pieces += results.shown("free_body.png", "A block cut free: forces on it, and their closing.")
     return pieces
@@ -85,7 +89,9 @@ def _modes(results: Results) -> list[Any]:
     """Table and shapes, as an earlier command has found them."""
     text = results.quoted("modes.txt")
     if text is None:
-        return [not_held("modes", "`archfem modes CASE.toml --out FOLDER` adds them to the folder.")]
+        return [
+            not_held("modes", "`archfem modes CASE.toml --out FOLDER` adds them to the folder.")
+        ]
     shapes = results.shown("modes.png", "Shapes of the modes about dead load.")
     return [Words(text, "lines"), *shapes]
 

@@ -79,10 +79,13 @@ def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
         driver.execute_script(SET, "time", 0.0)
         driver.find_element(find, ".player-play").click()
         driver.implicitly_wait(1)
-        assert driver.execute_async_script(
-            "const done = arguments[0]; setTimeout(() => done("
-            "document.querySelector('figure.player').player.time), 400)"
-        ) > 0.05
+        assert (
+            driver.execute_async_script(
+                "const done = arguments[0]; setTimeout(() => done("
+                "document.querySelector('figure.player').player.time), 400)"
+            )
+            > 0.05
+        )
         assert complaints(driver) == []
 
 
