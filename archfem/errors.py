@@ -23,6 +23,10 @@ class StudyStopped(ArchfemError):
     """A study that could not go on; what was finished is kept: make good what is said, go on."""
 
 
+class NotInstalled(ArchfemError, ImportError):
+    """A package that is asked for and not there: get it as said, or ask for what needs it not."""
+
+
 class DidNotConverge(ArchfemError):
     """No equilibrium was found; what was computed up to there is kept.
 

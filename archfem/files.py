@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from archfem.errors import InvalidInput
+
 
 @contextmanager
 def in_one_stroke(path: Path) -> Iterator[Path]:
@@ -27,6 +29,29 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
         os.replace(draft, path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def result_folder(path: str | Path) -> Path:
+    """Return a folder for results, made if it is not there.
+
+    Args:
+        path: of the folder.
+
+    Raises:
+        InvalidInput: a file stands in its place, or it cannot be made.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise InvalidInput(
+            f"--out {folder} is a file, and results go into a folder: name another"
+        ) from error
+    except OSError as error:
+        raise InvalidInput(
+            f"the folder {folder} cannot be made ({error.strerror}): name another with --out"
+        ) from error
+    return folder
 
 
 def forget_stale(folder: Path, *others: Path) -> None:

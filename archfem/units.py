@@ -5,7 +5,7 @@
 
 import re
 from functools import cache
-from math import isfinite, tan
+from math import degrees, isfinite, pi, tan
 from typing import Any
 
 from archfem.errors import InvalidInput
@@ -28,6 +28,15 @@ ACCELERATION = "m/s**2"
 
 ANGLES = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
 """Units that pass for pure numbers and are none."""
+
+
+_DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+"""Degrees as most write them, read without the registry of units."""
+LONGEST, FACTORS = 100, 4
+"""Letters and powers that a quantity has at most."""
+
+POWERS = re.compile(r"\*\*(?![-+]?\d(?![\d.eE]|\*\*))|[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
+"""A power that is more than a digit, or has one of its own: "9**9**9" would never be done."""
 
 
 @cache
@@ -61,9 +70,39 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     return number
 
 
+def in_degrees(value: Any, key: str) -> float:
+    """Return an angle as a number of degrees.
+
+    Args:
+        value: 159, "159 degree", "2.775 rad"; a bare number is in degrees, and refused up to 2π,
+            where it is more likely meant in radians: with its unit it is taken at its word.
+        key: what to call the value in an error.
+
+    Raises:
+        InvalidInput: it is no angle, text without a unit, or a bare number of so few degrees.
+    """
+    if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
+        return float(plain[1])
+    if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
+        raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
+    number = in_unit(value, "degree", key)
+    if not isinstance(value, str) and 0.0 < abs(number) <= 2.0 * pi:
+        raise InvalidInput(
+            f"{key} = {value!r} would be a few degrees only, and looks like radians: give "
+            f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if you mean that'
+        )
+    return number
+
+
 def _converted(text: str, unit: str, key: str) -> float:
     import pint
 
+    plain = re.sub(r"\s", "", text).replace("^", "**")
+    if len(text) > LONGEST or POWERS.search(plain) or plain.count("**") > FACTORS:
+        raise InvalidInput(
+            f"{key} = {text[:LONGEST]!r} is not a quantity: write a number and a unit with small "
+            'whole powers, e.g. "20 kN/m**3"'
+        )
     registry = _registry()
     wanted = "dimensionless" if unit == "1" else unit
     if unit == ACCELERATION:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from archfem.cases.case import Case
 from archfem.cases.inputs import input_files
+from archfem.cases.kept import HISTORY
 from archfem.cases.reportable import Reportable
-from archfem.cases.run import HISTORY
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput
 

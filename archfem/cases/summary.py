@@ -166,7 +166,7 @@ def accuracy_words(found: Accuracy) -> str:
 
 
 def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
-    """Return what a run did: its verdict, the table of its joints, and the use of strength.
+    """Return what a run did: its verdict, how it was found, its joints, and the use of strength.
 
     Args:
         structure: what was shaken.
@@ -174,7 +174,30 @@ def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
         dead: joints under dead load alone.
     """
     strength = utilisation_sentence(structure, run.joints)
-    return f"{run.verdict}\n\n{joint_table(run.joints, dead)}\n\n{strength}"
+    parts = [run.verdict, found_words(run), joint_table(run.joints, dead), strength]
+    return "\n\n".join(parts)
+
+
+def found_words(run: History) -> str:
+    """Return how the numbers of a run came about, and what speaks for them, in a few lines.
+
+    Args:
+        run: what happened.
+    """
+    told = run.dataset.attrs
+    predicted = (
+        f"predicted to err by {told['predicted_error']:.2g} in the largest |e|"
+        if "predicted_error" in told
+        else 'its error in |e| was not predicted, as fidelity = "auto" does'
+    )
+    lines = [
+        f"outcome: {run.outcome}; {told['steps']} steps by '{told['method']}'",
+        f"energy: drifts by {told['energy_drift']:+.1e} of the largest exchanged at most",
+        f"displacements: no block farther than {told['largest_displacement'] / mm:.3g} mm",
+        f"model: rung '{told['fidelity']}', {predicted}",
+        f"doubts: {len(run.doubts) or 'none'}",
+    ]
+    return "\n".join(lines)
 
 
 def motion_table(motions: Sequence[Motion]) -> str:

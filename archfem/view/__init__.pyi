@@ -1,6 +1,7 @@
 from .accuracy import draw_accuracy as draw_accuracy
 from .collapse import draw_capacity as draw_capacity
 from .collapse import draw_collapse as draw_collapse
+from .dead import draw_dead_load as draw_dead_load
 from .displaced import draw_displaced as draw_displaced
 from .envelopes import draw_eccentricity as draw_eccentricity
 from .envelopes import draw_envelope as draw_envelope
