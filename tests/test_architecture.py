@@ -13,7 +13,7 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {"errors", "arguments", "arrays", "units", "files", "tables", "_petsc"}
+GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "tables", "_petsc"}
 GROUND |= {"packages", "compiled"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]

@@ -1,5 +1,6 @@
 """Analyses as files: TOML in, folders of results out.
 
+    toml        tables of a file, no deeper and no larger than anybody means
     settings    tables of a case file and changes to them
     structures  [structure], [materials], [contacts] as a `Structure`
     motions     [motion], [suite] as a `Motion`, a `Suite`

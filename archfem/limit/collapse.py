@@ -263,6 +263,10 @@ def stands(
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
+
+    Example:
+        >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
+        False
     """
     _, dead = self_weight(structure, friction, strength, fill)
     return balanced(dead.unbalanced(), dead)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.motion import oscillator, signals
@@ -48,6 +49,7 @@ class Match:
     band: tuple[float, float] = BAND
 
 
+@as_annotated
 def matched(
     motion: Motion,
     spectrum: DesignSpectrum,
