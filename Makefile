@@ -4,9 +4,9 @@ SHELL := /bin/bash
 PYTHON := .venv/bin/python
 # What is large is never compiled from source: that takes an hour, and fails in the end.
 PIP := .venv/bin/pip install -q --disable-pip-version-check -c constraints.txt \
-	--only-binary numpy,scipy,numba,llvmlite,vtk,gmsh,pandas,shapely
+	--only-binary numpy,scipy,numba,llvmlite,gmsh,pandas,shapely
 APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas0-pthread \
-	libegl1 libgl1 libglu1-mesa libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 libfontconfig1
+	libgl1 libglu1-mesa libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 libfontconfig1
 
 # Small dense and sparse problems: threads only get in each other's way.
 export OPENBLAS_NUM_THREADS := 1

@@ -66,7 +66,6 @@ def findings() -> Iterator[Finding]:
     yield Finding("Python", f"{sys.version.split()[0]}, {sys.executable}")
     yield from _required()
     yield from _fenicsx()
-    yield _drawing()
     yield _ffmpeg()
     yield _compiled()
     if find_spec("distributed") is None:
@@ -118,13 +117,6 @@ def _fenicsx() -> Iterator[Finding]:
     compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
     get = "'apt-get install gcc libc6-dev', elsewhere 'conda install -c conda-forge c-compiler'"
     yield Finding("C compiler", compiler or "missing", "" if compiler else get)
-
-
-def _drawing() -> Finding:
-    """The library with which films are drawn."""
-    if packages.can_draw():
-        return Finding("library to draw films", "found")
-    return Finding("library to draw films", "missing", packages.NEEDS["EGL"].get)
 
 
 def _ffmpeg() -> Finding:
