@@ -2,9 +2,17 @@
 
 from typing import Any
 
+LONGEST = 4000
+"""Most letters of an error: what it quotes may have been of any length."""
+
 
 class ArchfemError(Exception):
     """Anything archfem refuses or fails to do."""
+
+    def __init__(self, message: str = "") -> None:
+        if len(message) > LONGEST:
+            message = f"{message[: LONGEST - 500]} … {message[-490:]}"
+        super().__init__(message)
 
 
 class InvalidInput(ArchfemError, ValueError):

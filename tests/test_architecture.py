@@ -13,7 +13,7 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {"errors", "arguments", "arrays", "units", "files", "tables", "_petsc"}
+GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "tables", "_petsc"}
 GROUND |= {"packages", "compiled"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
@@ -32,6 +32,9 @@ ONLY_IN = {
     "matplotlib": "view",
     "pyvista": "view.films",
     "imageio": "view.films",
+    "imageio_ffmpeg": "view.films",
+    "jinja2": "view.pages",
+    "markupsafe": "view.pages",
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",

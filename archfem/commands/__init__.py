@@ -2,6 +2,7 @@
 
     line      words as a command, and its exit code
     cases     commands for one case, and for records
+    films     the command for films
     studies   the command for studies
     examples  cases that archfem brings
     doctor    what is installed, and what is missing

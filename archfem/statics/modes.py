@@ -91,6 +91,11 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         DidNotConverge: the structure is a mechanism there and does not vibrate, or modes were not
             found; `last` is the state.
         NotInstalled: SLEPc is not there, and the model too large to do without.
+
+    Example:
+        >>> model = af.build(af.column(breadth=0.6, heights=[2.4]), fidelity="rigid")
+        >>> af.modes(model, 3).frequencies.round(2).tolist()
+        [10.56, 79.23, 87.53]
     """
     check_model(model)
     if about is not None:

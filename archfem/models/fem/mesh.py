@@ -113,9 +113,11 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
         mesh_only.write_bytes(given)
         try:
             gmsh.merge(str(mesh_only))
-        except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path} is not a gmsh mesh: {error}") from error
-        return _imported(structure)
+            return _imported(structure)
+        except MeshError:
+            raise
+        except Exception as error:  # neither gmsh nor FEniCSx raise anything more specific
+            raise MeshError(f"{path} is not a gmsh mesh of it: {error}") from error
 
 
 @contextmanager
