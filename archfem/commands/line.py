@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from io import TextIOWrapper
 
 from archfem.errors import ArchfemError
 
@@ -35,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         As by `exit_code`; where the words are not understood, the process ends with 2.
     """
     given = _parser().parse_args(arguments)
+    if isinstance(sys.stdout, TextIOWrapper):  # each line when it is known, also into a pipe
+        sys.stdout.reconfigure(line_buffering=True)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     return exit_code(lambda: given.command(given))
 
