@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
+from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
@@ -55,7 +56,7 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Exports):
     """The record of one run.
 
     Attributes:
