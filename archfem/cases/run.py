@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.inputs import inputs_digest
 from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
@@ -25,6 +27,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.strength import strength_use
+
+if TYPE_CHECKING:
+    from archfem.view.pages.player import Player
 
 HISTORY = "history.nc"
 """Name of a history's file."""
@@ -99,6 +104,27 @@ class Run:
     kept: bool = False
     seconds: float = 0.0
     error: DidNotConverge | None = None
+
+    def report(self, path: str | Path) -> Path:
+        """Write a report of the run: one HTML file, to hand in and to print.
+
+        Args:
+            path: the file, .html; folders are made.
+
+        Returns:
+            The file.
+        """
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+        from archfem.cases.dossier.writing import write_report
+
+        folder = None if self.path is None else self.path.parent
+        return write_report(Results(self.case, {self.motion.name: self.history}, folder), path)
+
+    def player(self) -> "Player":
+        """Return the player of the run, which shows itself in a notebook."""
+        from archfem.cases.dossier.display import player_of
+
+        return player_of(self.case, self.history, self.case.title)
 
 
 Result = Collapse | Rest | Suite | Run
@@ -248,6 +274,7 @@ def shaken(
         DidNotConverge: a step failed; `history` is the record up to it.
     """
     output = case.output
+    of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
     animated = FRAMES if output.get("animation", False) else None
     try:
         with told_of(case.title, motion.name):
@@ -267,14 +294,16 @@ def shaken(
             )
     except DidNotConverge as error:
         if error.history is not None:
-            error.history.dataset.attrs["case"] = case.text()
+            error.history.dataset.attrs |= of_case
         raise
-    run.dataset.attrs["case"] = case.text()
+    run.dataset.attrs |= of_case
     return run
 
 
 def finished(path: Path, case: Case, motion: Motion) -> History | None:
     """Return what an earlier run left, where it ended by itself, of the same case and motion.
+
+    The files that the case reads, and archfem itself, must be those of then, to the letter.
 
     Args:
         path: file of the history.
@@ -289,7 +318,8 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
         whole = run.ended.by_itself
     except InvalidInput:
         return None
-    if not whole or run.dataset.attrs.get("case") != case.text():
+    told = run.dataset.attrs
+    if not whole or told.get("inputs") != inputs_digest(case.settings, case.folder):
         return None
     before, now = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
@@ -300,7 +330,9 @@ def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> R
     case = rest.case.alone(motion.name)
     path = None if folder is None else folder / motion.name / HISTORY
     if path is not None and (history := finished(path, case, motion)) is not None:
-        return Run(case, motion, history, path, kept=True)
+        chosen = rest.dead.model.prediction  # by the first pair, which this one may not be
+        if chosen is None or history.dataset.attrs.get("predicted_error") == chosen.error:
+            return Run(case, motion, history, path, kept=True)
     return _run(case, motion, rest, path, shake)
 
 

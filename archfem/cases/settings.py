@@ -5,11 +5,11 @@ words, a Python type or several, or a list of one unit or type for a list.
 """
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from archfem.cases.toml import tables_of
 from archfem.errors import InvalidInput
 from archfem.masonry.naming import did_you_mean
 from archfem.units import in_degrees, in_unit
@@ -139,8 +139,8 @@ def change(settings: dict[str, Any], text: str) -> None:
         raise InvalidInput(f"'{text}' is not a change: write section.key=value")
     path, words = parted.groups()
     try:
-        value = tomllib.loads(f"value = {words}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = tables_of(f"value = {words}")["value"]
+    except InvalidInput:
         value = words.strip()
     put(settings, path, value)
 

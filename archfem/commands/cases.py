@@ -7,6 +7,7 @@ from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest, Result, Run, carried_out, expected_damping
+from archfem.commands.line import DOUBTFUL
 from archfem.dynamics.history import Ending, History
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.files import result_folder
@@ -129,11 +130,26 @@ def modes(given: argparse.Namespace) -> None:
     _tell_written(write_modes(found, text, folder))
 
 
-def run(given: argparse.Namespace) -> None:
+def report(given: argparse.Namespace) -> None:
+    """Write one page of what a result folder holds.
+
+    Args:
+        given: `folder`, the page `out`, and `inputs`, the folder of the case's drawing, or None.
+    """
+    from archfem.cases.folders import opened
+
+    path = opened(given.folder, inputs=given.inputs).report(given.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def run(given: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
     Args:
         given: `case`, a file, `changes` to it, the folder `out`, and `workers` for pairs.
+
+    Returns:
+        `DOUBTFUL` where a run has doubts, else 0.
     """
     case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
@@ -142,16 +158,19 @@ def run(given: argparse.Namespace) -> None:
         from archfem.studies.pairs import run_pairs
 
         run_pairs(case, folder, workers=given.workers)
-    tell(case, carried_out(case, folder), folder)
+    return DOUBTFUL if tell(case, carried_out(case, folder), folder) else 0
 
 
-def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
+def tell(case: Case, results: Iterable[Result], folder: Path) -> bool:
     """Print the results of a case as they come, and write their tables and pictures.
 
     Args:
         case: what was asked.
         results: as by `carried_out`.
         folder: for the files.
+
+    Returns:
+        Whether any run has doubts; its summary begins with them.
 
     Raises:
         DidNotConverge: a step of a run failed.
@@ -180,6 +199,7 @@ def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _tell_pairs(suite, runs, rest, folder)
+    return any(run.doubts for run in runs.values())
 
 
 def _tell_run(done: Run, rest: Rest) -> None:

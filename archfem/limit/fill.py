@@ -50,6 +50,10 @@ class Fill:
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
         Trans. R. Soc. 147 (1857) 9-27. Flamant, C. R. Acad. Sci. 114 (1892) 1465-1468.
+
+    Example:
+        >>> af.limit.Fill(friction_angle=30.0).mobilisation
+        0.3333333333333333
     """
 
     friction_angle: float

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill import Fill
@@ -16,6 +17,7 @@ LIMIT = 1e-9
 """Relative width of the bracket of the thickness beyond which nothing can be built."""
 
 
+@as_annotated
 def minimum_thickness(
     build: Callable[[float], Structure],
     *,
@@ -43,6 +45,12 @@ def minimum_thickness(
 
     References:
         Milankovitch, Z. Math. Phys. 55 (1907) 1-27. Heyman, Int. J. Mech. Sci. 11 (1969) 363-372.
+
+    Example:
+        >>> def semicircle(t):
+        ...     return af.circular_arch(radius=1.0, thickness=t, embrace=180.0, voussoirs=7)
+        >>> round(af.minimum_thickness(semicircle, friction=None, tolerance=1e-4), 3)
+        0.096
     """
     if not 1e-9 <= tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.annotated import check_fields
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.masonry.geometry import (
@@ -54,9 +54,8 @@ class Block:
     grain: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what is no material, and outlines that do not bound an area anticlockwise."""
-        named = f"block '{self.name}': material"
-        instance(self.material, Material, named, "give a Material, e.g. archfem.STONE")
+        """Refuse outlines that do not bound an area anticlockwise."""
+        check_fields(self)
         if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
             raise InvalidStructure(
                 f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"

@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.arguments import instance, real
+from archfem.annotated import check_fields
+from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
@@ -44,13 +45,8 @@ class Joint:
     role: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is no contact."""
-        instance(
-            self.contact,
-            Contact,
-            f"joint '{self.name}': contact",
-            "give a Contact, e.g. archfem.masonry.STONE_TO_STONE",
-        )
+        """Refuse what is no joint."""
+        check_fields(self)
 
     @property
     def lower(self) -> int:
@@ -106,6 +102,7 @@ class Structure:
 
     def __post_init__(self) -> None:
         """Fill in roles, and refuse what does not hang together, or overlaps."""
+        check_fields(self)
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
         if not 0.0 < real(self.width, "width [m]") < 1e4:

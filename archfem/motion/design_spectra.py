@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from archfem.arguments import real
+from archfem.annotated import check_fields
+from archfem.arguments import real, said
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion.oscillator import check
@@ -66,6 +67,11 @@ class Tbec2018:
 
     References:
         Turkish Building Earthquake Code (2018), sections 2.3.2 to 2.3.5.
+
+    Example:
+        >>> code = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
+        >>> code.horizontal([0.0, 0.5, 1.0]).round(3).tolist()
+        [0.476, 1.19, 0.625]
     """
 
     ss: float
@@ -77,6 +83,7 @@ class Tbec2018:
         real(self.s1, "map value S_1 [g]")
         if not (0.0 < self.ss < np.inf and 0.0 < self.s1 < np.inf):
             raise InvalidInput(f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are > 0")
+        check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
         if self.site not in _SHORT_FACTORS:
@@ -159,6 +166,10 @@ class Eurocode8:
 
     References:
         EN 1998-1:2004, clauses 3.2.2.2 and 3.2.2.3.
+
+    Example:
+        >>> af.Eurocode8(ag=0.3, ground="C").horizontal([0.0, 0.2, 2.0]).round(4).tolist()
+        [0.345, 0.8625, 0.2588]
     """
 
     ag: float
@@ -169,6 +180,7 @@ class Eurocode8:
     def __post_init__(self) -> None:
         if not real(self.ag, "design ground acceleration [g]") > 0.0:
             raise InvalidInput(f"design ground acceleration {self.ag!r} g: expected more than 0")
+        check_fields(self)
         if self.type not in _GROUND or self.ground not in _GROUND[1]:
             raise InvalidInput(
                 f"Eurocode 8 type {self.type!r} on ground {self.ground!r}: expected type 1 or 2 on "
@@ -282,7 +294,10 @@ def checked_periods(periods: float | Array, longest: float) -> Array:
     Raises:
         InvalidInput: a period is negative, not finite, or beyond the longest.
     """
-    natural = np.asarray(periods, dtype=float)
+    try:
+        natural = np.asarray(periods, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"periods {said(periods)} s are no numbers") from error
     check(natural, 0.05)
     if np.any(natural > longest):
         raise InvalidInput(

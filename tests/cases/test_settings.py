@@ -35,6 +35,12 @@ def test_an_angle_is_no_pure_number(text, tangent):
     [
         ("2 kg", "not in a unit like m"),
         ("two", "not a quantity"),
+        ("9**9**9**9 m", "with small whole powers"),
+        ("(9**9)**(9**9) m", "with small whole powers"),
+        ("9 ^ 9 ^ 9 m", "with small whole powers"),
+        ("((((((9**9)**9)**9)**9)**9)**9) m", "with small whole powers"),
+        ("9" * 5000 + " m", "with small whole powers"),
+        ("__import__('os').getpid() m", "not a quantity"),
         ("2 furlonks", "not a quantity"),
         ("(", "not a quantity"),
         (float("nan"), "not finite"),

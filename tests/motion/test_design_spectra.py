@@ -9,7 +9,7 @@ from archfem.motion.design_spectra import Eurocode8, TableSpectrum, Tbec2018
 ROUND_OFF = 1e-12
 
 
-def test_tbec_at_its_corners():
+def test_tbec_at_its_corners(verified):
     spectrum = Tbec2018(ss=1.140, s1=0.315, site="ZD")
     # F_S = 1.1 - 0.1 * 0.14/0.25 = 1.044, F_1 = 2.0 - 0.1 * 0.15 = 1.985.
     sds, sd1 = 1.044 * 1.140, 1.985 * 0.315
@@ -19,6 +19,8 @@ def test_tbec_at_its_corners():
     periods = [0.0, 0.1 * corner, 0.2 * corner, corner, 1.0, 6.0, 12.0]
     expected = [0.4 * sds, 0.7 * sds, sds, sds, sd1, sd1 / 6.0, sd1 * 6.0 / 144.0]
     assert spectrum.horizontal(periods) == pytest.approx(expected, rel=ROUND_OFF)
+    found = spectrum.horizontal(periods)
+    verified("TBEC-2018 at its corners, horizontal [g]", expected, "by hand from its tables", found)
     periods = [0.0, 0.1 * corner / 3, 0.2 * corner / 3, corner / 3, 1.0, 3.0]
     level = 0.8 * sds
     expected = [0.32 * sds, 0.56 * sds, level, level, level * corner / 3, level * corner / 9]
@@ -109,9 +111,11 @@ def test_every_cell_of_the_tables_of_the_eurocode(type_, place):
         (0.1, "B", 1, (0.075, 0.5, 1.0), (0.21, 0.3, 0.15)),
     ],
 )
-def test_eurocode_horizontal_at_its_corners(ag, ground, type_, periods, expected):
+def test_eurocode_horizontal_at_its_corners(ag, ground, type_, periods, expected, verified):
     spectrum = Eurocode8(ag=ag, ground=ground, type=type_)
     assert spectrum.horizontal(periods) == pytest.approx(expected, rel=ROUND_OFF)
+    case = f"EN 1998-1:2004, type {type_}, ground {ground}, a_g {ag:g} g, at its corners [g]"
+    verified(case, expected, "by hand from its tables", spectrum.horizontal(periods))
 
 
 @pytest.mark.parametrize(("type_", "ratio"), [(1, 0.9), (2, 0.45)])

@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block, Point
@@ -23,6 +24,7 @@ THIN = 0.02
 """Least fill above rings and sidewalls [m]."""
 
 
+@as_annotated
 def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
     *,
     arches: Sequence[Arch],

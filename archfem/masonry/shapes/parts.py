@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.arguments import instance, is_number, said
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Point
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
@@ -216,7 +216,8 @@ def _check_positive(part: Any, *keys: str) -> None:
     """Refuse lengths that cannot be meant."""
     for key in keys:
         value = getattr(part, key)
-        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
+        instance(value, Real, f"'{part.name}': {key} = {said(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
         if not 0.0 < value < 1e3:
             raise InvalidStructure(
                 f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
@@ -227,6 +228,7 @@ def _check_not_negative(part: Any, *keys: str) -> None:
     """Refuse lengths that can be 0 but no less."""
     for key in keys:
         value = getattr(part, key)
-        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
+        instance(value, Real, f"'{part.name}': {key} = {said(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
         if not 0.0 <= value < 1e3:
             raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")

@@ -14,6 +14,9 @@ from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
 
+MOST = 10_000
+"""Voussoirs, or chords of each, beyond which nobody means it."""
+
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     *,
@@ -53,6 +56,11 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     Raises:
         InvalidInput: an angle looks like radians.
         InvalidStructure: the lengths do not make a ring.
+
+    Example:
+        >>> ring = af.circular_arch(radius=2.95, embrace=159.0, thickness=0.55, voussoirs=17)
+        >>> len(ring.blocks), len(ring.joints), round(ring.weight)
+        (19, 18, 90051)
     """
     real(thickness, "thickness [m]")
     radius, embrace = _circle(radius, embrace, span, rise, thickness)
@@ -64,8 +72,9 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
     pieces = 1 if chords is None else chords
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if real(count, key) < 1 or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number of 1 or more")
+        if not 1 <= real(count, key) <= MOST or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MOST}")
+    voussoirs, pieces = int(voussoirs), int(pieces)
     turn = embrace / voussoirs / pieces
     if turn > 120.0:
         raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
@@ -115,6 +124,10 @@ def column(
 
     Raises:
         InvalidStructure: a length is not positive.
+
+    Example:
+        >>> [joint.name for joint in af.column(breadth=0.6, heights=[1.2, 1.2]).joints]
+        ['joint 0', 'joint 1']
     """
     heights = reals(heights, "heights of the blocks [m]")
     if real(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from archfem.arguments import pieces
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import Contact, Material
@@ -136,11 +137,11 @@ class Site:
             paving: the stones, about as long as they are asked to be.
         """
         breaks, levels = np.array(surface).T
-        pieces = [
-            np.linspace(a, b, max(1, round((b - a) / paving.length)) + 1)[:-1]
+        parts = [
+            np.linspace(a, b, pieces(b - a, paving.length, "paving stones") + 1)[:-1]
             for a, b in pairwise(breaks)
         ]
-        x = np.append(np.concatenate(pieces), breaks[-1])
+        x = np.append(np.concatenate(parts), breaks[-1])
         y = np.interp(x, breaks, levels)
         for k in range(len(x) - 1):
             low = [(x[k], y[k]), (x[k + 1], y[k + 1])]
@@ -181,7 +182,7 @@ class Site:
     def _pier(self, pier: Pier, left: Face, right: Face) -> int:
         """A pier under two springings; the number of its skewback."""
         (x0, y0), (x1, y1) = left[0], right[0]
-        step = pier.height / max(1, round(pier.height / pier.course))
+        step = pier.height / pieces(pier.height, pier.course, f"courses of '{pier.name}'")
         if not left[1][0] < right[1][0] or min(y0, y1) <= -step:
             raise InvalidStructure(
                 f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
@@ -213,9 +214,8 @@ class Site:
         low, high = levels
         if high - low < 1e-9:
             return below
-        for y, top in pairwise(
-            np.linspace(low, high, max(1, round((high - low) / part.course)) + 1)
-        ):
+        count = pieces(high - low, part.course, f"courses of '{part.name}'")
+        for y, top in pairwise(np.linspace(low, high, count + 1)):
             number = self._course(sides, (y, top), part)
             self._bed((below, number), sides, y, part)
             below = number
@@ -281,7 +281,7 @@ class Site:
         if wall.state == "fixed":
             outline = [(outer, -wall.height), (x, -wall.height), (x, y), (edge, level)]
             return self.add([*outline, *reversed(steps)], wall.name, role=wall.role, fixed=True)
-        step = wall.height / max(1, round(wall.height / wall.course))
+        step = wall.height / pieces(wall.height, wall.course, f"courses of '{wall.name}'")
         below = self._courses((outer, x), (-wall.height, -step), wall)
         corner = [(back, level)] if wall.setback > 0.0 else []
         outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]
