@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
@@ -63,7 +65,7 @@ def write_vtk(model: Model, run: xr.Dataset, path: str | Path) -> Path:
     joints = [np.arange(4 * k, 4 * k + 4) for k in range(len(model.structure.joints))]
     for number, frame in enumerate(frames(solids, run)):
         files = [folder / f"{part}_{number:05d}.vtu" for part in ("blocks", "joints")]
-        data = {"block": solids.owner.astype(np.int64)}
+        data: dict[str, NDArray[Any]] = {"block": solids.owner.astype(np.int64)}
         if frame.stress is not None:
             data |= dict(zip(STRESSES, frame.stress.T, strict=True))
         write_vtu(files[0], solids.places, solids.polygons, {"displacement": frame.moved}, data)
@@ -147,7 +149,7 @@ def frames(solids: Solids, run: xr.Dataset) -> Iterator[Frame]:
         yield Frame(float(time), own[:, :2] + turned - arm, stress)
 
 
-def _of_joints(run: xr.Dataset, time: float) -> dict[str, Array]:
+def _of_joints(run: xr.Dataset, time: float) -> dict[str, NDArray[Any]]:
     """What the joints do at the recorded step nearest a time; nothing after it."""
     step = run.sel(time=time, method="nearest")
     found = {name: step[name].values for name in JOINT_DATA if name in run}
@@ -180,7 +182,9 @@ def _xdmf(solids: Solids, shown: list[Frame], entries: int, heavy: str) -> str:
         )
 
     def attribute(name: str, kind: str, centre: str, data: str) -> str:
-        return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{data}</Attribute>'
+        return (
+            f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{data}</Attribute>'
+        )
 
     lines = [
         '<?xml version="1.0"?>',

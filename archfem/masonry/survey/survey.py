@@ -159,12 +159,14 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
         gravity=gravity,
         name=Path(path).stem,
     )
-    return _named_by_curves(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
+    return (
+        _named_by_curves(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
+    )
 
 
 def _named_by_curves(structure: Structure, path: Path, unit: str | None) -> Structure:
     """The same with each joint named as the physical curve along it, if there is one."""
-    near, names = TOUCHING * structure.size, {}
+    near, names = TOUCHING * structure.size, dict[int, str]()
     for name, middles in physical_curves(path, in_unit(f"1 {unit or 'm'}", "m", "unit")):
         away = middles[None] - structure.middles[:, None]
         along = np.abs(np.einsum("jpk,jk->jp", away, structure.tangents))

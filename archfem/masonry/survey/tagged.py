@@ -135,4 +135,6 @@ def _outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[in
     before, ahead = places - np.roll(places, 1, axis=0), np.roll(places, -1, axis=0) - places
     turn = before[:, 0] * ahead[:, 1] - before[:, 1] * ahead[:, 0]
     lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(ahead, axis=1)
-    return [point for point, bends in zip(loop, np.abs(turn) > STRAIGHT * lengths, strict=True) if bends]
+    return [
+        point for point, bends in zip(loop, np.abs(turn) > STRAIGHT * lengths, strict=True) if bends
+    ]

@@ -55,7 +55,8 @@ class Solids:
     @cached_property
     def owner(self) -> NDArray[np.intp]:
         """Block of each polygon (p,)."""
-        return self.block[[polygon[0] for polygon in self.polygons]]
+        found: NDArray[np.intp] = self.block[[polygon[0] for polygon in self.polygons]]
+        return found
 
     def displacement(self, q: Array) -> Array:
         """Return the displacement of every point (m, 2) [m].
@@ -92,7 +93,7 @@ class Solids:
 
     @cached_property
     def corners(self) -> Array:
-        """Faces of each joint as built, the lower block's ends and back on the higher's (j, 4, 2)."""
+        """Faces of each joint as built, there on the lower block and back on the other (j, 4, 2)."""
         return np.array([[*joint.ends, *joint.ends[::-1]] for joint in self.model.structure.joints])
 
     @cached_property

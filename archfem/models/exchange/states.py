@@ -1,6 +1,7 @@
 """One state of a model as a file: DXF, VTU, or whatever meshio writes."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +14,13 @@ from archfem.models.exchange.vtu import write_vtu
 from archfem.models.model import Model
 
 
-def write_state(
-    model: Model, q: Array, path: str | Path, *, magnification: float = 1.0
-) -> Path:
+def write_state(model: Model, q: Array, path: str | Path, *, magnification: float = 1.0) -> Path:
     """Write where the blocks are, for programs that draw or mesh.
 
     As *.dxf: the outlines of all blocks where they have moved, each on the layer of its part, over
-    those as built, and the joints as built. As *.vtu, or any format of meshio (*.vtk, *.msh, *.inp,
-    *.xdmf …): the cells as built, with displacements [m] at their points and the number of its block
-    and stresses [Pa] in each. Blocks share no points, so that openings stay.
+    those as built, and the joints as built. As *.vtu, or any format of meshio that has data (*.vtk,
+    *.xdmf, *.e …): the cells as built, with displacements [m] at their points, and in each the
+    number of its block and stresses [Pa]. Blocks share no points, so that openings stay.
 
     Args:
         model: what stands.
@@ -39,7 +38,7 @@ def write_state(
     moved = solids.displacement(np.asarray(q, dtype=float))
     if path.suffix == ".dxf":
         return _drawn(solids, moved, path, magnification)
-    data: dict[str, Array | NDArray[np.int64]] = {"block": solids.owner.astype(np.int64)}
+    data: dict[str, NDArray[Any]] = {"block": solids.owner.astype(np.int64)}
     stress = solids.stress(q)
     if stress is not None:
         names = ("stress_xx", "stress_yy", "stress_xy")
@@ -66,7 +65,9 @@ def _drawn(solids: Solids, moved: Array, path: Path, magnification: float) -> Pa
 
 def _rim(cells: list[NDArray[np.intp]]) -> list[int]:
     """The points around a block, in order: edges of one cell only, one after another."""
-    edges = {(int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)}
+    edges = {
+        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
+    }
     after = {a: b for a, b in edges if (b, a) not in edges}
     loop = [min(after)]
     while (following := after[loop[-1]]) != loop[0]:
@@ -74,7 +75,7 @@ def _rim(cells: list[NDArray[np.intp]]) -> list[int]:
     return loop
 
 
-def _by_meshio(solids: Solids, moved: Array, data: dict[str, Array], path: Path) -> Path:
+def _by_meshio(solids: Solids, moved: Array, data: dict[str, NDArray[Any]], path: Path) -> Path:
     """A file in one of meshio's formats."""
     try:
         import meshio

@@ -3,6 +3,7 @@
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -23,7 +24,7 @@ def write_vtu(
     points: Array,
     polygons: Sequence[NDArray[np.intp]],
     point_data: Mapping[str, Array],
-    cell_data: Mapping[str, Array],
+    cell_data: Mapping[str, NDArray[Any]],
 ) -> None:
     """Write polygons and what is known of their points and of themselves.
 
@@ -35,7 +36,7 @@ def write_vtu(
         cell_data: by name, (n_polygons,) or (n_polygons, k).
     """
     sizes = [len(polygon) for polygon in polygons]
-    cells = {
+    cells: dict[str, NDArray[Any]] = {
         "connectivity": np.concatenate(polygons).astype(np.int64),
         "offsets": np.cumsum(sizes, dtype=np.int64),
         "types": np.array([KINDS.get(size, 7) for size in sizes], dtype=np.uint8),
@@ -82,18 +83,18 @@ def _spatial(values: Array) -> Array:
     return values
 
 
-def _section(name: str, arrays: Mapping[str, Array | NDArray[np.generic]]) -> list[str]:
+def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
     """Some arrays under a name."""
     return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
 
 
-def _array(name: str, values: Array | NDArray[np.generic]) -> str:
+def _array(name: str, values: NDArray[Any]) -> str:
     """An array, its bytes in letters after their number."""
     kind, form = TYPES[values.dtype.kind] if values.dtype != np.uint8 else TYPES["u"]
     data = np.ascontiguousarray(values, dtype=form).tobytes()
     size = np.array([len(data)], dtype="<u8").tobytes()
-    components = values.shape[1] if values.ndim == 2 else 1
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     return (
-        f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfComponents="{components}" '
-        f'format="binary">{b64encode(size + data).decode()}</DataArray>'
+        f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="binary">'
+        f"{b64encode(size + data).decode()}</DataArray>"
     )
