@@ -87,8 +87,8 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         displacements: "small", or "large" where blocks may turn and slide as far as they like,
             and fall; not on the rung "monolithic". With "auto" the choice is made by small
             displacements, and holds as long as blocks hold together.
-        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and `coarse`;
-            for "rigid" and "auto" there is none.
+        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and
+            `coarse`; for "rigid" and "auto" there is none.
 
     Raises:
         InvalidInput: an option is not one of those above.

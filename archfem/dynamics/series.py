@@ -17,9 +17,8 @@ from archfem.models.exchange.solids import Solids
 from archfem.models.exchange.vtu import write_collection, write_vtu
 from archfem.models.model import Model
 
-JOINT_DATA = (
-    "N", "V", "M", "eccentricity", "friction", "opening", "slip", "rotation", "hinge", "slide", "open",
-)  # fmt: skip
+JOINT_DATA = ("N", "V", "M", "eccentricity", "friction", "opening", "slip", "rotation")
+FLAGS = ("hinge", "slide", "open")
 """What files tell of each joint, as far as a run has it."""
 
 STRESSES = ("stress_xx", "stress_yy", "stress_xy")
@@ -46,8 +45,8 @@ def write_vtk(model: Model, run: xr.Dataset, path: str | Path) -> Path:
 
     Blocks share no points, so that openings stay. Points bear `displacement` [m], cells the number
     of their `block` and, where blocks deform, mean stresses `stress_xx`, `stress_yy`, `stress_xy`
-    [Pa]; warp by displacement to see what moves. The second part has a quadrilateral for each joint,
-    flat at rest, which bears N, V, M, eccentricity, opening, slip and flags.
+    [Pa]; warp by displacement to see what moves. The second part has a quadrilateral for each
+    joint, flat at rest, which bears N, V, M, eccentricity, opening, slip and flags.
 
     Args:
         model: that made the run.
@@ -152,7 +151,7 @@ def frames(solids: Solids, run: xr.Dataset) -> Iterator[Frame]:
 def _of_joints(run: xr.Dataset, time: float) -> dict[str, NDArray[Any]]:
     """What the joints do at the recorded step nearest a time; nothing after it."""
     step = run.sel(time=time, method="nearest")
-    found = {name: step[name].values for name in JOINT_DATA if name in run}
+    found = {name: step[name].values for name in (*JOINT_DATA, *FLAGS) if name in run}
     kinds = {name: np.uint8 if each.dtype == bool else float for name, each in found.items()}
     kept = {name: each.astype(kinds[name]) for name, each in found.items()}
     return {"joint": np.arange(run.sizes["joint"], dtype=np.int64), **kept}
@@ -167,7 +166,7 @@ def _named(path: str | Path, suffix: str) -> Path:
 
 
 def _kind(size: int) -> tuple[int, ...]:
-    """XDMF's number of a polygon in a mixed topology, and the count of corners where it needs it."""
+    """XDMF's number of a kind of polygon, and the count of its corners where that needs it."""
     return {3: (4,), 4: (5,)}.get(size, (3, size))
 
 

@@ -46,8 +46,8 @@ class Discretisation:
         points: on each facet, 3 where not given.
         displacements: "small", or "large" where blocks may turn and slide as far as they like, on
             all rungs but "monolithic"; those of a fill with nodes stay small.
-        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and `coarse`;
-            not on the rung "rigid", which has no mesh.
+        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and
+            `coarse`; not on the rung "rigid", which has no mesh.
     """
 
     fidelity: str | Mapping[str, str] = "full"

@@ -93,8 +93,9 @@ class Solids:
 
     @cached_property
     def corners(self) -> Array:
-        """Faces of each joint as built, there on the lower block and back on the other (j, 4, 2)."""
-        return np.array([[*joint.ends, *joint.ends[::-1]] for joint in self.model.structure.joints])
+        """Faces of each joint as built: on the lower block, and back on the other (j, 4, 2)."""
+        joints = self.model.structure.joints
+        return np.array([[*joint.ends, *joint.ends[::-1]] for joint in joints])
 
     @cached_property
     def _anchors(self) -> tuple[NDArray[np.intp], Array]:
