@@ -41,6 +41,7 @@ MODEL = {
     "points": int,
     "tolerance": "1",
     "displacements": str,
+    "file": str,
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
@@ -209,7 +210,11 @@ class Case:
     def discretisation(self) -> Discretisation:
         """What the structure is modelled by; its mesh does not count where "auto" is to choose."""
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
-        return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
+        told = {key: self.model[key] for key in self.model if key not in idle}
+        if "file" in told and self.chooses:
+            raise InvalidInput("model.file is one mesh, and fidelity = 'auto' chooses: name a rung")
+        told |= {key: self.folder / told[key] for key in ("file",) if key in told}
+        return Discretisation(**told)
 
     @property
     def tolerance(self) -> float:
@@ -256,12 +261,7 @@ class Case:
         return ground.ground_suite(self.suite, self.folder)
 
     def check_ground(self) -> None:
-        """Refuse motions that cannot be read, before anything is computed to be shaken by them.
-
-        Raises:
-            InvalidInput: a file is missing or no record; or horizontal and vertical do not go
-                together.
-        """
+        """Refuse motions that cannot be read, before anything is computed (`InvalidInput`)."""
         if self.motion is not None:
             self.ground_motion()
         if self.suite is not None:

@@ -17,6 +17,8 @@
     recorder      what a run leaves behind
     sentences     what a run means, in words
     history       the record of a run, and its file
+    exports       what a run is written as for other programs
+    series        runs as series of files: VTU and PVD, XDMF
     verdicts      when a run first meets a mechanism, by each definition
     scales        by what factor a motion must be multiplied for a mechanism
     collapse_scale  by what factor until the structure falls

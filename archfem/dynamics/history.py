@@ -11,6 +11,7 @@ import xarray as xr
 from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.dynamics.corners import displacement_of
+from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
@@ -58,7 +59,7 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class History(Shown, picture="joints.draw_joints"):
+class History(Exports, Shown, picture="joints.draw_joints"):
     """The record of one run.
 
     Attributes:
