@@ -13,7 +13,7 @@ export OMP_NUM_THREADS := 1
 # A worker a core, and whoever is done takes over from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow hard bench lint clean
+.PHONY: help setup demo test test-slow hard fuzz mutants bench lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -48,6 +48,9 @@ test-slow: .venv/compiled  ## the tests that take minutes
 
 hard: .venv/compiled  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard
+
+fuzz: .venv/compiled  ## odd input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
+	cd tests && ../$(PYTHON) -m fuzz --seed $(or $(SEED),0) $(if $(COUNT),--count $(COUNT))
 
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py

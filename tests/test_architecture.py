@@ -13,7 +13,17 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "tables", "_petsc"}
+GROUND = {
+    "errors",
+    "arguments",
+    "annotated",
+    "arrays",
+    "units",
+    "files",
+    "netcdf",
+    "tables",
+    "_petsc",
+}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}
@@ -34,6 +44,7 @@ ONLY_IN = {
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",
+    "netCDF4": "netcdf",
     "tomllib": ("cases", "studies"),
     "tomli_w": "cases",
     "argparse": "commands",

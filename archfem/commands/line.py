@@ -3,14 +3,19 @@
 import argparse
 import logging
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from archfem.commands import cases, studies
 from archfem.errors import ArchfemError
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
+
+TERMINATED = 143
+"""What it expects of one that was asked to end by SIGTERM."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,11 +25,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words after `archfem`; by default those that the process was given.
 
     Returns:
-        As by `exit_code`; where the words are not understood, the process ends with 2.
+        As by `exit_code`, or 143 where SIGTERM has ended the command; where the words are not understood, the process ends with 2.
     """
     given = _parser().parse_args(arguments)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
-    return exit_code(lambda: given.command(given))
+    with _asked_to_end() as asked:
+        code = exit_code(lambda: given.command(given))
+    return TERMINATED if asked and code == INTERRUPTED else code
+
+
+@contextmanager
+def _asked_to_end() -> Iterator[list[int]]:
+    """Let SIGTERM end what goes on as Ctrl-C does; the signals that have come."""
+    came: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def exit_code(command: Callable[[], None]) -> int:

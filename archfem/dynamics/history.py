@@ -13,7 +13,6 @@ from archfem.arrays import Array
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.duration import step_lengths
 from archfem.joints.resultants import one_joint
@@ -24,6 +23,7 @@ from archfem.limit.verified import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
+from archfem.netcdf import read_dataset, write_dataset
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -216,9 +216,7 @@ class History:
             The file.
         """
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
-        with in_one_stroke(Path(path)) as draft:
-            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
-        return Path(path)
+        return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
     @as_annotated
@@ -231,17 +229,11 @@ class History:
                 what roles its parts have.
 
         Raises:
-            InvalidInput: there is no such file, or it is something else, or of another structure;
-                or nothing tells the roles of the parts.
+            InvalidInput: there is no such file, or it is damaged, something else, or of another
+                structure; or nothing tells the roles of the parts.
         """
-        if not Path(path).is_file():
-            raise InvalidInput(f"there is no history file {path}")
-        try:
-            with xr.open_dataset(path, engine="netcdf4") as opened:
-                dataset = opened.load()
-        except OSError as error:
-            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
-        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        dataset = read_dataset(path, "history file")
+        missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
         names = dataset["name"].values.astype(str).tolist()

@@ -177,7 +177,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 
 
 def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
-    """A run of a structure that may fall, with what it has left of it."""
+    """A run of a structure that may fall, with what it has left of it; a broken one tells nothing."""
+    if history.ended is Ending.INTERRUPTED:
+        return history
     tilts = history.ended is Ending.FINISHED and tilting(model, state)
     if history.ended is not Ending.PARTED and not tilts:
         return with_fall(history, left_standing(model, state))
