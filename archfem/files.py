@@ -103,6 +103,7 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
 
     Raises:
         DiskFull: there is no room for it.
+        OSError: anything else is wrong with it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")

@@ -13,17 +13,8 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {
-    "errors",
-    "arguments",
-    "annotated",
-    "arrays",
-    "units",
-    "files",
-    "netcdf",
-    "tables",
-    "_petsc",
-}
+GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "netcdf", "tables"}
+GROUND |= {"threads", "_petsc"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}

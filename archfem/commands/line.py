@@ -3,16 +3,20 @@
 import argparse
 import logging
 import os
+import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from archfem.commands import cases, studies
-from archfem.errors import ArchfemError
+from archfem.errors import ArchfemError, InvalidInput
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
+
+LEAST_MEMORY = 3 * 2**29
+"""Address space that a run of a small ring takes, libraries included [bytes]."""
 
 TERMINATED = 143
 """What it expects of one that was asked to end by SIGTERM."""
@@ -25,12 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words after `archfem`; by default those that the process was given.
 
     Returns:
-        As by `exit_code`, or 143 where SIGTERM has ended the command; where the words are not understood, the process ends with 2.
+        As by `exit_code`, or 143 where SIGTERM has ended the command; where the words are not
+        understood, the process ends with 2.
     """
     given = _parser().parse_args(arguments)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _asked_to_end() as asked:
-        code = exit_code(lambda: given.command(given))
+        code = exit_code(lambda: (_check_memory(), given.command(given))[1])
     return TERMINATED if asked and code == INTERRUPTED else code
 
 
@@ -48,6 +53,20 @@ def _asked_to_end() -> Iterator[list[int]]:
         yield came
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _check_memory() -> None:
+    """Refuse a limit on memory under which libraries crash or wait for ever as they are loaded.
+
+    Raises:
+        InvalidInput: the limit is below what they take.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < LEAST_MEMORY:
+        raise InvalidInput(
+            f"memory is limited to {limit / 2**30:.2f} GiB, and libraries alone take "
+            f"{LEAST_MEMORY / 2**30:.2f} GiB: raise the limit (ulimit -v)"
+        )
 
 
 def exit_code(command: Callable[[], None]) -> int:

@@ -14,6 +14,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model, check_model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.tables import aligned
+from archfem.threads import on_one_thread
 
 SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""
@@ -66,6 +67,7 @@ class Modes:
         return aligned(head, rows)
 
 
+@on_one_thread
 def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     """Find the lowest modes of small vibrations about a state, K φ = ω² M φ.
 

@@ -17,6 +17,7 @@ from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
+from archfem.threads import on_one_thread
 
 Path = LoadPath | SupportPath
 
@@ -92,6 +93,7 @@ class Pushover:
         return float(self.curve["factor"][-1])
 
 
+@on_one_thread
 def pushover(
     model: Model,
     load: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
