@@ -43,6 +43,10 @@ class DiskFull(ArchfemError, OSError):
         self.errno = code
 
 
+class NotInstalled(ArchfemError, ImportError):
+    """A package that is asked for and not there: get it as said, or ask for what needs it not."""
+
+
 class DidNotConverge(ArchfemError):
     """No equilibrium was found; what was computed up to there is kept.
 

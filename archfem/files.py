@@ -122,6 +122,29 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
         draft.unlink(missing_ok=True)
 
 
+def result_folder(path: str | Path) -> Path:
+    """Return a folder for results, made if it is not there.
+
+    Args:
+        path: of the folder.
+
+    Raises:
+        InvalidInput: a file stands in its place, or it cannot be made.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise InvalidInput(
+            f"--out {folder} is a file, and results go into a folder: name another"
+        ) from error
+    except OSError as error:
+        raise InvalidInput(
+            f"the folder {folder} cannot be made ({error.strerror}): name another with --out"
+        ) from error
+    return folder
+
+
 def forget_stale(folder: Path, *others: Path) -> None:
     """Delete compiled code of a folder that is older than any of its sources.
 

@@ -5,7 +5,7 @@
 
 import re
 from functools import cache
-from math import inf, isfinite, prod, tan
+from math import degrees, inf, isfinite, pi, prod, tan
 from typing import Any
 
 from archfem.annotated import as_annotated
@@ -40,6 +40,10 @@ HIGHEST = 12
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
 
 
+_DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+"""Degrees as most write them, read without the registry of units."""
+
+
 @cache
 def _registry() -> Any:
     import pint  # slow to import, and only case files need it
@@ -60,6 +64,10 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     Raises:
         InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
             number is wanted.
+
+    Example:
+        >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
+        1480000000.0
     """
     if isinstance(value, str):
         number = _converted(value, unit, key)
@@ -69,6 +77,30 @@ def in_unit(value: Any, unit: str, key: str) -> float:
         raise InvalidInput(f"{key} = {said(value)} is not a number: give one in {unit}")
     if not isfinite(number):
         raise InvalidInput(f"{key} = {said(value)} is not finite: give a number in {unit}")
+    return number
+
+
+def in_degrees(value: Any, key: str) -> float:
+    """Return an angle as a number of degrees.
+
+    Args:
+        value: 159, "159 degree", "2.775 rad"; a bare number is in degrees, and refused up to 2π,
+            where it is more likely meant in radians: with its unit it is taken at its word.
+        key: what to call the value in an error.
+
+    Raises:
+        InvalidInput: it is no angle, text without a unit, or a bare number of so few degrees.
+    """
+    if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
+        return float(plain[1])
+    if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
+        raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
+    number = in_unit(value, "degree", key)
+    if not isinstance(value, str) and 0.0 < abs(number) <= 2.0 * pi:
+        raise InvalidInput(
+            f"{key} = {value!r} would be a few degrees only, and looks like radians: give "
+            f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if you mean that'
+        )
     return number
 
 

@@ -86,7 +86,7 @@ class Case:
 
     Attributes:
         title: in words.
-        structure: what stands.
+        structure: what stands; its name is the title of the case.
         model: keywords of `build`.
         motion: what the file says of one ground motion, or None.
         suite: what it says of a suite of them, or None; without either there is dead load alone.
@@ -164,7 +164,7 @@ class Case:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
             title=str(settings.get("title", "case")),
-            structure=planned(settings, folder),
+            structure=_titled(planned(settings, folder), settings),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
@@ -255,6 +255,18 @@ class Case:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
         return ground.ground_suite(self.suite, self.folder)
 
+    def check_ground(self) -> None:
+        """Refuse motions that cannot be read, before anything is computed to be shaken by them.
+
+        Raises:
+            InvalidInput: a file is missing or no record; or horizontal and vertical do not go
+                together.
+        """
+        if self.motion is not None:
+            self.ground_motion()
+        if self.suite is not None:
+            ground.ground_pairs(self.suite, self.folder)
+
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""
@@ -281,6 +293,11 @@ class Case:
     def text(self) -> str:
         """The case as TOML, changes included."""
         return tomli_w.dumps(self.settings)
+
+
+def _titled(structure: Structure, settings: Table) -> Structure:
+    """Return a structure that pictures call by the title of its case, where it has one."""
+    return replace(structure, name=str(settings.get("title", structure.name)))
 
 
 def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:

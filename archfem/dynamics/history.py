@@ -117,6 +117,17 @@ class History:
             )
         return Ending(self.dataset.attrs["ended"])
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the run doubtful, a sentence each.
+
+        Energy that drifts by more than 5 % at any step, joints that turn or blocks that move too
+        far for small displacements, a rung that is wrong for a block or whose predicted error is
+        larger than was asked for. Files of earlier versions tell none.
+        """
+        told = str(self.dataset.attrs.get("doubts", ""))
+        return tuple(words for words in told.split("\n") if words)
+
     @cached_property
     def mechanism(self) -> Mechanism | None:
         """The first mechanism by count, or None; with the blocks that can then move, if any."""
@@ -167,7 +178,8 @@ class History:
         The sentence tells the largest hinge rotation, slip and displacement, and what is left at
         the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
         and, where the structure is known, verified, each with its duration and its opening, and
-        whether any before it was too short to count. A run that did not finish says so first.
+        whether any before it was too short to count. A run that did not finish, and one that is in
+        doubt, say so first.
         """
         names = None
         if self.structure is not None:
@@ -175,6 +187,7 @@ class History:
         told = self.dataset.attrs
         whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
         lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
+        lines += [f"in doubt: {words}" for words in self.doubts]
         lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
         lines += mechanism_lines(self.joints, self._first, names, self._first_of_any_duration)
         return "\n".join(line for line in lines if line)

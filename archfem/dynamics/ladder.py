@@ -145,11 +145,15 @@ def choose(
     else:
         small = error_of_small(yardstick, steps)
     told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered), small)
+    chosen, doubts = model.predicted(told), []
     if not told.met:
-        logger.warning("%s", _unmet(told, in_model <= allowed))
+        doubts.append(_unmet(told, in_model <= allowed))
     if small > tolerance:
-        logger.warning("%s", _far(small, tolerance))
-    return model.predicted(told)
+        doubts.append(_far(small, tolerance))
+    for words in doubts:
+        logger.warning("%s", words)
+    chosen.doubts = (*model.doubts, *doubts)
+    return chosen
 
 
 def _steps(

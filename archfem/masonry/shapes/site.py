@@ -55,7 +55,7 @@ class Site:
 
         Args:
             arches: the rings.
-            piers: between them, one fewer.
+            piers: between them, one fewer, or also under both ends, one more.
             sidewalls: left and right, or none.
 
         Returns:
@@ -65,12 +65,15 @@ class Site:
             InvalidStructure: parts do not fit beside one another.
         """
         rings, x = [], sidewalls[0].length if sidewalls else 0.0
+        ends: Sequence[Courses] = sidewalls
+        if len(piers) > len(arches):
+            ends, piers = (piers[0], piers[-1]), piers[1:-1]
         for number, arch in enumerate(arches):
             rings.append(ring_of(arch, x, self.material, self.contact, self.chords))
             x += arch.span + (piers[number].gap if number < len(piers) else 0.0)
         faces = [(ring.joints[0], ring.joints[-1]) for ring in rings]
         springings = [(face_of(left), face_of(right)) for left, right in faces]
-        support = self._end(springings[0][0], 1.0, sidewalls[:1], "left abutment")
+        support = self._end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
             first = len(self.blocks)
             self.blocks += ring.blocks[1:-1]
@@ -78,7 +81,7 @@ class Site:
             if number < len(piers):
                 after = self._pier(piers[number], right, springings[number + 1][0])
             else:
-                after = self._end(right, -1.0, sidewalls[1:], "right abutment")
+                after = self._end(right, -1.0, ends[1:], "right abutment")
             stones = [support, *range(first, last + 1), after]
             for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
                 self._join(pair, face_of(joint), f"joint {k}", arch)
@@ -235,7 +238,7 @@ class Site:
         count = sum(joint.part == part.name for joint in self.joints)
         self._join(pair, (left, right), f"joint {count}" if count else "base", part)
 
-    def _end(self, face: Face, inward: float, walls: Sequence[Sidewall], bare: str) -> int:
+    def _end(self, face: Face, inward: float, walls: Sequence[Courses], bare: str) -> int:
         """What an outer springing bears on; the number of the block at the joint."""
         if not walls:
             outer, inner = face[1], face[0]
@@ -243,7 +246,25 @@ class Site:
             back = inward * 0.5 * np.array([-radial[1], radial[0]])
             far = [tuple(np.add(point, back)) for point in (outer, inner)]
             return self.add([inner, outer, *far], bare, fixed=True, structured=True)
+        if isinstance(walls[0], Pier):
+            return self._end_pier(walls[0], face, inward)
         return self._wall(walls[0], face, inward)
+
+    def _end_pier(self, pier: Pier, face: Face, inward: float) -> int:
+        """A pier under the only springing at an end; the number of its skewback."""
+        (x, y), (edge, level) = face
+        outer = 0.5 * (x + edge) - inward * pier.gap
+        step = pier.height / max(1, round(pier.height / pier.course))
+        if not inward * (edge - outer) >= 0.0 or y <= -step:
+            raise InvalidStructure(
+                f"'{pier.name}': a ring does not stand on a gap of {pier.gap:.3g} m and a course "
+                f"of {step:.3g} m: give a wider gap or higher courses"
+            )
+        below = self._courses((outer, x), (-pier.height, -step), pier)
+        outline = [(outer, -step), (x, -step), (x, y), (edge, level), (outer, level)]
+        top = self._stone(outline, "skewback", pier)
+        self._bed((below, top), (outer, x), -step, pier)
+        return top
 
     def _wall(self, wall: Sidewall, face: Face, inward: float) -> int:
         """A sidewall; the number of its skewback."""
