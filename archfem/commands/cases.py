@@ -207,6 +207,7 @@ def _tell_run(done: Run, rest: Rest) -> None:
 
     Raises:
         DidNotConverge: a step of the only run failed; one of a suite ends its own pair alone.
+        KeyboardInterrupt: Ctrl-C ended the only run.
     """
     from archfem.cases.report import is_written, write_run
     from archfem.cases.summary import run_words
@@ -231,6 +232,8 @@ def _tell_run(done: Run, rest: Rest) -> None:
     text = run_words(done.case.structure, history, rest.dead.joints)
     print(text)
     _tell_written(write_run(done, rest, text, done.path.parent))
+    if history.ended is Ending.INTERRUPTED and done.case.suite is None:
+        raise KeyboardInterrupt
 
 
 def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path) -> None:

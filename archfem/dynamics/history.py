@@ -15,7 +15,6 @@ from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.duration import step_lengths
 from archfem.joints.resultants import one_joint
@@ -26,6 +25,7 @@ from archfem.limit.verified import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
+from archfem.netcdf import read_dataset, write_dataset
 from archfem.shown import Shown
 
 SIGNS = (
@@ -241,9 +241,7 @@ class History(Exports, Shown, picture="joints.draw_joints"):
             The file.
         """
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
-        with in_one_stroke(Path(path)) as draft:
-            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
-        return Path(path)
+        return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
     @as_annotated
@@ -256,17 +254,11 @@ class History(Exports, Shown, picture="joints.draw_joints"):
                 what roles its parts have.
 
         Raises:
-            InvalidInput: there is no such file, or it is something else, or of another structure;
-                or nothing tells the roles of the parts.
+            InvalidInput: there is no such file, or it is damaged, something else, or of another
+                structure; or nothing tells the roles of the parts.
         """
-        if not Path(path).is_file():
-            raise InvalidInput(f"there is no history file {path}")
-        try:
-            with xr.open_dataset(path, engine="netcdf4") as opened:
-                dataset = opened.load()
-        except OSError as error:
-            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
-        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        dataset = read_dataset(path, "history file")
+        missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
         names = dataset["name"].values.astype(str).tolist()

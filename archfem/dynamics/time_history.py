@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
@@ -36,6 +35,7 @@ from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.newton import Newton
+from archfem.threads import on_one_thread
 
 logger = logging.getLogger("archfem")
 
@@ -82,6 +82,7 @@ _KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
 """Classes of arguments, what to call them, and what to give."""
 
 
+@on_one_thread
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
     model: Model,
     motion: Motion,
@@ -177,7 +178,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 
 
 def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
-    """A run of a structure that may fall, with what it has left of it."""
+    """A run of a structure that may fall, with what it has left of it, unless broken off."""
+    if history.ended is Ending.INTERRUPTED:
+        return history
     tilts = history.ended is Ending.FINISHED and tilting(model, state)
     if history.ended is not Ending.PARTED and not tilts:
         return with_fall(history, left_standing(model, state))
@@ -252,14 +255,13 @@ def _stepped(
     end: float,
 ) -> tuple[Ending, str]:
     """Record steps to the end of the motion, or up to an event; which of both, also in words."""
-    # Steps are too small for threads, which only get in each other's way.
     start = recorder.state
     batches = (
         stepper.batches(start, end)
         if isinstance(stepper, Pace)
         else stepper.batches(start, recorder.dt or STEP, end)
     )
-    with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
+    with _bar(end - start.time) as bar:
         for batch in batches:
             ended, reason, size = _reason(watches, batch, recorder.state.time)
             recorder.add(batch.cut(size), last=reason is not None)

@@ -10,10 +10,12 @@ from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.models.reduced import reduced
 from archfem.models.rigid import rigid
+from archfem.threads import on_one_thread
 
 logger = logging.getLogger("archfem")
 
 
+@on_one_thread
 def build(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of a structure.
 

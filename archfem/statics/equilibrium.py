@@ -22,6 +22,7 @@ from archfem.models.unfinished import Unfinished
 from archfem.shown import Shown
 from archfem.statics.newton import Newton, Solver
 from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
+from archfem.threads import on_one_thread
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -100,6 +101,7 @@ def self_weight(model: Model) -> Array:
     return model.load(BodyForce(0.0, -1.0))
 
 
+@on_one_thread
 def dead_load(
     model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
 ) -> Equilibrium:
