@@ -77,8 +77,13 @@ def test_commands_are_those_of_the_command_line(capsys):
     with pytest.raises(SystemExit):
         af.commands.main(["--help"])
     known = capsys.readouterr().out
-    for command in set(re.findall(r"^(?:archfem|`archfem) (\w+)", WORDS, re.MULTILINE)):
-        assert command in known
+    shell = "\n".join(re.findall(r"```sh\n(.*?)```", WORDS, re.DOTALL))
+    found = re.findall(r"^archfem (\w+)", shell, re.MULTILINE) + re.findall(
+        r"`archfem (\w+)", WORDS
+    )
+    assert {"run", "study", "motion"} <= set(found)
+    for command in set(found):
+        assert f" {command} " in known, command
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", WORDS))))
