@@ -66,8 +66,12 @@ def stack():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures are made, but their files stay empty: printing them takes most of the time."""
-    figure = "matplotlib.figure.Figure.savefig"
-    monkeypatch.setattr(figure, lambda self, path, **given: Path(path).touch())
+
+    def unprinted(figure, target, **given):
+        if not hasattr(target, "write"):
+            Path(target).touch()
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", unprinted)
 
 
 @pytest.fixture

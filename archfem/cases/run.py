@@ -5,11 +5,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.inputs import inputs_digest
+from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
@@ -24,6 +27,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.strength import strength_use
+
+if TYPE_CHECKING:
+    from archfem.view.pages.player import Player
 
 HISTORY = "history.nc"
 """Name of a history's file."""
@@ -99,6 +105,27 @@ class Run:
     seconds: float = 0.0
     error: DidNotConverge | None = None
 
+    def report(self, path: str | Path) -> Path:
+        """Write a report of the run: one HTML file, to hand in and to print.
+
+        Args:
+            path: the file, .html; folders are made.
+
+        Returns:
+            The file.
+        """
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+        from archfem.cases.dossier.writing import write_report
+
+        folder = None if self.path is None else self.path.parent
+        return write_report(Results(self.case, {self.motion.name: self.history}, folder), path)
+
+    def player(self) -> "Player":
+        """Return the player of the run, which shows itself in a notebook."""
+        from archfem.cases.dossier.display import player_of
+
+        return player_of(self.case, self.history, self.case.title)
+
 
 Result = Collapse | Rest | Suite | Run
 """What carrying out a case finds."""
@@ -135,6 +162,7 @@ def carried_out(
             first step of a run could be made.
     """
     shake, folder = shake or shaken, None if folder is None else Path(folder)
+    (case if pairs is None else case.alone(*pairs)).check_ground()
     if case.limit is not None:
         yield case.limit.of(case.structure)
     rest = Rest.of(case)
@@ -246,32 +274,36 @@ def shaken(
         DidNotConverge: a step failed; `history` is the record up to it.
     """
     output = case.output
+    of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
     animated = FRAMES if output.get("animation", False) else None
     try:
-        run = time_history(
-            dead.model,
-            motion,
-            dt=case.analysis.get("dt"),
-            start=dead,
-            damping=damping or damping_of(case, dead)[0],
-            scheme=case.scheme,
-            record=Record(
-                every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-            ),
-            until=CountedMechanism() if case.analysis.get("halt", False) else None,
-            criteria=case.criteria,
-            method=method,
-        )
+        with told_of(case.title, motion.name):
+            run = time_history(
+                dead.model,
+                motion,
+                dt=case.analysis.get("dt"),
+                start=dead,
+                damping=damping or damping_of(case, dead)[0],
+                scheme=case.scheme,
+                record=Record(
+                    every=output.get("every", 1), fields_every=output.get("fields_every", animated)
+                ),
+                until=CountedMechanism() if case.analysis.get("halt", False) else None,
+                criteria=case.criteria,
+                method=method,
+            )
     except DidNotConverge as error:
         if error.history is not None:
-            error.history.dataset.attrs["case"] = case.text()
+            error.history.dataset.attrs |= of_case
         raise
-    run.dataset.attrs["case"] = case.text()
+    run.dataset.attrs |= of_case
     return run
 
 
 def finished(path: Path, case: Case, motion: Motion) -> History | None:
     """Return what an earlier run left, where it ended by itself, of the same case and motion.
+
+    The files that the case reads, and archfem itself, must be those of then, to the letter.
 
     Args:
         path: file of the history.
@@ -286,7 +318,8 @@ def finished(path: Path, case: Case, motion: Motion) -> History | None:
         whole = run.ended.by_itself
     except InvalidInput:
         return None
-    if not whole or run.dataset.attrs.get("case") != case.text():
+    told = run.dataset.attrs
+    if not whole or told.get("inputs") != inputs_digest(case.settings, case.folder):
         return None
     before, now = run.dataset["ground"].values, motion.at(run.time)
     return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
@@ -297,7 +330,9 @@ def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> R
     case = rest.case.alone(motion.name)
     path = None if folder is None else folder / motion.name / HISTORY
     if path is not None and (history := finished(path, case, motion)) is not None:
-        return Run(case, motion, history, path, kept=True)
+        chosen = rest.dead.model.prediction  # by the first pair, which this one may not be
+        if chosen is None or history.dataset.attrs.get("predicted_error") == chosen.error:
+            return Run(case, motion, history, path, kept=True)
     return _run(case, motion, rest, path, shake)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, mechanism_lines
@@ -83,6 +84,7 @@ class History:
         """What makes a joint fail, and how many failed joints make a mechanism."""
         return Criteria.of(self.dataset)
 
+    @as_annotated
     def judged_by(self, criteria: Criteria) -> "History":
         """Return the same run, judged by other criteria.
 
@@ -114,6 +116,17 @@ class History:
                 f"'{self.outcome}'; run it again"
             )
         return Ending(self.dataset.attrs["ended"])
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the run doubtful, a sentence each.
+
+        Energy that drifts by more than 5 % at any step, joints that turn or blocks that move too
+        far for small displacements, a rung that is wrong for a block or whose predicted error is
+        larger than was asked for. Files of earlier versions tell none.
+        """
+        told = str(self.dataset.attrs.get("doubts", ""))
+        return tuple(words for words in told.split("\n") if words)
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
@@ -165,7 +178,8 @@ class History:
         The sentence tells the largest hinge rotation, slip and displacement, and what is left at
         the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
         and, where the structure is known, verified, each with its duration and its opening, and
-        whether any before it was too short to count. A run that did not finish says so first.
+        whether any before it was too short to count. A run that did not finish, and one that is in
+        doubt, say so first.
         """
         names = None
         if self.structure is not None:
@@ -173,6 +187,7 @@ class History:
         told = self.dataset.attrs
         whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
         lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
+        lines += [f"in doubt: {words}" for words in self.doubts]
         lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
         lines += mechanism_lines(self.joints, self._first, names, self._first_of_any_duration)
         return "\n".join(line for line in lines if line)
@@ -192,6 +207,7 @@ class History:
             return self._first
         return self.judged_by(replace(self.criteria, duration=0.0))._first
 
+    @as_annotated
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.
 
@@ -218,6 +234,7 @@ class History:
         return Path(path)
 
     @classmethod
+    @as_annotated
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
         """Return what `save` wrote; an earlier version's file is judged by the usual criteria.
 

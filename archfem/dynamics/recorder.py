@@ -156,7 +156,8 @@ class Recorder:
             DidNotConverge: the guard is certain that what was kept is wrong.
         """
         self.state = batch.state(len(batch.times) - 1)
-        drift, readings = self.guard.add(batch), batch.read(self._gauges)
+        readings = batch.read(self._gauges)
+        drift = self.guard.add(batch, readings)
         self._reach.add(batch.times, readings)
         numbers = self._drift.count + np.arange(len(batch.times))
         kept = numbers % self.every == 0
@@ -202,7 +203,7 @@ class Recorder:
             dataset[name] = "time", values, words
         self._add_coordinates(dataset)
         dataset.attrs |= {
-            "title": f"time history of {structure.name} under {motion.name or 'motion'}",
+            "title": f"{structure.name}: {motion.name or 'time history'}",
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,
@@ -210,6 +211,8 @@ class Recorder:
             "last_time": self.state.time,
             "energy_drift": self.guard.worst,
             "largest_displacement": self.guard.largest_displacement,
+            "largest_turn": self.guard.largest_turn,
+            "doubts": "\n".join(self.guard.doubts),
             "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)) if self.dt else 0,
             "shortest_step": float(self._smallest.values[1:].min(initial=np.inf)),
             "steps": self._drift.count - 1,

@@ -240,7 +240,7 @@ def _recorder(
         every=record.every,
         fields_every=record.fields_every,
         criteria=criteria,
-        guard=Guard(model, first),
+        guard=Guard(model, first, damps=isinstance(stepper.equation.scheme, HHT)),
         state=start,
     )
 

@@ -13,6 +13,9 @@ from archfem.studies.over import Axis
 from archfem.studies.store import told_when_full
 from archfem.studies.worker import Row
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""How cells begin that a spreadsheet computes."""
+
 NETCDF, CSV, PARQUET = "results.nc", "results.csv", "results.parquet"
 
 ALONG = "entry"
@@ -72,11 +75,16 @@ def write_table(found: xr.Dataset, folder: Path) -> list[Path]:
         with in_one_stroke(files[0]) as draft:
             found.to_netcdf(draft, engine="netcdf4")
         with in_one_stroke(files[1]) as draft:
-            frame.to_csv(draft, index=False)
+            frame.map(_harmless).rename(columns=_harmless).to_csv(draft, index=False)
         with suppress(ImportError), in_one_stroke(folder / PARQUET) as draft:
             frame.to_parquet(draft, index=False)
             files.append(folder / PARQUET)
     return files
+
+
+def _harmless(value: Any) -> Any:
+    """A value that no spreadsheet takes for a formula: words that look like one are quoted."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def read_table(path: str | Path) -> xr.Dataset:

@@ -99,6 +99,40 @@ def test_nothing_beside_or_behind_a_mesh_is_run(stack, tmp_path):
     assert not mark.exists()
 
 
+HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "ending"),
+    [
+        (HEAD + "{call}", "msh"),
+        (HEAD + "{call}", "geo"),
+        ("$MeshFormat;\n{call}", "msh"),
+        ("$MeshFormat\n2.2 0 8\n{call}$EndMeshFormat\n", "msh"),
+        (HEAD + "$Comments\n{call}$EndComments\n", "msh"),
+        (HEAD + "$InterpolationScheme\n{call}$EndInterpolationScheme\n", "msh"),
+        (HEAD + "$View\n{call}$EndView\n$ONELAB\n{call}$EndONELAB\n", "opt"),
+        ('Include "{other}";\n', "msh"),
+        ('Merge "{other}";\n', "step"),
+        ("{call}", "brep"),
+    ],
+)
+def test_no_file_whatever_it_is_called_runs_anything(stack, tmp_path, text, ending):
+    """Scripts of gmsh behind a header, in sections that it knows, and in files named elsewhere."""
+    mark, other = tmp_path / "ran", tmp_path / "other.geo"
+    call = f'SystemCall "touch {mark}";\n'
+    other.write_text(call)
+    path = tmp_path / f"hostile.{ending}"
+    path.write_text(text.format(call=call, other=other))
+    with pytest.raises(af.errors.MeshError):
+        read_mesh(stack, path)
+    link = tmp_path / "link.msh"
+    link.symlink_to(path)
+    with pytest.raises(af.errors.MeshError):
+        read_mesh(stack, link)
+    assert not mark.exists()
+
+
 def test_a_face_of_several_chords_gets_a_cell_for_each():
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
     assert len(mesh(ring, af.models.Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2

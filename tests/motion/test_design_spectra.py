@@ -43,6 +43,63 @@ def test_tbec_site_factors(site, ss, s1, sds, sd1):
     assert (spectrum.sds, spectrum.sd1) == pytest.approx((sds, sd1), rel=ROUND_OFF)
 
 
+# The tables once more, column by column, as others have copied them from the printed codes: a slip
+# in one of both copies is found out. Site classes ZA to ZE downwards; tables 2.1 and 2.2.
+TBEC_SHORT = {
+    0.25: "0.8 0.9 1.3 1.6 2.4",
+    0.50: "0.8 0.9 1.3 1.4 1.7",
+    0.75: "0.8 0.9 1.2 1.2 1.3",
+    1.00: "0.8 0.9 1.2 1.1 1.1",
+    1.25: "0.8 0.9 1.2 1.0 0.9",
+    1.50: "0.8 0.9 1.2 1.0 0.8",
+}
+TBEC_LONG = {
+    0.10: "0.8 0.8 1.5 2.4 4.2",
+    0.20: "0.8 0.8 1.5 2.2 3.3",
+    0.30: "0.8 0.8 1.5 2.0 2.8",
+    0.40: "0.8 0.8 1.5 1.9 2.4",
+    0.50: "0.8 0.8 1.5 1.8 2.2",
+    0.60: "0.8 0.8 1.4 1.7 2.0",
+}
+# Ground types A to E downwards; tables 3.2 and 3.3.
+EUROCODE = {
+    1: {
+        "S": "1.0 1.2 1.15 1.35 1.4",
+        "TB": "0.15 0.15 0.20 0.20 0.15",
+        "TC": "0.4 0.5 0.6 0.8 0.5",
+        "TD": "2.0 2.0 2.0 2.0 2.0",
+    },
+    2: {
+        "S": "1.0 1.35 1.5 1.8 1.6",
+        "TB": "0.05 0.05 0.10 0.10 0.05",
+        "TC": "0.25 0.25 0.25 0.30 0.25",
+        "TD": "1.2 1.2 1.2 1.2 1.2",
+    },
+}
+
+
+@pytest.mark.parametrize("place", range(5))
+def test_every_cell_of_the_tables_of_tbec(place):
+    site = ("ZA", "ZB", "ZC", "ZD", "ZE")[place]
+    for ss, column in TBEC_SHORT.items():
+        factor = float(column.split()[place])
+        assert Tbec2018(ss, 0.3, site).sds == pytest.approx(factor * ss, rel=ROUND_OFF)
+    for s1, column in TBEC_LONG.items():
+        factor = float(column.split()[place])
+        assert Tbec2018(1.0, s1, site).sd1 == pytest.approx(factor * s1, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize("type_", [1, 2])
+@pytest.mark.parametrize("place", range(5))
+def test_every_cell_of_the_tables_of_the_eurocode(type_, place):
+    """Soil factor and periods, seen in the spectrum: its start, its corners and its end."""
+    soil, rise, falls, far = (float(row.split()[place]) for row in EUROCODE[type_].values())
+    spectrum = Eurocode8(ag=0.2, ground="ABCDE"[place], type=type_)
+    found = spectrum.horizontal([0.0, rise / 2.0, rise, falls, far, 4.0])
+    level = [0.4, 0.7, 1.0, 1.0, falls / far, falls * far / 16.0]
+    assert found == pytest.approx(0.5 * soil * np.array(level), rel=ROUND_OFF)
+
+
 @pytest.mark.parametrize(
     ("ag", "ground", "type_", "periods", "expected"),
     [

@@ -76,7 +76,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     tied = sparse.kron(tie, sparse.identity(2)).tocsr()
     broken = Forms(space, af.joints.Quadrature()).stiffness()
 
-    whole = _fenicsx.space(grid.grid, "CG", degree, 2)
+    whole = _fenicsx.space(grid.grid, "Lagrange", degree, 2)
     u, v = ufl.TrialFunction(whole), ufl.TestFunction(whole)
     form = ufl.inner(
         plane_stress(u, af.STONE.young, af.STONE.poisson), ufl.sym(ufl.grad(v))
