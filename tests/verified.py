@@ -1,4 +1,4 @@
-"""What tests verify, as rows of a table: `pytest --verified docs/verification.json`.
+"""What tests verify, as rows of a table: `pytest --verified=docs/verification.json`.
 
 A test that asks for the fixture `verified` tells it what was computed beside what is known apart
 from this package. With the option only those tests run, and what they told is written to the file,
