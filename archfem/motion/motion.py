@@ -45,8 +45,10 @@ class Motion:
     transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
-            raise InvalidInput(f"dt {self.dt!r} s: the time between samples is a positive number")
+        if not (isinstance(self.dt, Real) and 1e-6 <= self.dt < np.inf):
+            raise InvalidInput(
+                f"dt {self.dt!r} s: the time between samples is a positive number, at least 1e-6"
+            )
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)

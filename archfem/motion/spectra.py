@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.arguments import instance, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import oscillator
@@ -39,6 +39,7 @@ def response_spectrum(
         BSSA 59 (1969). Chopra, Dynamics of structures, section 6.6.
     """
     instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    unmasked(periods, "periods [s]")
     try:
         natural = np.asarray(periods, dtype=float)
     except (TypeError, ValueError) as error:

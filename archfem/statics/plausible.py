@@ -41,7 +41,8 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     if (steep := (ratio > most).values).any():
         found.append(
             f"under dead load |V| / N is {float(ratio.max()):.3g} in "
-            f"{listed_joints(names[steep])}, and joints slide from {most:g} on: they hold only because they never slide"
+            f"{listed_joints(names[steep])}, and joints slide from {most:g} on: they hold only "
+            "because they never slide"
         )
     slid = abs(joints["slip"])
     if (far := (slid > SLID).values).any():
