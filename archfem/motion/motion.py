@@ -46,9 +46,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         if not (isinstance(self.dt, Real) and 1e-6 <= self.dt < np.inf):
-            raise InvalidInput(
-                f"dt {self.dt!r} s: the time between samples is a positive number, at least 1e-6"
-            )
+            raise InvalidInput(f"dt {self.dt!r} s: the time between samples is at least 1e-6 s")
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
