@@ -5,19 +5,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
 from archfem.cases.inputs import inputs_digest
+from archfem.cases.kept import HISTORY, finished
+from archfem.cases.reportable import Reportable
+from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.dynamics.time_history import Record, time_history
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge
 from archfem.limit.collapse import Collapse
 from archfem.models.build import build
 from archfem.models.model import Model
@@ -27,14 +30,11 @@ from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.plausible import dead_load_doubts
 from archfem.statics.strength import strength_use
 
-HISTORY = "history.nc"
-"""Name of a history's file."""
+if TYPE_CHECKING:
+    from archfem.cases.dossier.results import Results
 
 FRAMES = 10
 """Steps between two fields that are kept for an animation, unless the case says otherwise."""
-
-SAME = 1e-6
-"""Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
 
 Shake = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 """Runs a motion of a case from its dead load, with damping, as `shaken` does."""
@@ -85,7 +85,7 @@ class Rest:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Reportable):
     """A case under one motion.
 
     Attributes:
@@ -105,6 +105,13 @@ class Run:
     kept: bool = False
     seconds: float = 0.0
     error: DidNotConverge | None = None
+
+    def results(self) -> "Results":
+        """Return what its report is written from."""
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+
+        folder = None if self.path is None else self.path.parent
+        return Results(self.case, {self.motion.name: self.history}, folder)
 
 
 Result = Collapse | Rest | Suite | Run
@@ -142,6 +149,7 @@ def carried_out(
             first step of a run could be made.
     """
     shake, folder = shake or shaken, None if folder is None else Path(folder)
+    (case if pairs is None else case.alone(*pairs)).check_ground()
     if case.limit is not None:
         yield case.limit.of(case.structure)
     rest = Rest.of(case)
@@ -256,51 +264,27 @@ def shaken(
     of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
     animated = FRAMES if output.get("animation", False) else None
     try:
-        run = time_history(
-            dead.model,
-            motion,
-            dt=case.analysis.get("dt"),
-            start=dead,
-            damping=damping or damping_of(case, dead)[0],
-            scheme=case.scheme,
-            record=Record(
-                every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-            ),
-            until=CountedMechanism() if case.analysis.get("halt", False) else None,
-            criteria=case.criteria,
-            method=method,
-        )
+        with told_of(case.title, motion.name):
+            run = time_history(
+                dead.model,
+                motion,
+                dt=case.analysis.get("dt"),
+                start=dead,
+                damping=damping or damping_of(case, dead)[0],
+                scheme=case.scheme,
+                record=Record(
+                    every=output.get("every", 1), fields_every=output.get("fields_every", animated)
+                ),
+                until=CountedMechanism() if case.analysis.get("halt", False) else None,
+                criteria=case.criteria,
+                method=method,
+            )
     except DidNotConverge as error:
         if error.history is not None:
             error.history.dataset.attrs |= of_case
         raise
     run.dataset.attrs |= of_case
     return run
-
-
-def finished(path: Path, case: Case, motion: Motion) -> History | None:
-    """Return what an earlier run left, where it ended by itself, of the same case and motion.
-
-    The files that the case reads, and archfem itself, must be those of then, to the letter.
-
-    Args:
-        path: file of the history.
-        case: to compare with the one in the file.
-        motion: to compare with the ground motion in the file.
-
-    Returns:
-        The history; None where there is none, or one that broke off, or of another case or motion.
-    """
-    try:
-        run = History.read(path, case.structure)
-        whole = run.ended.by_itself
-    except InvalidInput:
-        return None
-    told = run.dataset.attrs
-    if not whole or told.get("inputs") != inputs_digest(case.settings, case.folder):
-        return None
-    before, now = run.dataset["ground"].values, motion.at(run.time)
-    return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
 
 
 def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> Run:

@@ -30,10 +30,24 @@ LOOSE = 100.0
 """Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
 
 
+Rows = tuple[list[str], list[list[str]]]
+"""Titles of the columns of a table, and its rows."""
+
+
 def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
     """Return one line a joint: envelope, and when and how long it hinged, slid and was open.
 
     Only joints that are `judged` have a line.
+
+    Args:
+        joints: over time and joint.
+        dead: over joint, under dead load alone.
+    """
+    return aligned(*joint_rows(joints, dead))
+
+
+def joint_rows(joints: xr.Dataset, dead: xr.Dataset | None = None) -> Rows:
+    """Return the cells of `joint_table`.
 
     Args:
         joints: over time and joint.
@@ -59,11 +73,20 @@ def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
             start, longest = times[key][k]
             cells += [_seconds(start), _seconds(longest) if longest > 0.0 else "-"]
         rows.append(cells)
-    return aligned(head, rows)
+    return head, rows
 
 
 def pair_table(runs: Mapping[str, History]) -> str:
     """Return one line a run of a suite: its ground, the gravest joint, the mechanism, its end.
+
+    Args:
+        runs: what to call each run, and the run.
+    """
+    return aligned(*pair_rows(runs))
+
+
+def pair_rows(runs: Mapping[str, History]) -> Rows:
+    """Return the cells of `pair_table`.
 
     Args:
         runs: what to call each run, and the run.
@@ -97,7 +120,7 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 _end(run),
             ]
         )
-    return aligned(head, rows)
+    return head, rows
 
 
 def _end(run: History) -> str:
@@ -185,6 +208,15 @@ def motion_table(motions: Sequence[Motion]) -> str:
     Args:
         motions: each with a name.
     """
+    return aligned(*motion_rows(motions))
+
+
+def motion_rows(motions: Sequence[Motion]) -> Rows:
+    """Return the cells of `motion_table`.
+
+    Args:
+        motions: each with a name.
+    """
     head = ["motion", "component", "samples", "dt", "PGA", "PGV", "PGD", "Arias", "CAV"]
     head += ["Housner", "D5-95", "length"]
     rows = []
@@ -207,7 +239,7 @@ def motion_table(motions: Sequence[Motion]) -> str:
                     f"{found.duration:.2f} s",
                 ]
             )
-    return aligned(head, rows)
+    return head, rows
 
 
 def match_table(matches: Sequence[Match]) -> str:

@@ -2,21 +2,20 @@
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest, Result, Run, carried_out, expected_damping
+from archfem.commands.line import DOUBTFUL
 from archfem.dynamics.history import Ending, History
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.files import result_folder
 from archfem.joints.criteria import judged
 from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.strength import use_sentence
-
-DOUBTFUL = 3
-"""Exit code of a command whose answer is in doubt."""
 
 
 def check(given: argparse.Namespace) -> int:
@@ -34,6 +33,7 @@ def check(given: argparse.Namespace) -> int:
     print(case.title)
     if case.limit is not None:
         print(collapse_words(case.structure, case.limit.of(case.structure)))
+    case.check_ground()
     rest = Rest.of(case)
     _tell_rest(rest)
     if case.suite is not None:
@@ -51,17 +51,22 @@ def motion(given: argparse.Namespace) -> None:
 
     Args:
         given: `files`, the `column`, `units` and `dt` [s] of plain ones, and the folder `out`.
+
+    Raises:
+        InvalidInput: some files are no records; the others are told of before.
     """
     from archfem.cases.report import named_apart, write_motions
     from archfem.cases.summary import motion_table
 
-    options = {"column": given.column, "units": given.units, "dt": given.dt}
-    motions = named_apart(
-        [Motion.read(path, **options) for path in given.files],
-        [Path(path).name for path in given.files],
-    )
+    folder, options = result_folder(given.out), (given.column, given.units, given.dt)
+    read, refused = _records(given.files, *options)
+    motions = named_apart(list(read.values()), [Path(path).name for path in read])
     print(motion_table(motions))
-    _tell_written(write_motions(motions, Path(given.out)))
+    _tell_written(write_motions(motions, folder))
+    if refused:
+        raise InvalidInput(
+            f"{len(refused)} of {len(given.files)} files were refused, as said above"
+        )
 
 
 def accuracy(given: argparse.Namespace) -> None:
@@ -74,7 +79,7 @@ def accuracy(given: argparse.Namespace) -> None:
     from archfem.cases.summary import accuracy_words
     from archfem.dynamics.tradeoff import accuracy as compared
 
-    case = Case.read(given.case, given.changes)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     found = compared(
         case.structure,
         case.ground_motion(),
@@ -83,7 +88,7 @@ def accuracy(given: argparse.Namespace) -> None:
     )
     text = accuracy_words(found)
     print(text)
-    _tell_written(write_accuracy(found, text, Path(given.out)))
+    _tell_written(write_accuracy(found, text, folder))
 
 
 def compile_steps(given: argparse.Namespace) -> None:
@@ -120,14 +125,26 @@ def modes(given: argparse.Namespace) -> None:
     from archfem.cases.report import write_modes
     from archfem.statics.modes import modes as lowest
 
-    case = Case.read(given.case, given.changes)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     print(case.title)
     rest = Rest.of(case)
     _tell_rest(rest)
     found = lowest(rest.dead.model, given.count, about=rest.dead)
     text = f"{found.table()}\n\n{rest.damping[1]}"
     print(text)
-    _tell_written(write_modes(found, text, Path(given.out)))
+    _tell_written(write_modes(found, text, folder))
+
+
+def report(given: argparse.Namespace) -> None:
+    """Write one page of what a result folder holds.
+
+    Args:
+        given: `folder`, the page `out`, and `inputs`, the folder of the case's drawing, or None.
+    """
+    from archfem.cases.folders import opened
+
+    path = opened(given.folder, inputs=given.inputs).report(given.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -139,8 +156,7 @@ def run(given: argparse.Namespace) -> int:
     Returns:
         `DOUBTFUL` where a run has doubts, else 0.
     """
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
-    folder.mkdir(parents=True, exist_ok=True)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     print(case.title)
     if given.workers > 1 and case.suite is not None:
@@ -273,6 +289,23 @@ def _tell_motions(suite: Suite) -> None:
     from archfem.cases.summary import match_table, motion_table
 
     print(match_table(suite.matches) if suite.matches else motion_table(suite.motions))
+
+
+def _records(
+    files: Sequence[str], column: int | None, units: str | None, dt: float | None
+) -> tuple[dict[str, Motion], list[InvalidInput]]:
+    """Read records: the motions by file, and why others were refused, which is told."""
+    read, refused = {}, []
+    for path in files:
+        try:
+            read[path] = Motion.read(path, column=column, units=units, dt=dt)
+        except InvalidInput as error:
+            refused.append(error)
+            if len(files) > 1:
+                print(f"archfem: {error}", file=sys.stderr)
+    if not read:
+        raise refused[0]
+    return read, refused
 
 
 def _tell_written(files: Iterable[Path]) -> None:

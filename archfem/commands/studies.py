@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from archfem.errors import InvalidInput
+from archfem.files import result_folder
 from archfem.studies.progress import status
 
 
@@ -28,9 +29,9 @@ def study(given: argparse.Namespace) -> None:
     if given.own_code:  # find = "module:function" beside the file
         sys.path.insert(0, str(Path(given.case).resolve().parent))
     if "cases" in study_tables(Path(given.case)):
-        _compare(given, Path(given.out))
+        _compare(given, result_folder(given.out))
     else:
-        _go_over(given, Path(given.out))
+        _go_over(given, result_folder(given.out))
 
 
 def _compare(given: argparse.Namespace, folder: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, mechanism_lines
@@ -83,6 +84,7 @@ class History:
         """What makes a joint fail, and how many failed joints make a mechanism."""
         return Criteria.of(self.dataset)
 
+    @as_annotated
     def judged_by(self, criteria: Criteria) -> "History":
         """Return the same run, judged by other criteria.
 
@@ -205,6 +207,7 @@ class History:
             return self._first
         return self.judged_by(replace(self.criteria, duration=0.0))._first
 
+    @as_annotated
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.
 
@@ -231,6 +234,7 @@ class History:
         return Path(path)
 
     @classmethod
+    @as_annotated
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
         """Return what `save` wrote; an earlier version's file is judged by the usual criteria.
 

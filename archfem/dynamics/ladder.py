@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
+from archfem.arguments import instance, real
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
 from archfem.dynamics.schemes import Viscous
@@ -89,9 +90,10 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be cut as asked.
     """
-    if not 0.0 < tolerance < 1.0:
+    instance(structure, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
+    if not 0.0 < real(tolerance, "tolerance on |e| [-]") < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
-    if fidelity == "auto":
+    if isinstance(fidelity, str) and fidelity == "auto":
         return choose(structure, tolerance, motion, damping, dt, displacements=displacements)
     asked = Discretisation(fidelity, cells, cell, coarse, degree, quadrature, points, displacements)
     return plain.build(structure, asked)

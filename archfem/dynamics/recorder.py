@@ -203,7 +203,7 @@ class Recorder:
             dataset[name] = "time", values, words
         self._add_coordinates(dataset)
         dataset.attrs |= {
-            "title": f"time history of {structure.name} under {motion.name or 'motion'}",
+            "title": f"{structure.name}: {motion.name or 'time history'}",
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,

@@ -74,6 +74,10 @@ class StiffnessDamping:
         frequency: at which damping has the ratio [Hz].
         joints: what it acts on beside the blocks, as in `Rayleigh`; only with "closed", the
             default, do open joints stay free.
+
+    Example:
+        >>> round(af.StiffnessDamping(0.05, 8.0).stiffness, 6)
+        0.001989
     """
 
     ratio: float

@@ -95,6 +95,10 @@ class Contact:
         dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].
         tension: tensile strength f_t of the bond, up to c / μ, the apex of Coulomb's limit; 0 has
             no bond [Pa].
+
+    Example:
+        >>> af.Contact(1.48e9, 0.30e9, friction=0.6, cohesion=5e3).slides
+        True
     """
 
     normal_stiffness: float

@@ -7,12 +7,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.annotated import check_fields
 from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import Contact
 from archfem.masonry.naming import number_of
+from archfem.masonry.overlaps import check_apart, check_simple
 from archfem.masonry.roles import judged_parts, with_roles
 from archfem.units import G
 
@@ -42,6 +44,10 @@ class Joint:
     name: str
     part: str = ""
     role: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no joint."""
+        check_fields(self)
 
     @property
     def lower(self) -> int:
@@ -96,7 +102,8 @@ class Structure:
     name: str = "structure"
 
     def __post_init__(self) -> None:
-        """Fill in roles, and refuse what does not hang together."""
+        """Fill in roles, and refuse what does not hang together, or overlaps."""
+        check_fields(self)
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
         if not 1e-3 <= real(self.width, "width [m]") < 1e4:
@@ -114,6 +121,7 @@ class Structure:
             raise InvalidStructure("no block is free to move: leave at least one not fixed")
         _ = self.normals
         self._check_support()
+        self._check_outlines()
 
     @cached_property
     def size(self) -> float:
@@ -207,6 +215,14 @@ class Structure:
             raise InvalidStructure(
                 f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
             )
+
+    def _check_outlines(self) -> None:
+        """Bodies neither cross themselves nor reach into one another."""
+        outlines = [block.drawn() for block in self.blocks]
+        names = [block.name for block in self.blocks]
+        for outline, name in zip(outlines, names, strict=True):
+            check_simple(outline, name)
+        check_apart(outlines, names, fixed=[block.fixed for block in self.blocks])
 
     @cached_property
     def free(self) -> tuple[int, ...]:

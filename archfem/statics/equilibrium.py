@@ -122,6 +122,11 @@ def dead_load(
         InvalidInput: the model is none, or the stages do not build it.
         DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
             equilibrium found on the way, under part of the weight.
+
+    Example:
+        >>> model = af.build(af.column(breadth=0.6, heights=[1.2, 1.2]), fidelity="rigid")
+        >>> af.dead_load(model).joints["N"].values.round(3).tolist()
+        [28800.0, 14400.0]
     """
     check_model(model)
     if stages is None:

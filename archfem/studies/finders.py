@@ -7,6 +7,7 @@ import numpy as np
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest, shaken
+from archfem.cases.told import told_of
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.scales import mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
@@ -145,16 +146,17 @@ def of_scales(rest: Rest, motion: Motion, **options: Any) -> Found:
         KeyboardInterrupt: on Ctrl-C.
     """
     options["between"] = tuple(options.get("between", (0.05, 5.0)))
-    found = mechanism_scales(
-        rest.dead.model,
-        motion,
-        start=rest.dead,
-        damping=rest.damping[0],
-        dt=rest.case.analysis.get("dt"),
-        criteria=rest.case.criteria,
-        method=method_for(rest, motion),
-        **options,
-    )
+    with told_of(rest.case.title, motion.name):
+        found = mechanism_scales(
+            rest.dead.model,
+            motion,
+            start=rest.dead,
+            damping=rest.damping[0],
+            dt=rest.case.analysis.get("dt"),
+            criteria=rest.case.criteria,
+            method=method_for(rest, motion),
+            **options,
+        )
     if found.interrupted:
         raise KeyboardInterrupt
     brackets = {definition: found[definition] for definition in DEFINITIONS}

@@ -44,11 +44,9 @@ def _overlaps(model: Moving, q: Array) -> Array:
     structure, q = model.structure, np.ascontiguousarray(q, float)
     joints, poses = model.joints, np.zeros((len(structure.joints), 2, 3))
     share = joints.faces.depth / np.bincount(joints.whole, joints.faces.depth)[joints.whole]
-    own = np.empty(3)
     for piece, joint in enumerate(joints.whole):
         for side in range(2):
-            pose(joints.sides, piece, side, q, own)
-            poses[joint, side] += share[piece] * own
+            poses[joint, side] += share[piece] * np.array(pose(joints.sides, piece, side, q))
     mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
     along = turned(structure.tangents, mean[:, 2])
     slip = np.sum(along * apart[:, :2], axis=1)

@@ -29,7 +29,12 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     panels           that factor, dense block by dense block
     turning          the strategy for blocks that move as far as they like
     turning_newton   Newton's method for a step of theirs
-    band_lu          its elimination, with row exchanges
+    band_lu          its elimination in a band, with row exchanges
+    panel_lu         its elimination in dense panels, condensed onto what joints move
     elimination      the order in which its unknowns are eliminated
     sparse_rows      compiled products of matrices and vectors
 """
+
+from archfem import compiled
+
+compiled.prepare()

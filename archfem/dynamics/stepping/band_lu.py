@@ -7,9 +7,6 @@ the right. The matrix need not be symmetric.
 import numba
 import numpy as np
 
-SMALL = 1e-6
-"""Pivot, relative to the rest of its row, below which rows must be exchanged."""
-
 
 @numba.njit(cache=True)
 def eliminate(band, vector):  # type: ignore
@@ -61,51 +58,6 @@ def _exchange(band, vector, k, half):  # type: ignore
             band[pivot, half + j - k + shift] = upper
         vector[k], vector[pivot] = vector[pivot], vector[k]
     return pivot if largest > 0.0 else -1
-
-
-@numba.njit(cache=True)
-def factorised(band):  # type: ignore
-    """Split a matrix into triangles in place, without exchanges.
-
-    Args:
-        band: the matrix, then its factors (n, 3 b + 1).
-
-    Returns:
-        Whether no pivot has become small, by which exchanges would be needed.
-    """
-    size, half = band.shape[0], (band.shape[1] - 1) // 3
-    for k in range(size):
-        pivot, width = band[k, half], min(half, size - 1 - k)
-        if not abs(pivot) > SMALL * np.max(np.abs(band[k, half : 2 * half + 1])):
-            return False
-        upper = band[k, half + 1 : half + 1 + width]
-        for i in range(k + 1, k + width + 1):
-            place = half + k - i
-            factor = band[i, place] / pivot
-            if factor != 0.0:
-                band[i, place] = factor
-                lower = band[i, place + 1 : place + 1 + width]
-                for j in range(width):
-                    lower[j] -= factor * upper[j]
-    return True
-
-
-@numba.njit(cache=True)
-def solved(band, vector):  # type: ignore
-    """Solve a system in place by its factors.
-
-    Args:
-        band: as `factorised` leaves it (n, 3 b + 1).
-        vector: right side, then solution (n,).
-    """
-    size, half = len(vector), (band.shape[1] - 1) // 3
-    for k in range(size):
-        width = min(half, k)
-        vector[k] -= np.dot(band[k, half - width : half], vector[k - width : k])
-    for k in range(size - 1, -1, -1):
-        width = min(half, size - 1 - k)
-        later = np.dot(band[k, half + 1 : half + 1 + width], vector[k + 1 : k + 1 + width])
-        vector[k] = (vector[k] - later) / band[k, half]
 
 
 def banded(matrix, half: int):  # type: ignore

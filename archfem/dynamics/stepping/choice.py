@@ -16,6 +16,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from archfem.arguments import said
 from archfem.arrays import Array
 from archfem.dynamics.stepping.banded import WIDEST, Banded
 from archfem.dynamics.stepping.equation import Equation
@@ -81,8 +82,8 @@ def stepper_for(
     """
     if isinstance(method, Stepper):
         return method
-    if method not in METHODS:
-        raise InvalidInput(f"method '{method}' is not known: use one of {METHODS}")
+    if not isinstance(method, str) or method not in METHODS:
+        raise InvalidInput(f"method {said(method)} is not known: use one of {METHODS}")
     strategy = None
     if method == "auto":
         strategy = chosen(equation, start, dt)

@@ -19,8 +19,10 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.band_lu import banded, half_width
+from archfem.dynamics.stepping.elimination import Elimination, Indices
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import begin, measure, settle
+from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
 from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
 from archfem.dynamics.stepping.strategy import Reordered
 from archfem.dynamics.stepping.turning_newton import sought
@@ -39,10 +41,10 @@ WHOLE = (3, 0)
 none does."""
 
 WIDE = 40
-"""Half-width of the band from which factors are kept while they serve."""
+"""Half-width of a band from which a sparse factor takes its place, and is kept while it serves."""
 
 COARSER = 10.0
-"""Of `ENOUGH`, where the band is wide: there passes by kept factors round to about as much."""
+"""Of `ENOUGH`, where factors are kept: passes by them round to about as much."""
 
 SETUP = 0.05
 """Estimate of the time until the first step can be taken [s]."""
@@ -59,12 +61,12 @@ class TurningSystem(NamedTuple):
         blocks: K, of the blocks alone.
         viscous: C.
         effective: 2 M/Δt² + C/Δt + (½ + β/Δt) K.
-        band: the same as a band (n, 3 b + 1).
+        band: the same as a band (n, 3 b + 1), without rows where that is wide.
+        panels: the same in panels then, to which joints add.
         weight: forces of gravity (n,).
         body: forces per unit ground acceleration (2, n).
         step: Δt, and β/Δt.
         enough: force left out of balance that ends the passes [N], and correction [m].
-        wide: whether factors are kept.
     """
 
     turning: Moved
@@ -75,11 +77,11 @@ class TurningSystem(NamedTuple):
     viscous: Rows
     effective: Rows
     band: Array
+    panels: Panels
     weight: Array
     body: Array
     step: tuple[float, float]
     enough: tuple[float, float]
-    wide: bool
 
 
 class Turning(Reordered):
@@ -96,7 +98,11 @@ class Turning(Reordered):
         assert isinstance(model, Moving)
         self._equation: Equation = equation
         self._model: Moving = model
-        super().__init__(_narrow(model))
+        order, self._elimination = _narrow(model), None
+        if half_width(model.closed()[order][:, order]) >= WIDE:
+            self._elimination = Elimination.of(model.closed())
+            order = self._elimination.order
+        super().__init__(order)
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
@@ -121,27 +127,31 @@ class Turning(Reordered):
         """
         equation, model, order = self._equation, self._model, self.order
         late = equation.lag / dt
-        mass, blocks, viscous, closed = (
-            each[order][:, order].tocsr()
-            for each in (model.mass, model.blocks, equation.viscous, model.closed())
+        mass, blocks, viscous = (
+            each[order][:, order].tocsr() for each in (model.mass, model.blocks, equation.viscous)
         )
-        effective = (2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks
-        room, half = answer(model.joints), half_width(closed)
-        balance = ENOUGH * (COARSER if half >= WIDE else 1.0)
+        effective = ((2.0 / dt**2) * mass + viscous / dt + (0.5 + late) * blocks).tocsr()
+        room, sides = answer(model.joints), self._sides()
+        band, panels = np.zeros((0, 1)), NO_PANELS
+        if self._elimination is None:
+            band = banded(effective, half_width(model.closed()[order][:, order]))
+        else:
+            panels = panels_of(effective, self._elimination, _rates(sides))
+        balance = ENOUGH * (COARSER if self._elimination else 1.0)
         return TurningSystem(
-            model.joints._replace(sides=self._sides()),
+            model.joints._replace(sides=sides),
             room,
             np.zeros_like(room.slid),
             rows_of(mass),
             rows_of(blocks),
             rows_of(viscous),
-            rows_of(effective.tocsr()),
-            banded(effective, half),
+            rows_of(effective),
+            band,
+            panels,
             equation.weight[order],
             np.ascontiguousarray(model.body[order].T),
             (dt, late),
             (balance * float(np.linalg.norm(equation.weight)), ROUNDED * model.structure.size),
-            half >= WIDE,
         )
 
     def _sides(self) -> Sides:
@@ -163,6 +173,15 @@ def _narrow(model: Moving) -> Any:
     return np.concatenate([np.arange(*model.starts[k : k + 2]) for k in blocks])
 
 
+def _rates(sides: Sides) -> Indices:
+    """Rows and columns of `Answer.rate`, negative where there is none (k, 2)."""
+    own = np.where(np.arange(sides.index.shape[-1]) < sides.size[:, :, None], sides.index, -1)
+    rows, columns = np.broadcast_arrays(own[:, :, :, None, None], own[:, None, None])
+    pairs = np.stack([rows.ravel(), columns.ravel()], axis=-1)
+    pairs[pairs.min(axis=1) < 0] = -1
+    return pairs
+
+
 class Turned(NamedTuple):
     """What is carried from step to step.
 
@@ -173,7 +192,8 @@ class Turned(NamedTuple):
         constant: what of the forces does not depend on the end of the step (n,).
         move: Δq (n,).
         along: the correction (n,).
-        known: whether the band holds factors, of a pass before (1,).
+        entries: of the factor in panels.
+        known: whether they are of a pass before (1,).
     """
 
     band: Array
@@ -182,6 +202,7 @@ class Turned(NamedTuple):
     constant: Array
     move: Array
     along: Array
+    entries: Array
     known: Any
 
 
@@ -215,6 +236,7 @@ def _started(system, state, memory):  # type: ignore
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),
+        np.empty_like(system.panels.base),
         np.zeros(1, dtype=np.bool_),
     )
 

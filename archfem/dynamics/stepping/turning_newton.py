@@ -1,13 +1,14 @@
 """Newton's method for a step of blocks that turn, compiled: passes, and how far each of them goes.
 
-A pass that leaves more out of balance than there was is shortened. Where the band is wide, factors
-are kept from pass to pass while they serve.
+A pass that leaves more out of balance than there was is shortened. Where the factor is sparse it is
+kept from pass to pass while it serves.
 """
 
 import numba
 import numpy as np
 
-from archfem.dynamics.stepping.band_lu import eliminate, factorised, solved
+from archfem.dynamics.stepping.band_lu import eliminate
+from archfem.dynamics.stepping.panel_lu import back, renewed
 from archfem.dynamics.stepping.sparse_rows import times
 from archfem.joints.moving.moved import pass_joints
 
@@ -61,18 +62,15 @@ def sought(system, kept, before, after, whole):  # type: ignore
 
 @numba.njit(cache=True)
 def _corrected(system, kept, serve):  # type: ignore
-    """Find the correction, by factors that serve if there are; whether there is one."""
-    if serve and kept.known[0]:
-        solved(kept.band, kept.rest)
-        return True
-    _assemble(system, kept)
-    if system.wide:
-        kept.known[0] = factorised(kept.band)
-        if kept.known[0]:
-            solved(kept.band, kept.rest)
-            return True
+    """Find the correction, by a factor that serves if there is one; whether there is one."""
+    if len(system.band) > 0:
         _assemble(system, kept)
-    return eliminate(kept.band, kept.rest)
+        return eliminate(kept.band, kept.rest)
+    if not (serve and kept.known[0]):
+        kept.known[0] = renewed(system.panels, system.room.rate.reshape(-1), kept.entries)
+    if kept.known[0]:
+        back(system.panels, kept.entries, kept.rest, kept.image)
+    return kept.known[0]
 
 
 @numba.njit(cache=True)

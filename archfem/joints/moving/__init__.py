@@ -9,3 +9,7 @@
 
 Start reading at `moved`.
 """
+
+from archfem import compiled
+
+compiled.prepare()

@@ -27,7 +27,7 @@ SMALL = 0.25
 of sin x / x below 1e-14 of it."""
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def small_turn(x):  # type: ignore
     """Return cos x, sin x / x and the derivative of the latter.
 
@@ -45,7 +45,7 @@ def small_turn(x):  # type: ignore
     return c, s, x * (-1 / 3 + y * (1 / 30 + y * (-1 / 840 + y * (1 / 45360 - y * (1 / 3991680)))))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def both(x):  # type: ignore
     """Return cos x and sin x.
 
@@ -56,7 +56,7 @@ def both(x):  # type: ignore
     return c, x * s
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def added(c, s, more_c, more_s):  # type: ignore
     """Return cosine and sine of the sum of two angles.
 
@@ -69,94 +69,122 @@ def added(c, s, more_c, more_s):  # type: ignore
     return c * more_c - s * more_s, s * more_c + c * more_s
 
 
-@numba.njit(cache=True)
-def measures(lower, higher, angle, found):  # type: ignore
-    """Find opening, slip and turn of a joint.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def measures(lower, higher, angle):  # type: ignore
+    """Return opening, slip and turn of a joint [m, m, -].
 
     Args:
-        lower: pose of the face of the lower block (3,) [m, m, rad].
-        higher: pose of the face of the higher block (3,) [m, m, rad].
+        lower: pose of the face of the lower block [m, m, rad].
+        higher: pose of the face of the higher block [m, m, rad].
         angle: direction of the joint's normal before anything moved [rad].
-        found: g, s and σ, filled (3,) [m, m, -].
     """
     direction = angle + 0.5 * (lower[2] + higher[2])
     c, s = np.cos(direction), np.sin(direction)
     x, y = higher[0] - lower[0], higher[1] - lower[1]
-    found[0], found[1] = c * x + s * y, c * y - s * x
-    found[2] = 2.0 * np.sin(0.5 * (higher[2] - lower[2]))
+    return c * x + s * y, c * y - s * x, 2.0 * np.sin(0.5 * (higher[2] - lower[2]))
 
 
-@numba.njit(cache=True)
-def follow(before, after, angle, ends, rates, now):  # type: ignore
-    """Find the measures at both ends of a step, and their derivatives.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def follow(lower, higher, angle):  # type: ignore
+    """Return the measures at both ends of a step, and their derivatives.
+
+    A derivative is told by its entries c, s, a, b and t: its rows are (c, s, a, a), (-s, c, -b, -b)
+    and (0, 0, -t, t).
 
     Args:
-        before: poses of both faces at the start (2, 3) [m, m, rad].
-        after: poses at the end (2, 3) [m, m, rad].
+        lower: poses of the face of the lower block at the start and at the end [m, m, rad].
+        higher: poses of the face of the higher block [m, m, rad].
         angle: direction of the joint's normal before anything moved [rad].
-        ends: opening, slip and turn at the start and at the end, filled (2, 3 or more).
-        rates: D, which takes the change of the poses to that of the measures, filled (3, 4).
-        now: derivative at the end, filled (3, 4).
 
     Returns:
-        What `bend` needs to know of the step.
+        Opening, slip and turn at the start and at the end; D, which takes the change of the poses
+        to theirs; the derivative at the end; and what `curved` needs to know of the step.
     """
-    first = angle + 0.5 * (before[0, 2] + before[1, 2])
-    turns = after[0, 2] - before[0, 2], after[1, 2] - before[1, 2]
-    half, quarter = 0.25 * (turns[0] + turns[1]), 0.25 * (turns[1] - turns[0])
+    ((xa, ya, a0), (xc, yc, a1)), ((xb, yb, b0), (xd, yd, b1)) = lower, higher
+    half, quarter = 0.25 * ((a1 - a0) + (b1 - b0)), 0.25 * ((b1 - b0) - (a1 - a0))
     mean, shrunk, falls = small_turn(half)
+    first = angle + 0.5 * (a0 + b0)
     c0, s0 = np.cos(first), np.sin(first)
     c, s = added(c0, s0, mean, half * shrunk)
     c1, s1 = added(c, s, mean, half * shrunk)
-    x0, y0 = before[1, 0] - before[0, 0], before[1, 1] - before[0, 1]
-    x1, y1 = after[1, 0] - after[0, 0], after[1, 1] - after[0, 1]
-    ends[0, 0], ends[0, 1] = c0 * x0 + s0 * y0, c0 * y0 - s0 * x0
-    ends[1, 0], ends[1, 1] = c1 * x1 + s1 * y1, c1 * y1 - s1 * x1
-    start = 0.5 * (before[1, 2] - before[0, 2])
+    x0, y0, x1, y1 = xb - xa, yb - ya, xd - xc, yd - yc
     near, less, drops = small_turn(quarter)
-    cosine, sine = both(start)
-    ends[0, 2] = 2.0 * sine
+    cosine, sine = both(0.5 * (b0 - a0))
+    start = c0 * x0 + s0 * y0, c0 * y0 - s0 * x0, 2.0 * sine
     cosine, sine = added(cosine, sine, near, quarter * less)
     last = added(cosine, sine, near, quarter * less)
-    ends[1, 2] = 2.0 * last[1]
+    end = c1 * x1 + s1 * y1, c1 * y1 - s1 * x1, 2.0 * last[1]
     x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-    across, along = 0.5 * shrunk * (c * x + s * y), 0.5 * shrunk * (c * y - s * x)
-    _fill(rates, (mean * c, mean * s), (along, across), less * cosine)
-    _fill(now, (c1, s1), (0.5 * ends[1, 1], 0.5 * ends[1, 0]), last[0])
+    along, across = 0.5 * shrunk * (c * y - s * x), 0.5 * shrunk * (c * x + s * y)
+    rates = mean * c, mean * s, along, across, less * cosine
+    now = c1, s1, 0.5 * end[1], 0.5 * end[0], last[0]
     by_turn = 0.25 * (drops * cosine - less * sine)
-    return (c, s), (c1, s1), (x, y), (shrunk, falls), by_turn
+    return start, end, rates, now, ((c, s), (c1, s1), (x, y), (shrunk, falls), by_turn)
 
 
-@numba.njit(cache=True)
-def _fill(rates, normal, arms, turn):  # type: ignore
-    """Write down a derivative."""
-    (c, s), (along, across) = normal, arms
-    rates[0, 0], rates[0, 1], rates[0, 2], rates[0, 3] = c, s, along, along
-    rates[1, 0], rates[1, 1], rates[1, 2], rates[1, 3] = -s, c, -across, -across
-    rates[2, 0], rates[2, 1], rates[2, 2], rates[2, 3] = 0.0, 0.0, -turn, turn
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def pushed(rates, force):  # type: ignore
+    """Return Dᵀ f: the force on the jump, and the moments on both faces [N, N, N m, N m].
+
+    Args:
+        rates: D, as `follow` returns it.
+        force: f, on opening, slip and turn [N, N, N m].
+    """
+    c, s, a, b, t = rates
+    middle, apart = a * force[0] - b * force[1], t * force[2]
+    x, y = c * force[0] - s * force[1], s * force[0] + c * force[1]
+    return x, y, middle - apart, middle + apart
 
 
-@numba.njit(cache=True)
-def bend(step, force, rates):  # type: ignore
-    """Add the derivative of Dᵀ f by the jump and the angles at the end, with f held.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def seen(now, row):  # type: ignore
+    """Return a row times a derivative: by the jump's x and y, and by the faces' angles.
+
+    Args:
+        now: the derivative, as `follow` returns it.
+        row: by opening, slip and turn.
+    """
+    c, s, a, b, t = now
+    middle, apart = a * row[0] - b * row[1], t * row[2]
+    return c * row[0] - s * row[1], s * row[0] + c * row[1], middle - apart, middle + apart
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def curved(step, rates, now, force, law):  # type: ignore
+    """Return the derivative of Dᵀ f by the jump and the angles at the end, row by row.
 
     Args:
         step: as `follow` returned it.
-        force: f, on opening, slip and turn (3 or more,) [N, N, N m].
-        rates: added to (4, 4).
+        rates: D.
+        now: the derivative of the measures at the end.
+        force: f, on opening, slip and turn [N, N, N m].
+        law: its derivatives by opening, slip and turn at the end, row by row.
     """
     (c, s), (c1, s1), (x, y), (shrunk, falls), by_turn = step
     f, g = force[0], force[1]
     ax, ay = -f * s - g * c, f * c - g * s  # f_g t_m - f_s n_m
     by_angle = 0.125 * (falls * (ax * x + ay * y) + shrunk * (ax * y - ay * x))
     by_turn *= force[2]
-    pull = (-0.25 * (f * s1 + g * c1), 0.25 * (f * c1 - g * s1))
-    place = (0.25 * shrunk * ax, 0.25 * shrunk * ay)
-    for axis in range(2):
-        for side in range(2, 4):
-            rates[axis, side] += pull[axis]
-            rates[side, axis] += place[axis]
-    rates[2, 2] += by_angle + by_turn
-    rates[3, 3] += by_angle + by_turn
-    rates[2, 3] += by_angle - by_turn
-    rates[3, 2] += by_angle - by_turn
+    same, other = by_angle + by_turn, by_angle - by_turn
+    px, py = -0.25 * (f * s1 + g * c1), 0.25 * (f * c1 - g * s1)
+    qx, qy = 0.25 * shrunk * ax, 0.25 * shrunk * ay
+    first, second, third = seen(now, law[0]), seen(now, law[1]), seen(now, law[2])
+    c, s, a, b, t = rates
+    middle = _mixed(a, first, -b, second, (qx, qy, 0.0, 0.0))
+    return (
+        _mixed(c, first, -s, second, (0.0, 0.0, px, px)),
+        _mixed(s, first, c, second, (0.0, 0.0, py, py)),
+        _mixed(1.0, middle, -t, third, (0.0, 0.0, same, other)),
+        _mixed(1.0, middle, t, third, (0.0, 0.0, other, same)),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _mixed(a, first, b, second, more):  # type: ignore
+    """Return a sum of three rows, of which two have factors."""
+    return (
+        a * first[0] + b * second[0] + more[0],
+        a * first[1] + b * second[1] + more[1],
+        a * first[2] + b * second[2] + more[2],
+        a * first[3] + b * second[3] + more[3],
+    )

@@ -11,10 +11,10 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.joints.moving.frames import bend, follow, measures
-from archfem.joints.moving.overlap import Faces, lap, press_faces, stored
-from archfem.joints.moving.poses import Sides, pose, stretched, swing, swing_bend
-from archfem.joints.moving.rubbing import limit_faces, rub_faces
+from archfem.joints.moving.carrying import carry
+from archfem.joints.moving.frames import curved, follow, measures, pushed, seen
+from archfem.joints.moving.overlap import Faces, lap, stored
+from archfem.joints.moving.poses import Sides, gather, pose, shape, stretched, swing, swing_bend
 
 
 class Moved(NamedTuple):
@@ -76,23 +76,20 @@ def answer(joints: Moved) -> Answer:
     )
 
 
-@numba.njit(cache=True)
-def find_measures(joints, joint, q, found):  # type: ignore
-    """Find opening, slip and turn of a joint, positive to the left of its normal.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def find_measures(joints, joint, q):  # type: ignore
+    """Return opening, slip and turn of a joint, positive to the left of its normal [m, m, -].
 
     Args:
         joints: `Moved`.
         joint: its number.
         q: coordinates (n,).
-        found: filled (3,) [m, m, -].
     """
-    poses = np.empty((2, 3))
-    for side in range(2):
-        pose(joints.sides, joint, side, q, poses[side])
-    measures(poses[0], poses[1], joints.angle[joint], found)
+    lower, higher = pose(joints.sides, joint, 0, q), pose(joints.sides, joint, 1, q)
+    return measures(lower, higher, joints.angle[joint])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def all_measures(joints, q):  # type: ignore
     """Return opening, slip and turn of the joints of the structure (n_joints, 3) [m, m, -].
 
@@ -103,10 +100,10 @@ def all_measures(joints, q):  # type: ignore
         joints: `Moved`.
         q: coordinates (n,).
     """
-    found, own, depths = np.zeros((joints.wholes, 3)), np.empty(3), joints.faces.depth
+    found, depths = np.zeros((joints.wholes, 3)), joints.faces.depth
     sums = np.zeros((joints.wholes, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
     for joint in range(len(joints.angle)):
-        find_measures(joints, joint, q, own)
+        own = find_measures(joints, joint, q)
         whole, depth, place = joints.whole[joint], depths[joint], joints.aside[joint]
         spread = 0.25 * depth**3
         found[whole, 0] += depth * own[0]
@@ -126,7 +123,7 @@ def all_measures(joints, q):  # type: ignore
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def paired_slips(joints, q):  # type: ignore
     """Return how far pieces have slid whose places stay opposite, over their length (j,) [-].
 
@@ -134,15 +131,14 @@ def paired_slips(joints, q):  # type: ignore
         joints: `Moved`.
         q: coordinates (n,).
     """
-    found, own, faces = np.zeros(len(joints.angle)), np.empty(3), joints.faces
+    found, faces = np.zeros(len(joints.angle)), joints.faces
     for joint in range(len(found)):
         if faces.paired[joint]:
-            find_measures(joints, joint, q, own)
-            found[joint] = abs(own[1]) / faces.depth[joint]
+            found[joint] = abs(find_measures(joints, joint, q)[1]) / faces.depth[joint]
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def joint_energy(joints, q, slid):  # type: ignore
     """Return the energy stored in all joints [J].
 
@@ -151,9 +147,9 @@ def joint_energy(joints, q, slid):  # type: ignore
         q: coordinates (n,).
         slid: how far each point has slid for good (p,) [m].
     """
-    found, total, faces = np.empty(3), 0.0, joints.faces
+    total, faces = 0.0, joints.faces
     for joint in range(len(joints.angle)):
-        find_measures(joints, joint, q, found)
+        found = find_measures(joints, joint, q)
         longer = stretched(joints.sides, joint, q)
         length = lap(faces, joint, found[1])[0]
         phi = stored(faces, joint, length, found[0], found[2])[0]
@@ -164,7 +160,7 @@ def joint_energy(joints, q, slid):  # type: ignore
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def pass_joints(joints, before, after, late, slid, found):  # type: ignore
     """Find what joints do over a step.
 
@@ -176,115 +172,90 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
-    sides, size = joints.sides, found.force.shape[2]
-    poses, moves, ends = np.empty((2, 2, 3)), np.empty((2, 2, 3, size)), np.empty((2, 4))
-    by_faces, curved, pushed = np.empty((2, 3, 4)), np.empty((4, 4)), np.empty((2, 3))
-    force, rate, normals = np.empty(4), np.empty((4, 4)), np.empty((len(slid), 4))
+    sides, faces = joints.sides, joints.faces
     stretches = sides.stretch.shape[2] > 0
-    longer = np.empty((2, 2, size if stretches else 0))
+    longer = np.empty((2, 2, sides.stretch.shape[2]))
     found.resultants[:] = 0.0
     for joint in range(len(joints.angle)):
-        swings = (
-            swing(sides, joint, 0, before, after, poses, moves),
-            swing(sides, joint, 1, before, after, poses, moves),
+        first, swings, ways = swing(sides, joint, 0, before, after)
+        second, others, more = swing(sides, joint, 1, before, after)
+        start, end, rates, now, step = follow(first, second, joints.angle[joint])
+        stretch = stretched(sides, joint, before), stretched(sides, joint, after)
+        force, law, lengthens, shear, lost = carry(
+            faces, joint, (start, end, stretch), late, slid, found.slid
         )
-        step = follow(poses[0], poses[1], joints.angle[joint], ends, by_faces[0], by_faces[1])
-        ends[0, 3], ends[1, 3] = stretched(sides, joint, before), stretched(sides, joint, after)
-        lagging = press_faces(joints.faces, joint, ends, late, force, rate, normals)
-        limit_faces(joints.faces, joint, ends, late, normals)
-        shear, rubbing = rub_faces(
-            joints.faces, joint, ends, late, normals, slid, (force, rate, found.slid)
-        )
-        found.lost[joint] = lagging + rubbing
+        found.lost[joint] = lost
         whole, hand = joints.whole[joint], joints.hand[joint]
         found.resultants[whole, 0] -= force[0]
         found.resultants[whole, 1] += hand * shear
         found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
-        _between(by_faces, rate, curved)
-        bend(step, force, curved)
-        for side in range(2):
-            _push(by_faces, force, side, pushed)
-            count = sides.size[joint, side]
-            _gather(joint, side, count, moves, pushed, found.force)
-            for other in range(2):
-                counts = count, sides.size[joint, other]
-                _spread((joint, side, other), counts, moves, curved, found.rate)
-            if sides.turns[joint, side]:
-                swing_bend(sides, joint, side, swings[side], pushed, found.rate)
+        x, y, low, high = pushed(rates, force)
+        lower, higher = (-x, -y, low), (x, y, high)
+        gather(sides, joint, 0, ways[0], lower, found.force[joint, 0])
+        gather(sides, joint, 1, more[0], higher, found.force[joint, 1])
+        _spread(sides, joint, (ways, more), curved(step, rates, now, force, law), found.rate)
+        if sides.turns[joint, 0]:
+            swing_bend(sides, joint, 0, swings, lower, found.rate)
+        if sides.turns[joint, 1]:
+            swing_bend(sides, joint, 1, others, higher, found.rate)
         if stretches:
-            _stretch(sides, joint, (force, rate), by_faces, moves, longer, found)
+            by_all, of_all = seen(now, law[3]), pushed(rates, (0.0, lengthens[0], 0.0))
+            _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), longer)
+            _stretch(sides, joint, (force[3], lengthens[1]), longer, found)
 
 
-@numba.njit(cache=True)
-def _between(by_faces, rate, found):  # type: ignore
-    """Dᵀ rate B, of all that faces can do to the joint (4, 4)."""
-    for column in range(4):
-        for row in range(4):
-            found[row, column] = 0.0
-        for k in range(3):
-            value = 0.0
-            for j in range(3):
-                value += rate[k, j] * by_faces[1, j, column]
-            for row in range(4):
-                found[row, column] += by_faces[0, k, row] * value
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _spread(sides, joint, ways, curved, rate):  # type: ignore
+    """Write down the derivative of the forces on both blocks by the coordinates of both."""
+    (xx, xy, xa, xb), (yx, yy, ya, yb), (ax, ay, aa, ab), (bx, by, ba, bb) = curved
+    (low, lower), (high, higher) = ways
+    _columns(
+        sides, joint, (0, 0), (low, lower), ((xx, xy, -xa), (yx, yy, -ya), (-ax, -ay, aa)), rate
+    )
+    _columns(
+        sides, joint, (1, 0), (high, lower), ((-xx, -xy, xa), (-yx, -yy, ya), (-bx, -by, ba)), rate
+    )
+    _columns(
+        sides, joint, (0, 1), (low, higher), ((-xx, -xy, -xb), (-yx, -yy, -yb), (ax, ay, ab)), rate
+    )
+    _columns(sides, joint, (1, 1), (high, higher), ((xx, xy, xb), (yx, yy, yb), (bx, by, bb)), rate)
 
 
-@numba.njit(cache=True)
-def _push(by_faces, force, side, found):  # type: ignore
-    """Forces on the pose of a face."""
-    sign, turn = 2.0 * side - 1.0, 0.0
-    for row in range(3):
-        turn += by_faces[0, row, 2 + side] * force[row]
-    found[side, 0] = sign * (by_faces[0, 0, 0] * force[0] + by_faces[0, 1, 0] * force[1])
-    found[side, 1] = sign * (by_faces[0, 0, 1] * force[0] + by_faces[0, 1, 1] * force[1])
-    found[side, 2] = turn
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _columns(sides, joint, where, ways, curved, rate):  # type: ignore
+    """Write down the derivative of the forces on a block by the coordinates of one."""
+    (side, other), (way, now), first = where, ways, 0
+    (a, b, c), (d, e, f), (g, h, i) = curved
+    if sides.turns[joint, other]:
+        first, (x, y) = 3, now[2]
+        gather(sides, joint, side, way, (a, d, g), rate[joint, side, :, other, 0])
+        gather(sides, joint, side, way, (b, e, h), rate[joint, side, :, other, 1])
+        third = a * x + b * y + c, d * x + e * y + f, g * x + h * y + i
+        gather(sides, joint, side, way, third, rate[joint, side, :, other, 2])
+    for k in range(first, sides.size[joint, other]):
+        x, y, z = shape(sides, joint, other, k, now)
+        push = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+        gather(sides, joint, side, way, push, rate[joint, side, :, other, k])
 
 
-@numba.njit(cache=True)
-def _gather(joint, side, count, moves, pushed, found):  # type: ignore
-    """Forces on the coordinates of a block."""
-    x, y, turn = pushed[side, 0], pushed[side, 1], pushed[side, 2]
-    for k in range(count):
-        value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
-        found[joint, side, k] = value + moves[0, side, 2, k] * turn
+@numba.njit(cache=True, error_model="numpy")
+def _pulls(sides, joint, ways, rows, longer):  # type: ignore
+    """Find how the stretch changes with all coordinates, and all forces with the stretch."""
+    for end in range(2):
+        x, y, low, high = rows[end]
+        gather(sides, joint, 0, ways[end][0], (-x, -y, low), longer[end, 0])
+        gather(sides, joint, 1, ways[end][1], (x, y, high), longer[end, 1])
 
 
-@numba.njit(cache=True)
-def _spread(where, counts, moves, curved, found):  # type: ignore
-    """Derivative of the forces on a block by the coordinates of one."""
-    joint, side, other = where
-    toward, against, row, last = 2.0 * side - 1.0, 2.0 * other - 1.0, 2 + side, 2 + other
-    for column in range(counts[1]):
-        a, b = against * moves[1, other, 0, column], against * moves[1, other, 1, column]
-        c = moves[1, other, 2, column]
-        x = toward * (curved[0, 0] * a + curved[0, 1] * b + curved[0, last] * c)
-        y = toward * (curved[1, 0] * a + curved[1, 1] * b + curved[1, last] * c)
-        turn = curved[row, 0] * a + curved[row, 1] * b + curved[row, last] * c
-        for k in range(counts[0]):
-            value = moves[0, side, 0, k] * x + moves[0, side, 1, k] * y
-            found[joint, side, k, other, column] = value + moves[0, side, 2, k] * turn
-
-
-@numba.njit(cache=True)
-def _stretch(sides, joint, law, by_faces, moves, longer, found):  # type: ignore
+@numba.njit(cache=True, error_model="numpy")
+def _stretch(sides, joint, law, longer, found):  # type: ignore
     """Add what the stretch of the faces does: its force, and how all forces change with it."""
-    force, rate = law
-    for side, sign in ((0, -1.0), (1, 1.0)):  # of the stretch by all, of all by the stretch
-        for k in range(sides.size[joint, side]):
-            longer[0, side, k] = longer[1, side, k] = 0.0
-            for end in range(2):
-                x, y, turn = moves[end, side, 0, k], moves[end, side, 1, k], moves[end, side, 2, k]
-                for row in range(3):
-                    value = sign * (by_faces[end, row, 0] * x + by_faces[end, row, 1] * y)
-                    value += by_faces[end, row, 2 + side] * turn
-                    factor = rate[3, row] if end else rate[row, 3]
-                    longer[1 - end, side, k] += factor * value
     for side, sign in ((0, -1.0), (1, 1.0)):
         for k in range(sides.size[joint, side]):
             pulled = sign * sides.stretch[joint, side, k]
-            found.force[joint, side, k] += force[3] * pulled
+            found.force[joint, side, k] += law[0] * pulled
             for other, against in ((0, -1.0), (1, 1.0)):
                 for m in range(sides.size[joint, other]):
                     more = against * sides.stretch[joint, other, m]
-                    value = pulled * (longer[0, other, m] + rate[3, 3] * more)
+                    value = pulled * (longer[0, other, m] + law[1] * more)
                     found.rate[joint, side, k, other, m] += value + longer[1, side, k] * more

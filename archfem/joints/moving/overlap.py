@@ -9,7 +9,7 @@ over a step are those whose work is the change of that:
     F_s = k_n w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i f̄_i) + Σ τ̄_i,
 
 f̄_i the means of ∫φ_i <gap>₋ dx, or of W_i <gap>₋, while the gap goes straight, bars means of both
-ends; `rubbing` gives the shear τ̄.
+ends; `rubbing` gives the shear τ̄, and `carrying` puts all together.
 """
 
 from typing import Any, NamedTuple
@@ -50,7 +50,7 @@ class Faces(NamedTuple):
     paired: Any
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def overlap(depth, slip):  # type: ignore
     """Return the length on which the faces overlap, and its derivative by the slip.
 
@@ -64,7 +64,7 @@ def overlap(depth, slip):  # type: ignore
     return length, -np.sign(slip)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def lap(faces, joint, slip):  # type: ignore
     """Return the length on which the law of a joint acts, and its derivative by the slip.
 
@@ -78,7 +78,7 @@ def lap(faces, joint, slip):  # type: ignore
     return overlap(faces.depth[joint], slip)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def stored(faces, joint, length, opening, turn):  # type: ignore
     """Return Φ, half the mean square of the closing over the overlap, and its derivatives.
 
@@ -117,115 +117,45 @@ def stored(faces, joint, length, opening, turn):  # type: ignore
     return 0.5 * (first * whole + step * tilted), whole, tilted - 0.5 * whole
 
 
-@numba.njit(cache=True)
-def press_faces(faces, joint, ends, late, force, rate, normals):  # type: ignore
-    """Find the mean force of the gaps over a step, and its derivative by the measures at the end.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def carried(ends, late, facet):  # type: ignore
+    """Return means of ∫φ_i <gap>₋ over a step on a facet of unit length, or of <gap>₋.
 
     Args:
-        faces: `Faces`.
-        joint: its number.
-        ends: measures at the start and at the end of the step (2, 4).
-        late: lag of damping over the length of the step [-].
-        force: on opening, slip, turn and stretch, filled (4,) [N, N, N m, N].
-        rate: filled (4, 4).
-        normals: of each point mean pressing force, not negative, and its derivative by opening,
-            slip and turn at the end, filled for those of this joint (p, 4) [N].
+        ends: gaps of both ends at the start, and of both at the end [m].
+        late: lag of damping over the length of the step, by which gaps are seen ahead [-].
+        facet: whether it is one; else only its first end counts.
 
     Returns:
-        Energy that the lag takes [J].
+        At both ends, and derivatives of the first by the first and by the second gap at the end,
+        and of the second by the second.
     """
-    first, last = lap(faces, joint, ends[0, 1]), lap(faces, joint, ends[1, 1])
-    l0, (l1, shrinks) = first[0], last
-    mean, turn, stiff = 0.5 * (l0 + l1), 0.5 * (ends[0, 2] + ends[1, 2]), faces.normal[joint]
-    widens = 0.5 * shrinks
-    total = moment = lost = 0.0
-    rate[:] = 0.0  # in the rows of opening and turn, derivatives of total and moment at first
-    stride = 2 if faces.facets else 1
-    for point in range(faces.first[joint], faces.first[joint + 1], stride):
-        x0 = faces.place[point]
-        x1 = faces.place[point + stride - 1]
-        a, c = ends[0, 0] - x0 * l0 * ends[0, 2], ends[0, 0] - x1 * l0 * ends[0, 2]
-        b, d = ends[1, 0] - x0 * l1 * ends[1, 2], ends[1, 0] - x1 * l1 * ends[1, 2]
-        lagged = (a + late * (b - a), c + late * (d - c), b + late * (b - a), d + late * (d - c))
-        share = faces.share[point]
-        (n0, n1), (k00, k01, k11) = _carried(lagged, late, 1.0 + late, faces.facets)
-        if late > 0.0:
-            p0, p1 = _carried((a, c, b, d), 0.0, 1.0, faces.facets)[0]
-            lost += share * ((n0 - p0) * (b - a) + (n1 - p1) * (d - c))
-        total += share * (n0 + n1)
-        moment += share * (x0 * n0 + x1 * n1)
-        scale = -stiff * share
-        normals[point, 0] = scale * mean * n0
-        if faces.facets:
-            normals[point + 1, 0] = scale * mean * n1
-        for k in range(3):
-            by_b, by_d = gap_rate(k, x0, l1, shrinks, ends), gap_rate(k, x1, l1, shrinks, ends)
-            near, far = k00 * by_b + k01 * by_d, k01 * by_b + k11 * by_d
-            rate[0, k] += share * (near + far)
-            rate[2, k] += share * (x0 * near + x1 * far)
-            wider = widens if k == 1 else 0.0
-            normals[point, 1 + k] = scale * (mean * near + wider * n0)
-            if faces.facets:
-                normals[point + 1, 1 + k] = scale * (mean * far + wider * n1)
-    before = stored(faces, joint, l0, ends[0, 0], ends[0, 2])[0]
-    after, whole, tilted = stored(faces, joint, l1, ends[1, 0], ends[1, 2])
-    slope, bends = _slope(ends[0, 1], ends[1, 1], first, last)
-    push = 0.5 * (before + after) - mean * turn * moment
-    force[0] = stiff * mean * total
-    force[1] = stiff * slope * push
-    force[2], force[3] = -stiff * mean * mean * moment, 0.0
-    by_phi = (whole, -shrinks * ends[1, 2] * tilted, -l1 * tilted)
-    for k in range(3):
-        wider, turns, tilts = widens if k == 1 else 0.0, 0.5 if k == 2 else 0.0, rate[2, k]
-        rate[0, k] = stiff * (mean * rate[0, k] + wider * total)
-        rate[2, k] = -stiff * mean * (mean * tilts + 2.0 * wider * moment)
-        change = 0.5 * by_phi[k] - (wider * turn + mean * turns) * moment
-        change -= mean * turn * tilts
-        rate[1, k] = stiff * (slope * change + (bends * push if k == 1 else 0.0))
-    return stiff * mean * lost
-
-
-@numba.njit(cache=True)
-def gap_rate(measure, place, length, shrinks, ends):  # type: ignore
-    """Return the derivative of the gap at a place by a measure at the end of the step.
-
-    Args:
-        measure: 0 opening, 1 slip, 2 turn.
-        place: x [-].
-        length: of the overlap at the end [m].
-        shrinks: its derivative by the slip [-].
-        ends: measures at the start and at the end of the step (2, 3).
-    """
-    if measure == 0:
-        return 1.0
-    return -place * (shrinks * ends[1, 2] if measure == 1 else length)
-
-
-@numba.njit(cache=True)
-def _carried(ends, first, second, facet):  # type: ignore
-    """Mean of ∫φ_i <gap>₋ over a step on a facet of unit length, or of <gap>₋, and its derivative.
-
-    Args:
-        ends: gaps of both ends at the start, and of both at the end, of their paths [m].
-        first: change of the start with a parameter [-].
-        second: change of the end with it [-].
-        facet: whether it is one.
-
-    Returns:
-        At both ends, and derivatives of the first by the first and by the second gap, and of the
-        second by the second.
-    """
-    half = 0.5 * (first + second)
+    half = 0.5 + late
+    if max(ends) <= 0.0:
+        a, c, b, d = ends
+        near, far = (a + b) / 12.0, (c + d) / 12.0
+        if facet:
+            return (2.0 * near + far, near + 2.0 * far), (half / 3.0, half / 6.0, half / 3.0)
+        return (6.0 * near, 0.0), (half, 0.0, 0.0)
+    if min(ends) > 0.0:
+        return (0.0, 0.0), (0.0, 0.0, 0.0)
     if not facet:
-        normal, _, rate, _ = point_means(ends[0], ends[2], first, second)
+        normal, _, rate, _ = point_means(ends[0], ends[2], late, 1.0 + late)
         return (normal, 0.0), (half - rate, 0.0, 0.0)
-    normal, _, rates, _ = facet_means(ends, first, second)
+    normal, _, rates, _ = facet_means(ends, late, 1.0 + late)
     return normal, (half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2])
 
 
-@numba.njit(cache=True)
-def _slope(before, after, first, last):  # type: ignore
-    """Δℓ/Δs over a step, and its derivative by the slip at the end, from ℓ and its derivatives."""
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def slope(before, after, first, last):  # type: ignore
+    """Return Δℓ/Δs over a step, and its derivative by the slip at the end.
+
+    Args:
+        before: slip at the start [m].
+        after: slip at the end [m].
+        first: ℓ at the start and its derivative, as by `lap`.
+        last: the same at the end.
+    """
     (l0, r0), (l1, r1) = first, last
     moved = after - before
     same = r0 == r1 and l0 > 0.0 and l1 > 0.0 and before * after > 0.0

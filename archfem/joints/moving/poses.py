@@ -45,19 +45,19 @@ class Sides(NamedTuple):
     held: Array
 
 
-@numba.njit(cache=True)
-def _shaped(shapes, index, span, q):  # type: ignore
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _shaped(sides, joint, side, q):  # type: ignore
     """U ξ and Θ ξ of a face."""
     x = y = turn = 0.0
-    for k in range(span[0], span[1]):
-        own = q[index[k]]
-        x += shapes[0, k] * own
-        y += shapes[1, k] * own
-        turn += shapes[2, k] * own
+    for k in range(3 if sides.turns[joint, side] else 0, sides.size[joint, side]):
+        own = q[sides.index[joint, side, k]]
+        x += sides.shapes[joint, side, 0, k] * own
+        y += sides.shapes[joint, side, 1, k] * own
+        turn += sides.shapes[joint, side, 2, k] * own
     return x, y, turn
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _turned(arm, shift, half):  # type: ignore
     """R r - r + R u, of cosine and sine of half the angle; and cosine and sine of the angle."""
     (rx, ry), (dx, dy), (ch, sh) = arm, shift, half
@@ -67,7 +67,7 @@ def _turned(arm, shift, half):  # type: ignore
     return (x, y), (c, s)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def stretched(sides, joint, q):  # type: ignore
     """Return by how much the higher face of a joint has become longer than the lower [m].
 
@@ -85,34 +85,35 @@ def stretched(sides, joint, q):  # type: ignore
     return total
 
 
-@numba.njit(cache=True)
-def pose(sides, joint, side, q, found):  # type: ignore
-    """Find the pose of a face.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _straight(sides, joint, side, q):  # type: ignore
+    """Pose of a face of a block without a frame."""
+    dx, dy, turn = _shaped(sides, joint, side, q)
+    held = sides.held
+    return held[joint, side, 0] + dx, held[joint, side, 1] + dy, held[joint, side, 2] + turn
+
+
+@numba.njit(cache=True, error_model="numpy")
+def pose(sides, joint, side, q):  # type: ignore
+    """Return the pose of a face [m, m, rad].
 
     Args:
         sides: `Sides`.
         joint: its number.
         side: 0 of the lower block, 1 of the higher.
         q: coordinates (n,).
-        found: filled (3,) [m, m, rad].
     """
-    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
-    size = sides.size[joint, side]
     if not sides.turns[joint, side]:
-        dx, dy, turn = _shaped(shapes, index, (0, size), q)
-        found[0] = sides.held[joint, side, 0] + dx
-        found[1] = sides.held[joint, side, 1] + dy
-        found[2] = sides.held[joint, side, 2] + turn
-        return
-    dx, dy, turn = _shaped(shapes, index, (3, size), q)
-    arm = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
-    (x, y), _ = _turned(arm, (dx, dy), both(0.5 * q[index[2]]))
-    found[0], found[1], found[2] = q[index[0]] + x, q[index[1]] + y, q[index[2]] + turn
+        return _straight(sides, joint, side, q)
+    index, (dx, dy, turn) = sides.index, _shaped(sides, joint, side, q)
+    arm, angle = (sides.arm[joint, side, 0], sides.arm[joint, side, 1]), q[index[joint, side, 2]]
+    (x, y), _ = _turned(arm, (dx, dy), both(0.5 * angle))
+    return q[index[joint, side, 0]] + x, q[index[joint, side, 1]] + y, angle + turn
 
 
-@numba.njit(cache=True)
-def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
-    """Find the poses of a face at both ends of a step, and their derivatives.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def swing(sides, joint, side, before, after):  # type: ignore
+    """Return the poses of a face at both ends of a step, and how the block turns.
 
     Args:
         sides: `Sides`.
@@ -120,58 +121,82 @@ def swing(sides, joint, side, before, after, poses, moves):  # type: ignore
         side: 0 of the lower block, 1 of the higher.
         before: coordinates at the start (n,).
         after: coordinates at the end (n,).
-        poses: at the start and at the end, of both sides, filled for this one (2, 2, 3).
-        moves: what takes the change of coordinates over the step to that of the pose, and the
-            derivative at the end, filled for this side in the first columns (2, 2, 3, s).
 
     Returns:
-        What `swing_bend` needs to know of the step, of a block that turns.
+        Pose at the start and at the end [m, m, rad]; what `swing_bend` needs to know of the step;
+        and for its mean and its end cosine and sine of the angle, a factor of the shapes, and how
+        the middle goes with the angle.
     """
-    index, shapes = sides.index[joint, side], sides.shapes[joint, side]
-    size = sides.size[joint, side]
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     if not sides.turns[joint, side]:
-        pose(sides, joint, side, before, poses[0, side])
-        pose(sides, joint, side, after, poses[1, side])
-        for k in range(size):
-            for row in range(3):
-                moves[0, side, row, k] = moves[1, side, row, k] = shapes[row, k]
-        return (1.0, 0.0), (rx, ry), (1.0, 0.0, 1.0, 0.0)
-    x, y, turn = index[0], index[1], index[2]
+        start, last = (
+            _straight(sides, joint, side, before),
+            _straight(sides, joint, side, after),
+        )
+        still = (1.0, 0.0), 1.0, (0.0, 0.0)
+        return (start, last), ((1.0, 0.0), (rx, ry), (1.0, 0.0, 1.0, 0.0)), (still, still)
+    index = sides.index
+    x, y, turn = index[joint, side, 0], index[joint, side, 1], index[joint, side, 2]
     half = 0.5 * (after[turn] - before[turn])
     mean, shrunk, falls = small_turn(half)
-    start = both(0.5 * before[turn])
-    u0, v0, tilt = _shaped(shapes, index, (3, size), before)
-    (dx, dy), (c, s) = _turned((rx, ry), (u0, v0), start)
-    poses[0, side, 0], poses[0, side, 1] = before[x] + dx, before[y] + dy
-    poses[0, side, 2] = before[turn] + tilt
-    u1, v1, tilt = _shaped(shapes, index, (3, size), after)
-    end = added(start[0], start[1], mean, half * shrunk)
-    (dx, dy), last = _turned((rx, ry), (u1, v1), end)
-    poses[1, side, 0], poses[1, side, 1] = after[x] + dx, after[y] + dy
-    poses[1, side, 2] = after[turn] + tilt
-    _turning(shapes, size, (last, 1.0, 1.0), (rx + u1, ry + v1), moves[1, side])
-    middle = added(c, s, mean, half * shrunk)
-    reach = rx + 0.5 * (u0 + u1), ry + 0.5 * (v0 + v1)
-    _turning(shapes, size, (middle, mean, shrunk), reach, moves[0, side])
-    return middle, reach, (mean, half * shrunk, shrunk, falls)
+    begin = both(0.5 * before[turn])
+    u0, v0, tilt = _shaped(sides, joint, side, before)
+    (dx, dy), (c, s) = _turned((rx, ry), (u0, v0), begin)
+    start = before[x] + dx, before[y] + dy, before[turn] + tilt
+    u1, v1, tilt = _shaped(sides, joint, side, after)
+    end = added(begin[0], begin[1], mean, half * shrunk)
+    (dx, dy), (c1, s1) = _turned((rx, ry), (u1, v1), end)
+    last = after[x] + dx, after[y] + dy, after[turn] + tilt
+    c, s = added(c, s, mean, half * shrunk)
+    px, py = rx + 0.5 * (u0 + u1), ry + 0.5 * (v0 + v1)
+    bx, by = rx + u1, ry + v1
+    arm = -shrunk * (s * px + c * py), shrunk * (c * px - s * py)
+    now = (c1, s1), 1.0, (-(s1 * bx + c1 * by), c1 * bx - s1 * by)
+    step = (c, s), (px, py), (mean, half * shrunk, shrunk, falls)
+    return (start, last), step, (((c, s), mean, arm), now)
 
 
-@numba.njit(cache=True)
-def _turning(shapes, size, turn, reach, moves):  # type: ignore
-    """Write down a derivative of a pose by the frame and by the shapes."""
-    ((c, s), mean, shrunk), (x, y) = turn, reach
-    moves[0, 0], moves[0, 1], moves[0, 2] = 1.0, 0.0, -shrunk * (s * x + c * y)
-    moves[1, 0], moves[1, 1], moves[1, 2] = 0.0, 1.0, shrunk * (c * x - s * y)
-    moves[2, 0], moves[2, 1], moves[2, 2] = 0.0, 0.0, 1.0
-    for k in range(3, size):
-        u, v = shapes[0, k], shapes[1, k]
-        moves[0, k], moves[1, k] = mean * (c * u - s * v), mean * (s * u + c * v)
-        moves[2, k] = shapes[2, k]
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def shape(sides, joint, side, k, way):  # type: ignore
+    """Return how a face goes with one of its shapes: x, y and angle.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        k: number of the coordinate among the face's.
+        way: of the mean of a step or its end, as `swing` returned it.
+    """
+    (c, s), factor, _ = way
+    u, v = sides.shapes[joint, side, 0, k], sides.shapes[joint, side, 1, k]
+    turn = sides.shapes[joint, side, 2, k]
+    return factor * (c * u - s * v), factor * (s * u + c * v), turn
 
 
-@numba.njit(cache=True)
-def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def gather(sides, joint, side, way, push, found):  # type: ignore
+    """Write down the generalised forces of a force on a face.
+
+    Args:
+        sides: `Sides`.
+        joint: its number.
+        side: 0 of the lower block, 1 of the higher.
+        way: of the mean of the step, as `swing` returned it.
+        push: on the pose [N, N, N m].
+        found: filled for this face in its first places (…, s).
+    """
+    (fx, fy, ft), first = push, 0
+    if sides.turns[joint, side]:
+        first = 3
+        found[0], found[1] = fx, fy
+        found[2] = way[2][0] * fx + way[2][1] * fy + ft
+    for k in range(first, sides.size[joint, side]):
+        x, y, turn = shape(sides, joint, side, k, way)
+        found[k] = x * fx + y * fy + turn * ft
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def swing_bend(sides, joint, side, step, push, rates):  # type: ignore
     """Add the derivative of generalised forces on a face by the coordinates at the end.
 
     Args:
@@ -179,11 +204,11 @@ def swing_bend(sides, joint, side, step, force, rates):  # type: ignore
         joint: its number.
         side: 0 of the lower block, 1 of the higher, of one that turns.
         step: as `swing` returned it.
-        force: on the poses of both faces, which is held (2, 3) [N, N, N m].
+        push: on the pose, which is held [N, N, N m].
         rates: of all joints, added to (j, 2, s, 2, s).
     """
     (c, s), (x, y), (mean, sine, shrunk, falls) = step
-    fx, fy = force[side, 0], force[side, 1]
+    fx, fy = push[0], push[1]
     along = fx * (c * x - s * y) + fy * (s * x + c * y)  # F·R x
     across = -fx * (s * x + c * y) + fy * (c * x - s * y)  # F·J R x
     rates[joint, side, 2, side, 2] += 0.5 * (falls * across - shrunk * along)

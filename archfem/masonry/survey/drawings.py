@@ -13,8 +13,12 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
+from archfem.files import check_file, text_of
 from archfem.masonry.naming import did_you_mean
 from archfem.units import in_unit
+
+LARGEST = 2**25
+"""Most bytes of a drawing."""
 
 SIZES = (0.02, 20.0)
 """Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong."""
@@ -66,8 +70,7 @@ def outlines_in(
     readers = {".geojson": _geojson, ".json": _geojson, ".dxf": _dxf}
     if path.suffix.lower() not in readers:
         raise InvalidInput(f"{path} is no drawing: give a .geojson or a .dxf file")
-    if not path.is_file():
-        raise InvalidInput(f"there is no drawing {path}")
+    check_file(path, "drawing", LARGEST)
     try:
         outlines = list(readers[path.suffix.lower()](path, unit, ignored))
         _check_sizes(outlines)
@@ -79,8 +82,8 @@ def outlines_in(
 def _geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Polygons of a GeoJSON file."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8-sig"))
-    except ValueError as error:
+        found = json.loads(text_of(path, "drawing", LARGEST))
+    except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
@@ -68,6 +69,7 @@ class Survey:
     moved: float
 
 
+@as_annotated
 def read_outlines(
     path: str | Path,
     *,

@@ -1,7 +1,7 @@
 """The one place that touches what differs between versions of DOLFINx.
 
-Features are tested, never version numbers: 0.5 (Debian 12) is the one in use, and 0.9 and newer
-are meant to follow. Everything here is serial: one analysis is one process.
+Features are tested, never version numbers: it works with 0.5 (Debian 12), 0.9 (Debian 13) and 0.11.
+Everything here is serial: one analysis is one process.
 """
 
 import logging
@@ -81,8 +81,9 @@ def cell_dofs(space: Any) -> Numbers:
 def facet_nodes(space: Any) -> Numbers:
     """Positions in a cell's node list of the nodes on each of its facets (facets, nodes)."""
     layout = space.dofmap.dof_layout
-    facets = space.mesh.ufl_cell().num_facets()
-    return np.array([layout.entity_closure_dofs(1, facet) for facet in range(facets)])
+    facets = space.mesh.ufl_cell().num_facets
+    count = facets() if callable(facets) else facets
+    return np.array([layout.entity_closure_dofs(1, facet) for facet in range(count)])
 
 
 def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
@@ -96,14 +97,14 @@ def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
         old.index_map_bs,
     )
     mesh = space._cpp_object.mesh
+    element = getattr(space.element, "_cpp_object", space.element)
     if hasattr(cpp.fem, "FunctionSpace"):
-        inner = cpp.fem.FunctionSpace(mesh, space.element, dofmap)
+        inner = cpp.fem.FunctionSpace(mesh, element, dofmap)
     else:
-        shape = space.value_shape
         try:
-            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap)
+            inner = cpp.fem.FunctionSpace_float64(mesh, element, dofmap)
         except TypeError:
-            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap, shape)
+            inner = cpp.fem.FunctionSpace_float64(mesh, element, dofmap, space.value_shape)
     new = fem.FunctionSpace(space.mesh, space.ufl_element(), inner)
     new.original = space  # its compiled element must outlive this copy
     return new

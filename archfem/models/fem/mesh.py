@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +20,10 @@ from archfem.masonry.structure import TOUCHING, Structure
 from archfem.models.discretisation import Discretisation
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.division import Division, divided
+from archfem.packages import needed
+
+with needed("gmsh"):
+    import gmsh
 
 FRONTAL = 6
 """Gmsh's number for the frontal Delaunay algorithm."""

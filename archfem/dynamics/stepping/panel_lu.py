@@ -1,0 +1,233 @@
+"""Gauss's elimination of a sparse matrix in dense panels, without row exchanges, compiled.
+
+The matrix need not be symmetric, its pattern is. Of each group of coordinates (`elimination`) the
+rows from its diagonal on are one dense block, and the columns below them another. Where entries
+never change, as inside a fill, groups are eliminated once: what is left is the matrix condensed
+onto the coordinates that joints move.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from scipy import sparse
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping.elimination import Elimination, Indices
+
+SMALL = 1e-6
+"""Pivot, relative to the rest of its row, below which rows would have to be exchanged."""
+
+
+class Panels(NamedTuple):
+    """A matrix of which some entries change, in the order in which it is eliminated.
+
+    Attributes:
+        first: first column of each group, and the number of columns (groups + 1,).
+        below: where its rows begin in `rows` (groups + 1,).
+        rows: rows below the columns of each group.
+        places: where its blocks begin among the entries, the rows of a group from its first column
+            on and then its columns below them, column by column (groups + 1,).
+        updates: where its targets begin (groups + 1,).
+        targets: which entries its elimination changes further down, row by row.
+        changing: groups to eliminate once entries change.
+        base: all entries, of other groups eliminated.
+        added: which entry each of those belongs to that are added, -1 to none (k,).
+    """
+
+    first: Indices
+    below: Indices
+    rows: Indices
+    places: Indices
+    updates: Indices
+    targets: Indices
+    changing: Indices
+    base: Array
+    added: Indices
+
+
+NO_PANELS = Panels(*(7 * (np.zeros(0, np.int64),)), np.zeros(0), np.zeros(0, np.int64))
+"""Where a band serves."""
+
+
+def panels_of(matrix: sparse.csr_matrix, elimination: Elimination, pairs: Indices) -> Panels:
+    """Return a matrix in panels.
+
+    Args:
+        matrix: what of it does not change, in the order of elimination (n, n).
+        elimination: of a pattern that has all its entries.
+        pairs: row and column of what is added later, negative where there is nothing (k, 2).
+
+    Raises:
+        LinAlgError: what does not change cannot be eliminated without row exchanges.
+    """
+    first = np.array([start for start, _ in elimination.groups] + [matrix.shape[0]], np.int64)
+    counts = np.array([len(rows) for rows in elimination.rows])
+    width = np.diff(first)
+    sizes = width * (width + 2 * counts)
+    below, places, updates = (
+        np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
+    )
+    rows = np.concatenate(elimination.rows).astype(np.int64)
+    layout = Panels(first, below, rows, places, updates, *(4 * (rows[:0],)))
+    targets = [np.broadcast_arrays(own[:, None], own) for own in elimination.rows]
+    ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
+    entries, base = matrix.tocoo(), np.zeros(places[-1])
+    np.add.at(base, _entries(layout, entries.row, entries.col), entries.data)
+    used = pairs[:, 0] >= 0
+    added = np.full(len(pairs), -1)
+    added[used] = _entries(layout, *pairs[used].T)
+    changes = np.zeros(len(width), bool)
+    changes[elimination.group_of[pairs[used].min(axis=1)]] = True
+    for group, parent in enumerate(elimination.parent):
+        if changes[group] and parent >= 0:
+            changes[parent] = True
+    panels = layout._replace(targets=_entries(layout, *ends), added=added, base=base)
+    if not eliminated(panels._replace(changing=np.flatnonzero(~changes)), base):
+        raise np.linalg.LinAlgError("a fill without joints is not held by its own inertia")
+    return panels._replace(changing=np.flatnonzero(changes))
+
+
+def _entries(panels: Panels, rows: Any, columns: Any) -> Indices:
+    """Which entry belongs to each row and column (k,)."""
+    first, low, high = panels.first, np.minimum(rows, columns), np.maximum(rows, columns)
+    size = first[-1]
+    group = np.searchsorted(first, low, "right") - 1
+    start, width, count = first[group], np.diff(first)[group], np.diff(panels.below)[group]
+    keys = size * np.repeat(np.arange(len(first) - 1), np.diff(panels.below)) + panels.rows
+    later = np.searchsorted(keys, size * group + high) - panels.below[group]
+    inner, near, far = high < start + width, low - start, high - start
+    upper = np.where(rows <= columns, near, far) * (width + count)
+    upper += np.where(rows <= columns, np.where(inner, far, width + later), near)
+    lower = width * (width + count) + near * count + later
+    return np.asarray(panels.places[group] + np.where(inner | (rows <= columns), upper, lower))
+
+
+@numba.njit(cache=True)
+def renewed(panels, added, entries):  # type: ignore
+    """Split the matrix into triangles.
+
+    Args:
+        panels: `Panels`.
+        added: to its entries (k,).
+        entries: filled, as `back` takes them.
+
+    Returns:
+        Whether no pivot has become small, by which row exchanges would be needed.
+    """
+    entries[:] = panels.base
+    for k in range(len(added)):
+        if panels.added[k] >= 0:
+            entries[panels.added[k]] += added[k]
+    return eliminated(panels, entries)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def eliminated(panels, entries):  # type: ignore
+    """Eliminate the groups that change; whether no pivot has become small.
+
+    Args:
+        panels: `Panels`.
+        entries: of the matrix, then of its triangles.
+    """
+    first, below = panels.first, panels.below
+    most = 0
+    for group in panels.changing:
+        most = max(most, below[group + 1] - below[group])
+    room = np.empty(most)
+    for group in panels.changing:
+        width, count = first[group + 1] - first[group], below[group + 1] - below[group]
+        place, size = panels.places[group], width + count
+        top = entries[place : place + width * size].reshape((width, size))
+        left = entries[place + width * size : place + width * (size + count)]
+        left = left.reshape((width, count))
+        if not _split(top, left):
+            return False
+        targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
+        _passed_on(top, left, targets.reshape((count, count)), room[:count], entries)
+    return True
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _split(top, left):  # type: ignore
+    """Eliminate the columns of a group within its blocks; whether no pivot is small."""
+    width, size = top.shape
+    for k in range(width):
+        row, largest = top[k], 0.0
+        for j in range(k, size):
+            largest = max(largest, abs(row[j]))
+        if not abs(row[k]) > SMALL * largest:
+            return False
+        inverse = 1.0 / row[k]
+        for i in range(k + 1, width):
+            other = top[i]
+            factor = other[k] * inverse
+            other[k] = factor
+            for j in range(k + 1, size):
+                other[j] -= factor * row[j]
+        column = left[k]
+        for i in range(len(column)):
+            column[i] *= inverse
+        for m in range(k + 1, width):
+            other, factor = left[m], row[m]
+            for i in range(len(column)):
+                other[i] -= factor * column[i]
+    return True
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _passed_on(top, left, targets, room, entries):  # type: ignore
+    """Take what a group's elimination changes from the entries further down."""
+    width, count = left.shape
+    for i in range(count):
+        room[:] = 0.0
+        for k in range(width):
+            factor, row = left[k, i], top[k, width:]
+            for j in range(count):
+                room[j] += factor * row[j]
+        own = targets[i]
+        for j in range(count):
+            entries[own[j]] -= room[j]
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def back(panels, entries, vector, room):  # type: ignore
+    """Solve a system in place by its triangles.
+
+    Args:
+        panels: `Panels`.
+        entries: as `renewed` leaves them.
+        vector: right side, then solution (n,).
+        room: for intermediate results (n,).
+    """
+    first, below, groups = panels.first, panels.below, len(panels.first) - 1
+    for group in range(groups):
+        start, width = first[group], first[group + 1] - first[group]
+        rows = panels.rows[below[group] : below[group + 1]]
+        count, place = len(rows), panels.places[group]
+        lower = place + width * (width + count)
+        total = room[:count]
+        total[:] = 0.0
+        for k in range(width):
+            value = vector[start + k]
+            for i in range(k + 1, width):
+                vector[start + i] -= value * entries[place + i * (width + count) + k]
+            column = entries[lower + k * count : lower + (k + 1) * count]
+            for i in range(count):
+                total[i] += value * column[i]
+        for i in range(count):
+            vector[rows[i]] -= total[i]
+    for group in range(groups - 1, -1, -1):
+        start, width = first[group], first[group + 1] - first[group]
+        rows = panels.rows[below[group] : below[group + 1]]
+        count, own = len(rows), room[: width + len(rows)]
+        own[:width] = vector[start : start + width]
+        for i in range(count):
+            own[width + i] = vector[rows[i]]
+        for k in range(width - 1, -1, -1):
+            begin = panels.places[group] + k * (width + count)
+            row, value = entries[begin : begin + width + count], own[k]
+            for j in range(k + 1, width + count):
+                value -= row[j] * own[j]
+            own[k] = value / row[k]
+            vector[start + k] = own[k]
