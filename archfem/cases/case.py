@@ -22,6 +22,7 @@ from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
 from archfem.cases.structures import planned
 from archfem.cases.toml import tables_in
 from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
+from archfem.dynamics.time_history import LEAST_STEP
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -191,8 +192,8 @@ class Case:
                 "built in stages; leave out one of both"
             )
         step = self.analysis.get("dt", 0.005)
-        if not 0.0 < step <= 0.1:
-            raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
+        if not LEAST_STEP <= step <= 0.1:
+            raise InvalidInput(f"analysis.dt = {step:g} s is not between {LEAST_STEP:g} and 0.1 s")
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
 

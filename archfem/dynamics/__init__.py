@@ -27,6 +27,7 @@
     yardstick     what a model and its steps err by
     smallness     what it errs by to take displacements as small
     probe         what a short run tells of a model
+    determined    how long a history is one, and not one of many
     tradeoff      speed against error over settings
 
 It imports from `motion`, `statics` and what is left of it. Start reading at `time_history`.

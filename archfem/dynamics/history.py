@@ -267,6 +267,14 @@ class History(Exports, Shown, picture="joints.draw_joints"):
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
             )
+        if structure is not None and dataset.attrs.get("structure") not in (
+            None,
+            structure.fingerprint,
+        ):
+            raise InvalidInput(
+                f"{path} is of another structure: its joints have the names of those of "
+                f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
+            )
         if structure is not None:
             roles = [joint.role for joint in structure.joints]
             dataset = dataset.assign_coords(role=("joint", roles))

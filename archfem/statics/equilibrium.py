@@ -58,6 +58,11 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
                 f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
                 f"points, the model {model.size} and {len(model.memory)}: give the same model's"
             )
+        if model.structure.fingerprint != self.model.structure.fingerprint:
+            raise InvalidInput(
+                f"the state is of another structure, '{self.model.structure.name}', whose blocks "
+                f"are elsewhere than those of '{model.structure.name}': give the same model's"
+            )
         built = self.model.built if isinstance(self.model, Jointed) else None
         if built is not None and isinstance(model, Jointed):
             model = model.begun(built)
