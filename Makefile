@@ -4,9 +4,9 @@ SHELL := /bin/bash
 PYTHON := .venv/bin/python
 # What is large is never compiled from source: that takes an hour, and fails in the end.
 PIP := .venv/bin/pip install -q --disable-pip-version-check -c constraints.txt \
-	--only-binary numpy,scipy,numba,llvmlite,gmsh,pandas,shapely
+	--only-binary numpy,scipy,numba,llvmlite,vtk,gmsh,pandas,shapely
 APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas0-pthread \
-	libgl1 libglu1-mesa libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 libfontconfig1
+	libegl1 libgl1 libglu1-mesa libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 libfontconfig1
 
 # Small dense and sparse problems: threads only get in each other's way.
 export OPENBLAS_NUM_THREADS := 1
@@ -18,7 +18,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # A worker a core, and whoever is done takes over from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -54,6 +54,9 @@ test-debian13:  ## the default tests in a Debian 13 made for them (root, deboots
 hard: .venv/compiled  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard
 
+fuzz: .venv/compiled  ## odd input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
+	cd tests && ../$(PYTHON) -m fuzz --seed $(or $(SEED),0) $(if $(COUNT),--count $(COUNT))
+
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py
 
@@ -68,7 +71,7 @@ notebooks: .venv/docs .venv/compiled  ## run the notebooks, and keep what they s
 	$(PYTHON) docs/execute.py
 
 verification: .venv/compiled  ## the table of what tests verify, for the documentation
-	$(PYTHON) -m pytest $(SPREAD) -m "" --verified docs/verification.json
+	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json
 
 .venv/docs: .venv/ready
 	$(PIP) -e '.[dev,docs,notebooks]'

@@ -3,9 +3,11 @@
 Everything that archfem needs comes with `pip install archfem`, but FEniCSx: that has no wheels.
 """
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import CDLL
 from typing import NamedTuple
 
 from archfem.errors import NotInstalled
@@ -38,8 +40,11 @@ NEEDS = {
         "meshes, and all models but those of fidelity = 'rigid' (--set model.fidelity=rigid),",
         FROM,
     ),
-    "PETSc": Need("options of PETSc", "it comes with FEniCSx, " + FROM),
+    "PETSc": Need("its solvers", "it comes with FEniCSx, " + FROM),
     "SLEPc": Need("modes of large models", "it comes with FEniCSx, " + FROM),
+    "EGL": Need(
+        "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
+    ),
     "gmsh": Need(
         "meshes",
         "'pip install gmsh'; where libGLU or another library is what it lacks, 'apt-get install "
@@ -48,6 +53,9 @@ NEEDS = {
     ),
 }
 """What may be missing, by name."""
+
+DISPLAYS = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
+"""Libraries of which VTK takes the first that is there, to draw without a screen."""
 
 
 @contextmanager
@@ -65,7 +73,7 @@ def needed(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except (ImportError, OSError) as error:
+    except Exception as error:  # a NumPy it was not built for, a library it lacks: all fail apart
         raise NotInstalled(lacking(name, str(error))) from error
 
 
@@ -77,4 +85,31 @@ def lacking(name: str, why: str) -> str:
         why: it is missed.
     """
     need = NEEDS[name]
-    return f"{name} is missing for {sys.executable} ({why}); {need.what} need it: {need.get}"
+    return f"{name} cannot be loaded by {sys.executable} ({why}); {need.what} need it: {need.get}"
+
+
+def check_drawing() -> None:
+    """Refuse to open a viewer where VTK finds no library for it, which would end the process.
+
+    Raises:
+        NotInstalled: there is none.
+    """
+    if not can_draw():
+        raise NotInstalled(lacking("EGL", f"none of {', '.join(DISPLAYS)} is there"))
+
+
+def can_draw() -> bool:
+    """Return whether VTK finds a library to draw with; without one it ends the process."""
+    if sys.platform != "linux":
+        return True
+    screen = ("libGL.so.1",) if os.environ.get("DISPLAY") else ()
+    return any(map(_loads, (*DISPLAYS, *screen)))
+
+
+def _loads(library: str) -> bool:
+    """Whether a library is there, with all that it needs itself."""
+    try:
+        CDLL(library)
+    except OSError:
+        return False
+    return True

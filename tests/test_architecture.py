@@ -13,8 +13,8 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "tables", "_petsc"}
-GROUND |= {"packages", "compiled", "shown"}
+GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "netcdf", "tables"}
+GROUND |= {"threads", "packages", "compiled", "shown", "_petsc"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}
@@ -30,6 +30,7 @@ ONLY_IN = {
     "slepc4py": "_petsc",
     "numba": ("compiled", "dynamics.stepping", "dynamics.falling", "joints.moving"),
     "matplotlib": "view",
+    "pyvista": "view.films",
     "imageio": "view.films",
     "imageio_ffmpeg": "view.films",
     "jinja2": "view.pages",
@@ -37,6 +38,7 @@ ONLY_IN = {
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",
+    "netCDF4": "netcdf",
     "tomllib": ("cases", "studies"),
     "tomli_w": "cases",
     "argparse": "commands",
@@ -141,7 +143,7 @@ def test_public_names_are_about_fifty():
 
 
 def test_importing_archfem_loads_no_library():
-    slow = {"numpy", "scipy", "xarray", "numba", "matplotlib", "pint", "gmsh", "imageio"}
+    slow = {"numpy", "scipy", "xarray", "numba", "matplotlib", "pint", "gmsh", "pyvista"}
     script = f"import sys, archfem; print(*({slow} & set(sys.modules)))"
     ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert ran.stdout.split() == []

@@ -6,7 +6,7 @@ from importlib import import_module
 import archfem as af
 
 ROOMS = ["", "joints", "limit", "masonry", "motion", "statics", "dynamics", "studies", "units"]
-"""`view` is left out: its examples are the gallery, and pictures take their time to load."""
+"""`view` is left out: its examples are the gallery, and pyvista takes its time to load."""
 
 
 def examples():

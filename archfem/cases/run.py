@@ -27,6 +27,7 @@ from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.plausible import dead_load_doubts
 from archfem.statics.strength import strength_use
 
 if TYPE_CHECKING:
@@ -71,6 +72,11 @@ class Rest:
         """Stress in the blocks and use of their strength, as by `strength_use`; None if rigid."""
         model = self.dead.model
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the dead load doubtful, its model's rung included, a sentence each."""
+        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, self.case.criteria.friction))
 
     @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
@@ -300,6 +306,8 @@ def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake
     except DidNotConverge as error:
         history, failure = history_of(error), error
     seconds = perf_counter() - start
+    doubts = dict.fromkeys((*rest.doubts, *history.doubts))
+    history.dataset.attrs["doubts"] = "\n".join(doubts)
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)

@@ -66,6 +66,7 @@ def findings() -> Iterator[Finding]:
     yield Finding("Python", f"{sys.version.split()[0]}, {sys.executable}")
     yield from _required()
     yield from _fenicsx()
+    yield _drawing()
     yield _ffmpeg()
     yield _compiled()
     if find_spec("distributed") is None:
@@ -117,6 +118,13 @@ def _fenicsx() -> Iterator[Finding]:
     compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
     get = "'apt-get install gcc libc6-dev', elsewhere 'conda install -c conda-forge c-compiler'"
     yield Finding("C compiler", compiler or "missing", "" if compiler else get)
+
+
+def _drawing() -> Finding:
+    """The library with which pyvista's viewer draws."""
+    if packages.can_draw():
+        return Finding("library of the viewer", "found")
+    return Finding("library of the viewer", "missing", packages.NEEDS["EGL"].get)
 
 
 def _ffmpeg() -> Finding:

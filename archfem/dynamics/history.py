@@ -11,10 +11,10 @@ import xarray as xr
 from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.dynamics.corners import displacement_of
+from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.duration import step_lengths
 from archfem.joints.resultants import one_joint
@@ -25,6 +25,7 @@ from archfem.limit.verified import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
+from archfem.netcdf import read_dataset, write_dataset
 from archfem.shown import Shown
 
 SIGNS = (
@@ -58,7 +59,7 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class History(Shown, picture="joints.draw_joints"):
+class History(Exports, Shown, picture="joints.draw_joints"):
     """The record of one run.
 
     Attributes:
@@ -240,9 +241,7 @@ class History(Shown, picture="joints.draw_joints"):
             The file.
         """
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
-        with in_one_stroke(Path(path)) as draft:
-            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
-        return Path(path)
+        return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
     @as_annotated
@@ -255,17 +254,11 @@ class History(Shown, picture="joints.draw_joints"):
                 what roles its parts have.
 
         Raises:
-            InvalidInput: there is no such file, or it is something else, or of another structure;
-                or nothing tells the roles of the parts.
+            InvalidInput: there is no such file, or it is damaged, something else, or of another
+                structure; or nothing tells the roles of the parts.
         """
-        if not Path(path).is_file():
-            raise InvalidInput(f"there is no history file {path}")
-        try:
-            with xr.open_dataset(path, engine="netcdf4") as opened:
-                dataset = opened.load()
-        except OSError as error:
-            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
-        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        dataset = read_dataset(path, "history file")
+        missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
         names = dataset["name"].values.astype(str).tolist()
@@ -273,6 +266,14 @@ class History(Shown, picture="joints.draw_joints"):
             raise InvalidInput(
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        if structure is not None and dataset.attrs.get("structure") not in (
+            None,
+            structure.fingerprint,
+        ):
+            raise InvalidInput(
+                f"{path} is of another structure: its joints have the names of those of "
+                f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
             )
         if structure is not None:
             roles = [joint.role for joint in structure.joints]

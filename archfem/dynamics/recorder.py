@@ -208,6 +208,7 @@ class Recorder:
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,
+            "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
             "energy_drift": self.guard.worst,

@@ -1,5 +1,6 @@
 """What stands and what touches: the joints between blocks, and the structure that both form."""
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -106,12 +107,12 @@ class Structure(Shown, picture="structure.draw_structure"):
         check_fields(self)
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
-        if not 0.0 < real(self.width, "width [m]") < 1e4:
+        if not 1e-3 <= real(self.width, "width [m]") < 1e4:
             raise InvalidStructure(
-                f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
+                f"width {self.width:.3g} m is not between 1 mm and 10 km: give metres"
             )
-        if not 0.0 < real(self.gravity, "gravity [m/s²]") < 1e3:
-            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
+        if not 0.1 <= real(self.gravity, "gravity [m/s²]") < 1e3:
+            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]
             twice = sorted({name for name in names if names.count(name) > 1})
@@ -128,6 +129,14 @@ class Structure(Shown, picture="structure.draw_structure"):
         """Diagonal of the box around all blocks [m]."""
         points = np.concatenate([block.drawn() for block in self.blocks])
         return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """What tells its geometry from any other, to a billionth of its size."""
+        points = [*(block.points for block in self.blocks), *(joint.ends for joint in self.joints)]
+        places = np.round(np.concatenate(points) / self.size, 9) + 0.0  # of -0.0 too 0.0
+        told = f"{self.size:.9g} {self.width:.9g} {[len(each) for each in points]}"
+        return hashlib.sha256(told.encode() + places.tobytes()).hexdigest()[:16]
 
     @cached_property
     def normals(self) -> Array:

@@ -46,8 +46,8 @@ class Motion(Shown, picture="motions.draw_motion"):
     transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (is_number(self.dt) and self.dt > 0.0):
-            raise InvalidInput(f"dt {said(self.dt)} s: samples are a positive number apart")
+        if not (is_number(self.dt) and self.dt >= 1e-6):
+            raise InvalidInput(f"dt {said(self.dt)} s: samples are at least 1e-6 s apart")
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)

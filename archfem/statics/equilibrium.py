@@ -22,6 +22,7 @@ from archfem.models.unfinished import Unfinished
 from archfem.shown import Shown
 from archfem.statics.newton import Newton, Solver
 from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
+from archfem.threads import on_one_thread
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
@@ -56,6 +57,11 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
             raise InvalidInput(
                 f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
                 f"points, the model {model.size} and {len(model.memory)}: give the same model's"
+            )
+        if model.structure.fingerprint != self.model.structure.fingerprint:
+            raise InvalidInput(
+                f"the state is of another structure, '{self.model.structure.name}', whose blocks "
+                f"are elsewhere than those of '{model.structure.name}': give the same model's"
             )
         built = self.model.built if isinstance(self.model, Jointed) else None
         if built is not None and isinstance(model, Jointed):
@@ -100,6 +106,7 @@ def self_weight(model: Model) -> Array:
     return model.load(BodyForce(0.0, -1.0))
 
 
+@on_one_thread
 def dead_load(
     model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
 ) -> Equilibrium:

@@ -18,6 +18,7 @@ from archfem.shown import Shown
 from archfem.statics import dense_eigen
 from archfem.statics.equilibrium import Equilibrium
 from archfem.tables import aligned
+from archfem.threads import on_one_thread
 
 SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""
@@ -78,6 +79,7 @@ class Modes(Shown, picture="modes.draw_modes"):
         return aligned(head, rows)
 
 
+@on_one_thread
 def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     """Find the lowest modes of small vibrations about a state, K φ = ω² M φ.
 

@@ -18,6 +18,7 @@ from archfem.shown import Shown
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
+from archfem.threads import on_one_thread
 
 Path = LoadPath | SupportPath
 
@@ -113,6 +114,7 @@ class Pushover(Shown, picture="pushover.draw_pushover"):
         return one_joint(self.joints, joint)
 
 
+@on_one_thread
 def pushover(
     model: Model,
     load: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],

@@ -3,6 +3,7 @@
 import sys
 from importlib import metadata
 
+from archfem import packages
 from archfem.commands import doctor
 from archfem.commands.line import main
 
@@ -22,10 +23,12 @@ def test_all_is_well_ends_with_zero(monkeypatch, capsys):
 
 def test_what_is_missing_is_told_with_its_remedy(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "archfem.models.fem", None)
+    monkeypatch.setattr(packages, "DISPLAYS", ("libNone.so",))
+    monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(metadata, "requires", lambda name: ["numpy>=99.1", "nonesuch>=1", "a; b"])
     assert main(["doctor"]) == 1
     told = capsys.readouterr()
-    for remedy in ("apt-get install python3-dolfinx", "numpy>=99.1"):
+    for remedy in ("apt-get install python3-dolfinx", "apt-get install libegl1", "numpy>=99.1"):
         assert remedy in told.out
     assert "nonesuch" in told.err
     assert "FEniCSx" in told.err

@@ -192,7 +192,7 @@ import archfem as af
 for name in af.view.__all__:
     if not name.startswith(("film", "picture")):
         getattr(af.view, name)
-print(*({"imageio", "imageio_ffmpeg"} & set(sys.modules)))
+print(*({"pyvista", "imageio", "vtk"} & set(sys.modules)))
 """
     ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert ran.stdout.split() == []
