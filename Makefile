@@ -18,7 +18,7 @@ DEBIAN13 := /var/tmp/archfem-debian13
 # A worker a core, and whoever is done takes over from others.
 SPREAD := -n auto --dist worksteal
 
-.PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz lint clean
+.PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz mutants lint clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -53,6 +53,9 @@ test-debian13:  ## the default tests in a Debian 13 made for them (root, deboots
 
 hard: .venv/compiled  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard
+
+fuzz: .venv/compiled  ## odd input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
+	cd tests && ../$(PYTHON) -m fuzz --seed $(or $(SEED),0) $(if $(COUNT),--count $(COUNT))
 
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
 	$(PYTHON) tests/benchmarks/run.py

@@ -31,6 +31,18 @@ class StudyStopped(ArchfemError):
     """A study that could not go on; what was finished is kept: make good what is said, go on."""
 
 
+class DiskFull(ArchfemError, OSError):
+    """A file for which there is no room: make room, or give another folder, and run again.
+
+    Attributes:
+        errno: as the system has it.
+    """
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.errno = code
+
+
 class NotInstalled(ArchfemError, ImportError):
     """A package that is asked for and not there: get it as said, or ask for what needs it not."""
 

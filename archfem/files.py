@@ -1,5 +1,6 @@
 """Files read with care and written in one stroke, and compiled code that is out of date."""
 
+import errno
 import os
 import stat
 from collections.abc import Iterator
@@ -8,7 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from archfem.arguments import said
-from archfem.errors import InvalidInput
+from archfem.errors import DiskFull, InvalidInput
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What goes wrong where there is no room for a file."""
 
 LARGEST = 2**28
 """Most bytes that are read of a file unless told otherwise: a record of 10⁷ samples has fewer."""
@@ -96,6 +100,10 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
 
     Yields:
         Path of the draft, in the same folder and with the same suffix.
+
+    Raises:
+        DiskFull: there is no room for it.
+        OSError: anything else is wrong with it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
@@ -104,6 +112,12 @@ def in_one_stroke(path: Path) -> Iterator[Path]:
         with draft.open("rb+") as written:
             os.fsync(written.fileno())
         os.replace(draft, path)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise DiskFull(
+            error.errno, f"{path} could not be written, for the disk is full: make room there"
+        ) from error
     finally:
         draft.unlink(missing_ok=True)
 

@@ -13,8 +13,8 @@ import pytest
 import archfem
 
 ROOT = Path(archfem.__file__).parent
-GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "tables", "_petsc"}
-GROUND |= {"packages", "compiled"}
+GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "netcdf", "tables"}
+GROUND |= {"threads", "packages", "compiled", "shown", "_petsc"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}
@@ -38,6 +38,7 @@ ONLY_IN = {
     "pint": "units",
     "shapely": "masonry",
     "ezdxf": "masonry",
+    "netCDF4": "netcdf",
     "tomllib": ("cases", "studies"),
     "tomli_w": "cases",
     "argparse": "commands",

@@ -5,7 +5,7 @@ import importlib
 import pytest
 from fuzz.trial import BAD
 
-COUNTS = {"case_files": 40, "records": 200, "calls": 300}
+COUNTS = {"case_files": 25, "records": 100, "calls": 150}
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

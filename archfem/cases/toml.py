@@ -20,7 +20,7 @@ WHOLE = 2**63
 
 _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}}")
-_DEEP_VALUE = re.compile(rf"(?:[\[{{][\s]*+){{{DEEPEST}}}")
+_DEEP_VALUE = re.compile(rf"(?:[\[{{]\s*+(?:{_PART}\s*+=\s*+)?+){{{DEEPEST}}}")
 
 
 def tables_in(path: Path, what: str) -> dict[str, Any]:

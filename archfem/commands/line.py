@@ -3,16 +3,26 @@
 import argparse
 import logging
 import os
+import resource
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
+from io import TextIOWrapper
 
-from archfem.errors import ArchfemError
+from archfem.errors import ArchfemError, InvalidInput
 
 Command = Callable[[argparse.Namespace], int | None]
 
 INTERRUPTED = 130
 """What a shell expects of a command that Ctrl-C has ended."""
+
+LEAST_MEMORY = 3 * 2**29
+"""Address space that a run of a small ring takes, libraries included [bytes]."""
+
+TERMINATED = 143
+"""What it expects of one that was asked to end by SIGTERM."""
 
 DOUBTFUL = 3
 """What a command ends with whose answer is in doubt."""
@@ -21,7 +31,7 @@ CODES = f"""\
 exit codes: 0, an answer; 1, an error in words, no answer; 2, the words of the command are not
 understood; {DOUBTFUL}, an answer that is in doubt: summary.txt begins with why (energy that drifts,
 displacements that are not small, a rung that is wrong or errs by more than was asked for); 130,
-ended by Ctrl-C.
+ended by Ctrl-C, and 143, by SIGTERM: what was computed is kept.
 """
 
 
@@ -32,11 +42,53 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words after `archfem`; by default those that the process was given.
 
     Returns:
-        As by `exit_code`; where the words are not understood, the process ends with 2.
+        As by `exit_code`, or 143 where SIGTERM has ended the command; where the words are not
+        understood, the process ends with 2.
     """
     given = _parser().parse_args(arguments)
+    if isinstance(sys.stdout, TextIOWrapper):  # each line when it is known, also into a pipe
+        sys.stdout.reconfigure(line_buffering=True)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
-    return exit_code(lambda: given.command(given))
+    with _asked_to_end() as asked:
+        code = exit_code(lambda: _carried_out(given))
+    return TERMINATED if asked and code == INTERRUPTED else code
+
+
+def _carried_out(given: argparse.Namespace) -> int | None:
+    """Carry out a command, where there is room for it."""
+    _check_memory()
+    code: int | None = given.command(given)
+    return code
+
+
+@contextmanager
+def _asked_to_end() -> Iterator[list[int]]:
+    """Let SIGTERM end what goes on as Ctrl-C does; the signals that have come."""
+    came: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _check_memory() -> None:
+    """Refuse a limit on memory under which libraries crash or wait for ever as they are loaded.
+
+    Raises:
+        InvalidInput: the limit is below what they take.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < LEAST_MEMORY:
+        raise InvalidInput(
+            f"memory is limited to {limit / 2**30:.2f} GiB, and libraries alone take "
+            f"{LEAST_MEMORY / 2**30:.2f} GiB: raise the limit (ulimit -v)"
+        )
 
 
 def exit_code(command: Callable[[], int | None]) -> int:

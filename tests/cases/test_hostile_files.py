@@ -52,7 +52,7 @@ def read(path, text):
 def test_what_nobody_means_is_refused_at_once(tmp_path, text, says):
     (tmp_path / "base.toml").write_text(COLUMN)
     begun = time.process_time()
-    with pytest.raises(af.InvalidInput, match=says) as caught:
+    with pytest.raises(af.ArchfemError, match=says) as caught:
         read(tmp_path / "case.toml", text)
     assert time.process_time() - begun < SOON
     assert len(str(caught.value)) < 5000
@@ -81,11 +81,11 @@ def test_devices_pipes_and_folders_are_no_files(tmp_path, read):
             read(path)
 
 
-def test_counts_beyond_the_room_are_refused_before_they_take_any(monkeypatch):
+def test_counts_beyond_the_room_are_refused_before_they_take_any():
     ring = af.circular_arch(radius=3, thickness=0.5, embrace=90, voussoirs=5)
-    with pytest.raises(af.errors.MeshError, match="a mesh of 5e.06 cells, and there is room for"):
+    with pytest.raises(af.errors.MeshError, match=r"a mesh of 5e.06 cells, and there is room"):
         af.build(ring, cells=(1000, 1000))
-    with pytest.raises(af.InvalidInput, match="makes 1e.12, and there is room for 10000000"):
+    with pytest.raises(af.InvalidInput, match=r"makes 1e.12, and there is room for 10000000"):
         af.Motion.synthetic(duration=1e9, dt=1e-3)
     with pytest.raises(af.InvalidInput, match="there is room for 10000000"):
         af.Motion.synthetic(duration=1.0).resampled(1e-12)

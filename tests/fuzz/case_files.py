@@ -193,8 +193,8 @@ def checked(path: Path) -> str | None:
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         cases.check(argparse.Namespace(case=str(path), changes=[]))
-    if "ready" not in said.getvalue():
-        return "nothing is said of being ready"
+    if "dead load in" not in said.getvalue():
+        return "nothing is said of the dead load"
     found = re.search(r"^.*\b(nan|inf)\b.*$", said.getvalue(), re.MULTILINE)
     return found and found[0]
 

@@ -4,9 +4,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from benchmarks.mutated_records import SAMPLES, damaged
 
 from archfem.motion.records.read import read_channels
+from fuzz.damaged_records import SAMPLES, damaged
 from fuzz.trial import Came, judged
 
 FASTEST = 1e-4

@@ -154,6 +154,8 @@ def test_vertical_comes_from_another_motion(shaking):
     level = af.Motion(sine(), 0.01)
     assert level.with_vertical(af.Motion(sine()[:50], 0.01)).vertical == pytest.approx(sine()[:50])
     assert level.with_vertical(level).with_vertical(None).components == ("horizontal",)
+    whole = af.Motion(sine(), 0.01, 0.5 * sine())
+    assert level.with_vertical(whole).vertical == pytest.approx(0.5 * sine())
     with pytest.raises(af.errors.InvalidInput, match=r"step of 0\.005 s"):
         level.with_vertical(shaking)
 

@@ -9,7 +9,7 @@ import pytest
 import archfem as af
 from archfem.motion.records.read import read_channels, read_components
 
-DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "mutated_records.py"))
+DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
