@@ -105,6 +105,7 @@ def test_tables_of_joints(run, tmp_path, suffix, read, needs):
     assert set(one["part"]) == {"arch"}
 
 
+@pytest.mark.slow
 def test_a_fall_is_followed_to_the_ground(tmp_path):
     """After blocks come loose, points move as the rigid bodies of the record do."""
     column = af.column(breadth=0.5, heights=[1.0, 1.0])
