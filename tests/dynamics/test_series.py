@@ -14,7 +14,8 @@ def shaken(fidelity, **options):
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=3, chords=1)
     model = af.build(ring, fidelity=fidelity, cells=(2, 1), **options)
     motion = af.Motion.synthetic(duration=0.5, pga=4.0, seed=1)
-    return model, af.time_history(model, motion, dt=0.01, record=af.Record(fields_every=10))
+    record = af.Record(fields_every=10)
+    return model, af.time_history(model, motion, dt=0.01, record=record, method="snes")
 
 
 @pytest.fixture(scope="module", params=["rigid", "full"])
