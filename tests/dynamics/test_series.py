@@ -1,13 +1,14 @@
 """Runs as files, read back by programs that are not ours."""
 
-import h5py
-import meshio
 import numpy as np
 import pandas as pd
 import pytest
-import pyvista
 
 import archfem as af
+
+h5py = pytest.importorskip("h5py")
+meshio = pytest.importorskip("meshio")
+pyvista = pytest.importorskip("pyvista")
 
 
 def shaken(fidelity, **options):
