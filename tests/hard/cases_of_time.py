@@ -54,9 +54,9 @@ def _upright():
 
 
 def rocking(scheme, dt):
-    """It stands upright when it should, within a tenth of a step; then 20 s of impacts, 27 periods at first.
+    """It stands upright when it should, to a tenth of a step; then come 20 s of impacts.
 
-    Its energy over these is kept, or its loss is warned of, or the run is refused.
+    Energy over these is kept, or its loss is warned of, or the run is refused.
     """
     block = glued(af.column(breadth=0.6, heights=[2.4]))
     model = af.build(block, fidelity="rigid", cells=(16, 1))

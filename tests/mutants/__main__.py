@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 from mutants.changes import changes
@@ -39,6 +40,8 @@ def main() -> None:
         shutil.copy(ROOT / "pyproject.toml", place)
         for _ in range(given.count):
             path = rng.choice(modules)
+            for tests in _tests_of(Path(place), path):
+                _check(Path(place), tests)
             line, words, text = rng.choice(changes((ROOT / path).read_text(encoding="utf-8")))
             (Path(place) / path).write_text(text, encoding="utf-8")
             came = "killed" if _noticed(Path(place), path) else "SURVIVED"
@@ -63,11 +66,23 @@ def _modules() -> list[Path]:
     ]
 
 
+def _tests_of(place: Path, path: Path) -> list[Path]:
+    """Tests that should notice: first those named after the module, then those of its room."""
+    room = Path("tests") / path.parts[1]
+    own = room / f"test_{path.stem}.py"
+    return [own, room] if (place / own).exists() else [room]
+
+
 def _noticed(place: Path, path: Path) -> bool:
-    """Whether a test of the room fails: first those named after the module, then the others."""
-    tests = Path("tests") / path.parts[1]
-    own = tests / f"test_{path.stem}.py"
-    return ((place / own).exists() and not _passes(place, own)) or not _passes(place, tests)
+    """Whether a test fails that passes on what is not changed."""
+    return any(not _passes(place, tests) for tests in _tests_of(place, path))
+
+
+@cache
+def _check(place: Path, tests: Path) -> None:
+    """See that tests pass before anything is changed: else they would notice whatever is."""
+    if not _passes(place, tests):
+        raise SystemExit(f"{tests} does not pass as it is")
 
 
 def _passes(place: Path, tests: Path) -> bool:
