@@ -74,7 +74,7 @@ notebooks: .venv/docs .venv/compiled  ## run the notebooks, and keep what they s
 	$(PYTHON) docs/execute.py
 
 verification: .venv/compiled  ## the table of what tests verify, for the documentation
-	$(PYTHON) -m pytest $(SPREAD) -m "" --verified docs/verification.json
+	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json
 
 .venv/docs: .venv/ready
 	$(PIP) -e '.[dev,docs,notebooks]'

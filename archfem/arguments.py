@@ -112,6 +112,22 @@ def reals(value: Any, name: str, count: int | None = None) -> tuple[float, ...]:
     return tuple(real(each, f"{name}[{k}]") for k, each in enumerate(values))
 
 
+def unmasked(value: Any, name: str) -> None:
+    """Refuse arrays of which something is masked: under the mask is what nobody means.
+
+    Args:
+        value: what was given.
+        name: what to call it in an error.
+
+    Raises:
+        InvalidInput: something is masked.
+    """
+    if np.ma.is_masked(value):
+        raise InvalidInput(
+            f"{name} has {np.ma.count_masked(value)} values masked: fill them in, or leave them out"
+        )
+
+
 def row(value: Any, name: str, count: int | None = None) -> tuple[Any, ...]:
     """Return a row of values, whatever they are.
 

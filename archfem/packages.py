@@ -40,7 +40,7 @@ NEEDS = {
         "meshes, and all models but those of fidelity = 'rigid' (--set model.fidelity=rigid),",
         FROM,
     ),
-    "PETSc": Need("options of PETSc", "it comes with FEniCSx, " + FROM),
+    "PETSc": Need("its solvers", "it comes with FEniCSx, " + FROM),
     "SLEPc": Need("modes of large models", "it comes with FEniCSx, " + FROM),
     "EGL": Need("films", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"),
     "gmsh": Need(
@@ -71,7 +71,7 @@ def needed(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except (ImportError, OSError) as error:
+    except Exception as error:  # a NumPy it was not built for, a library it lacks: all fail apart
         raise NotInstalled(lacking(name, str(error))) from error
 
 
@@ -83,7 +83,7 @@ def lacking(name: str, why: str) -> str:
         why: it is missed.
     """
     need = NEEDS[name]
-    return f"{name} is missing for {sys.executable} ({why}); {need.what} need it: {need.get}"
+    return f"{name} cannot be loaded by {sys.executable} ({why}); {need.what} need it: {need.get}"
 
 
 def check_drawing() -> None:

@@ -38,7 +38,7 @@ HIGHEST = 12
 """Highest power that a unit has, all those in a quantity multiplied."""
 
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
-
+_RAISED = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
 
 _DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
 """Degrees as most write them, read without the registry of units."""
@@ -112,7 +112,7 @@ def _check_text(text: str, unit: str, key: str) -> None:
             f"in {unit}"
         )
     powers = [found[1] for found in _POWER.finditer(text)]
-    if None in powers or prod(int(power) for power in powers) > HIGHEST:
+    if _RAISED.search(text) or None in powers or prod(int(power) for power in powers) > HIGHEST:
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 

@@ -14,7 +14,7 @@ import archfem
 
 ROOT = Path(archfem.__file__).parent
 GROUND = {"errors", "arguments", "annotated", "arrays", "units", "files", "netcdf", "tables"}
-GROUND |= {"threads", "packages", "compiled", "_petsc"}
+GROUND |= {"threads", "packages", "compiled", "shown", "_petsc"}
 ROOMS = ["motion", "masonry", "joints", "limit", "models", "statics", "dynamics", "view", "cases"]
 ROOMS += ["studies", "commands"]
 ENTRANCES = {"__init__", "__main__", "_promised"}

@@ -1,5 +1,6 @@
 """The README and the pages of the documentation: code runs, and what they name is there."""
 
+import json
 import re
 from functools import reduce
 from pathlib import Path
@@ -60,8 +61,8 @@ def test_pages_run_and_print_what_follows(page, tmp_path, monkeypatch, capsys):
 
 def test_commands_are_targets_of_the_makefile():
     targets = (ROOT / "Makefile").read_text(encoding="utf-8")
-    found = set(re.findall(r"`make ([a-z-]+)", WORDS)) | set(
-        re.findall(r"^make (\w+)", WORDS, re.M)
+    found = set(re.findall(r"`make ([a-z0-9-]+)", WORDS)) | set(
+        re.findall(r"^make ([\w-]+)", WORDS, re.M)
     )
     assert {"demo", "test", "docs", "notebooks", "verification"} <= found
     for command in found:
@@ -77,13 +78,25 @@ def test_commands_are_those_of_the_command_line(capsys):
     with pytest.raises(SystemExit):
         af.commands.main(["--help"])
     known = capsys.readouterr().out
-    for command in set(re.findall(r"^(?:archfem|`archfem) (\w+)", WORDS, re.MULTILINE)):
-        assert command in known
+    shell = "\n".join(re.findall(r"```sh\n(.*?)```", WORDS, re.DOTALL))
+    found = re.findall(r"^archfem (\w+)", shell, re.MULTILINE) + re.findall(
+        r"`archfem (\w+)", WORDS
+    )
+    assert {"run", "study", "motion"} <= set(found)
+    for command in set(found):
+        assert f" {command} " in known, command
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", WORDS))))
 def test_names_in_the_text_are_there(name):
-    reduce(getattr, name.split("."), af)
+    """By their lists: to load what draws films takes its time."""
+    *places, last = name.split(".")
+    assert last in dir(reduce(getattr, places, af))
+
+
+def test_the_table_of_verification_names_tests_that_tell():
+    for row in json.loads((ROOT / "docs" / "verification.json").read_text(encoding="utf-8")):
+        assert "verified(" in (ROOT / row["test"]).read_text(encoding="utf-8")
 
 
 def test_links_of_the_readme_lead_somewhere():

@@ -9,11 +9,13 @@
     stepping    damping and scheme of [analysis]
     case        one analysis as one value, read from a TOML file
     run         carry out a case; go on where an earlier run ended
+    kept        histories that an earlier command left, where they still answer
     summary     tables and sentences of what was found
     report      tables and pictures, into a folder
     told        warnings that name case and motion
     inputs      what an answer hangs on besides: the files a case reads, the program
     shipped     the cases that archfem brings
+    reportable  results that have a report and a player
     folders     result folders opened again
     dossier     the report of a case, one page to hand in and to print
 

@@ -22,6 +22,7 @@ from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
 from archfem.cases.structures import planned
 from archfem.cases.toml import tables_in
 from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
+from archfem.dynamics.time_history import LEAST_STEP
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -41,6 +42,7 @@ MODEL = {
     "points": int,
     "tolerance": "1",
     "displacements": str,
+    "file": str,
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
@@ -190,8 +192,8 @@ class Case:
                 "built in stages; leave out one of both"
             )
         step = self.analysis.get("dt", 0.005)
-        if not 0.0 < step <= 0.1:
-            raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
+        if not LEAST_STEP <= step <= 0.1:
+            raise InvalidInput(f"analysis.dt = {step:g} s is not between {LEAST_STEP:g} and 0.1 s")
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
 
@@ -209,7 +211,11 @@ class Case:
     def discretisation(self) -> Discretisation:
         """What the structure is modelled by; its mesh does not count where "auto" is to choose."""
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
-        return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
+        told = {key: self.model[key] for key in self.model if key not in idle}
+        if "file" in told and self.chooses:
+            raise InvalidInput("model.file is one mesh, and fidelity = 'auto' chooses: name a rung")
+        told |= {key: self.folder / told[key] for key in ("file",) if key in told}
+        return Discretisation(**told)
 
     @property
     def tolerance(self) -> float:
@@ -256,12 +262,7 @@ class Case:
         return ground.ground_suite(self.suite, self.folder)
 
     def check_ground(self) -> None:
-        """Refuse motions that cannot be read, before anything is computed to be shaken by them.
-
-        Raises:
-            InvalidInput: a file is missing or no record; or horizontal and vertical do not go
-                together.
-        """
+        """Refuse motions that cannot be read, before anything is computed (`InvalidInput`)."""
         if self.motion is not None:
             self.ground_motion()
         if self.suite is not None:

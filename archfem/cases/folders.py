@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from archfem.cases.case import Case
 from archfem.cases.inputs import input_files
-from archfem.cases.run import HISTORY
+from archfem.cases.kept import HISTORY
+from archfem.cases.reportable import Reportable
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput
 
 if TYPE_CHECKING:
-    from archfem.view.pages.player import Player
+    from archfem.cases.dossier.results import Results
 
 CASE, REPORT, STUDY = "case.toml", "report.html", "study.json"
 """Names of the case's file, which `archfem run` leaves in its folder, of a report, and of what
@@ -21,7 +22,7 @@ tells that a folder is of a study."""
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class Opened(Reportable):
     """A folder that `archfem run` left, opened again.
 
     Attributes:
@@ -36,38 +37,22 @@ class Opened:
     runs: Mapping[str, History]
     missing: tuple[str, ...] = ()
 
+    def results(self) -> "Results":
+        """Return what its report is written from."""
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+
+        return Results(self.case, self.runs, self.folder, self.missing)
+
     def report(self, path: str | Path | None = None) -> Path:
         """Write a report of all that the folder holds: one HTML file, to hand in and to print.
 
         Args:
-            path: the file; by default report.html in the folder.
+            path: the file, .html; by default report.html in the folder.
 
         Returns:
             The file.
         """
-        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
-        from archfem.cases.dossier.writing import write_report
-
-        results = Results(self.case, self.runs, self.folder, self.missing)
-        return write_report(results, self.folder / REPORT if path is None else path)
-
-    def player(self, run: str | None = None) -> "Player":
-        """Return the player of a run, which shows itself in a notebook.
-
-        Args:
-            run: its name; needed where there are several.
-
-        Raises:
-            InvalidInput: there is no run, or none of that name, or several and none is named.
-        """
-        from archfem.cases.dossier.display import player_of
-
-        if run is None and len(self.runs) == 1:
-            (run,) = self.runs
-        if run not in self.runs:
-            asked = "no name is given" if run is None else f"there is no run '{run}'"
-            raise InvalidInput(f"{self.folder}: {asked}: name one of {list(self.runs)}")
-        return player_of(self.case, self.runs[run], self.case.title)
+        return super().report(self.folder / REPORT if path is None else path)
 
 
 def opened(folder: str | Path, *, inputs: str | Path | None = None) -> Opened:

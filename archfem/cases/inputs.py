@@ -21,7 +21,7 @@ LETTERS = 12
 
 
 def input_files(settings: Table, folder: Path = Path()) -> list[Path]:
-    """Return the records and drawings that the tables of a case name, there or not.
+    """Return the records, drawings and meshes that the tables of a case name, there or not.
 
     Args:
         settings: the tables by name.
@@ -32,7 +32,8 @@ def input_files(settings: Table, folder: Path = Path()) -> list[Path]:
     own = folder / str(suite.get("folder", ""))
     for pair in _table(suite.get("pairs")).values():
         records += [own / name for name in _named(pair)]
-    drawings = [folder / str(structure["file"])] if "file" in structure else []
+    shapes = (structure, _table(settings.get("model")))
+    drawings = [folder / str(table["file"]) for table in shapes if "file" in table]
     return [*drawings, *records]
 
 

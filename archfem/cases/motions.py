@@ -76,7 +76,13 @@ def motion_settings(given: Any, section: str = "motion") -> dict[str, Any]:
     """
     settings = _source_settings(given, MOTION, section)
     if isinstance(settings.get("vertical"), dict):
-        settings["vertical"] = _source_settings(settings["vertical"], SOURCE, f"{section}.vertical")
+        upright = _source_settings(settings["vertical"], SOURCE, f"{section}.vertical")
+        if "vertical_ratio" in upright.get("synthetic", {}):
+            raise InvalidInput(
+                f"{section}.vertical.synthetic.vertical_ratio: a vertical has none, its pga is its "
+                "own peak"
+            )
+        settings["vertical"] = upright
     return settings
 
 
@@ -96,7 +102,7 @@ def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion
     motion = motion if step is None else motion.resampled(step)
     if "vertical" in settings:
         upright = settings["vertical"]
-        other = _from_source({"file": upright} if isinstance(upright, str) else upright, folder)
+        other = _upright({"file": upright} if isinstance(upright, str) else upright, folder)
         other = other if step is None else other.resampled(step)
         if abs(other.dt - motion.dt) > 1e-6 * motion.dt:
             raise InvalidInput(
@@ -219,6 +225,13 @@ def _source_settings(given: Any, keys: Table, section: str) -> dict[str, Any]:
     if sources == ["samples"] and "dt" not in settings:
         raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
     return settings
+
+
+def _upright(settings: Table, folder: Path) -> Motion:
+    """A vertical, read or made: what is asked of one that is made is asked of its vertical."""
+    if "synthetic" not in settings:
+        return _from_source(settings, folder)
+    return Motion.synthetic(**settings["synthetic"], vertical_ratio=1.0)
 
 
 def _from_source(settings: Table, folder: Path) -> Motion:

@@ -91,7 +91,7 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     """
     case, run, dead = done.case, done.history, rest.dead
     tilt = abs(judged(run.joints)["eccentricity"])
-    chosen = case.joints or telling_joints(case.structure, run)
+    chosen = case.joints or telling_joints(run)
     figures = {
         "gravest.png": draw_during(dead.model, run, _gravest(run, tilt)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),

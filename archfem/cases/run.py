@@ -7,11 +7,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
 from archfem.cases.inputs import inputs_digest
+from archfem.cases.kept import HISTORY, finished
+from archfem.cases.reportable import Reportable
 from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
@@ -19,26 +20,21 @@ from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.dynamics.time_history import Record, time_history
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge
 from archfem.limit.collapse import Collapse
 from archfem.models.build import build
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.plausible import dead_load_doubts
 from archfem.statics.strength import strength_use
 
 if TYPE_CHECKING:
-    from archfem.view.pages.player import Player
-
-HISTORY = "history.nc"
-"""Name of a history's file."""
+    from archfem.cases.dossier.results import Results
 
 FRAMES = 10
 """Steps between two fields that are kept for an animation, unless the case says otherwise."""
-
-SAME = 1e-6
-"""Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
 
 Shake = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 """Runs a motion of a case from its dead load, with damping, as `shaken` does."""
@@ -78,13 +74,18 @@ class Rest:
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
 
     @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the dead load doubtful, its model's rung included, a sentence each."""
+        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, self.case.criteria.friction))
+
+    @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
         """Damping of the runs, and in words how it was found, as by `damping_of`."""
         return damping_of(self.case, self.dead)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Reportable):
     """A case under one motion.
 
     Attributes:
@@ -105,26 +106,12 @@ class Run:
     seconds: float = 0.0
     error: DidNotConverge | None = None
 
-    def report(self, path: str | Path) -> Path:
-        """Write a report of the run: one HTML file, to hand in and to print.
-
-        Args:
-            path: the file, .html; folders are made.
-
-        Returns:
-            The file.
-        """
+    def results(self) -> "Results":
+        """Return what its report is written from."""
         from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
-        from archfem.cases.dossier.writing import write_report
 
         folder = None if self.path is None else self.path.parent
-        return write_report(Results(self.case, {self.motion.name: self.history}, folder), path)
-
-    def player(self) -> "Player":
-        """Return the player of the run, which shows itself in a notebook."""
-        from archfem.cases.dossier.display import player_of
-
-        return player_of(self.case, self.history, self.case.title)
+        return Results(self.case, {self.motion.name: self.history}, folder)
 
 
 Result = Collapse | Rest | Suite | Run
@@ -300,31 +287,6 @@ def shaken(
     return run
 
 
-def finished(path: Path, case: Case, motion: Motion) -> History | None:
-    """Return what an earlier run left, where it ended by itself, of the same case and motion.
-
-    The files that the case reads, and archfem itself, must be those of then, to the letter.
-
-    Args:
-        path: file of the history.
-        case: to compare with the one in the file.
-        motion: to compare with the ground motion in the file.
-
-    Returns:
-        The history; None where there is none, or one that broke off, or of another case or motion.
-    """
-    try:
-        run = History.read(path, case.structure)
-        whole = run.ended.by_itself
-    except InvalidInput:
-        return None
-    told = run.dataset.attrs
-    if not whole or told.get("inputs") != inputs_digest(case.settings, case.folder):
-        return None
-    before, now = run.dataset["ground"].values, motion.at(run.time)
-    return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
-
-
 def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> Run:
     """Run a pair, or take what an earlier command left of it."""
     case = rest.case.alone(motion.name)
@@ -344,6 +306,8 @@ def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake
     except DidNotConverge as error:
         history, failure = history_of(error), error
     seconds = perf_counter() - start
+    doubts = dict.fromkeys((*rest.doubts, *history.doubts))
+    history.dataset.attrs["doubts"] = "\n".join(doubts)
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)

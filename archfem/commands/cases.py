@@ -18,11 +18,14 @@ from archfem.motion.suite import Suite
 from archfem.statics.strength import use_sentence
 
 
-def check(given: argparse.Namespace) -> None:
+def check(given: argparse.Namespace) -> int:
     """Read a case, do its limit analysis, find its dead load, read its motions.
 
     Args:
         given: `case`, a file, and `changes` to it.
+
+    Returns:
+        `DOUBTFUL` where it cannot be meant to rest as it does, else 0.
     """
     from archfem.cases.summary import collapse_words
 
@@ -38,7 +41,9 @@ def check(given: argparse.Namespace) -> None:
     elif case.motion is not None:
         motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, peak {motion.pga:.3f} m/s²")
-    print(f"{given.case}: ready; dead load in {rest.dead.iterations} iterations")
+    ready = f"in doubt, {len(rest.doubts)} times, as above" if rest.doubts else "ready"
+    print(f"{given.case}: {ready}; dead load in {rest.dead.iterations} iterations")
+    return DOUBTFUL if rest.doubts else 0
 
 
 def motion(given: argparse.Namespace) -> None:
@@ -199,7 +204,7 @@ def tell(case: Case, results: Iterable[Result], folder: Path) -> bool:
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _tell_pairs(suite, runs, rest, folder)
-    return any(run.doubts for run in runs.values())
+    return bool(rest.doubts) or any(run.doubts for run in runs.values())
 
 
 def _tell_run(done: Run, rest: Rest) -> None:
@@ -278,6 +283,8 @@ def _tell_rest(rest: Rest) -> None:
     )
     if rest.use is not None:
         print(f"dead load: {use_sentence(rest.use)}")
+    for words in rest.doubts:
+        print(f"in doubt: {words}")
 
 
 def _tell_motions(suite: Suite) -> None:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from io import TextIOWrapper
 
 from archfem.errors import ArchfemError, InvalidInput
 
@@ -45,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         understood, the process ends with 2.
     """
     given = _parser().parse_args(arguments)
+    if isinstance(sys.stdout, TextIOWrapper):  # each line when it is known, also into a pipe
+        sys.stdout.reconfigure(line_buffering=True)
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     with _asked_to_end() as asked:
         code = exit_code(lambda: _carried_out(given))

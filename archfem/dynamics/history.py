@@ -10,8 +10,10 @@ import xarray as xr
 
 from archfem.annotated import as_annotated
 from archfem.arrays import Array
+from archfem.dynamics.corners import displacement_of
+from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
-from archfem.dynamics.sentences import extremes, mechanism_lines
+from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.duration import step_lengths
@@ -24,6 +26,7 @@ from archfem.limit.verified import (
 )
 from archfem.masonry.structure import Structure
 from archfem.netcdf import read_dataset, write_dataset
+from archfem.shown import Shown
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -55,8 +58,8 @@ class Ending(StrEnum):
         return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+@dataclass(frozen=True, eq=False, repr=False)
+class History(Exports, Shown, picture="joints.draw_joints"):
     """The record of one run.
 
     Attributes:
@@ -78,6 +81,11 @@ class History:
         """
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
         return self.dataset[names]
+
+    @property
+    def displacement(self) -> xr.DataArray:
+        """Displacements of corners of the blocks, as by `displacement_of` (time, point, xy) [m]."""
+        return displacement_of(self.dataset)
 
     @property
     def criteria(self) -> Criteria:
@@ -208,6 +216,10 @@ class History:
         return self.judged_by(replace(self.criteria, duration=0.0))._first
 
     @as_annotated
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return in_a_line(self.dataset)
+
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.
 
@@ -254,6 +266,14 @@ class History:
             raise InvalidInput(
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        if structure is not None and dataset.attrs.get("structure") not in (
+            None,
+            structure.fingerprint,
+        ):
+            raise InvalidInput(
+                f"{path} is of another structure: its joints have the names of those of "
+                f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
             )
         if structure is not None:
             roles = [joint.role for joint in structure.joints]

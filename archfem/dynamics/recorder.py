@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem.arrays import Array
+from archfem.dynamics.corners import corner_displacements
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import SIGNS, Ending, History
 from archfem.dynamics.steps import Batch, State
@@ -207,6 +208,7 @@ class Recorder:
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,
+            "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
             "energy_drift": self.guard.worst,
@@ -239,6 +241,7 @@ class Recorder:
         if frames := self._fields.count:
             dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
             dataset["q"] = ("frame", "coordinate"), self._fields.values
+            dataset.update(corner_displacements(self.model, self._fields.values))
         for name in ("q", "velocity", "acceleration"):
             dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
         if self.state.memory is not None:

@@ -90,8 +90,10 @@ class StiffnessDamping:
         """Refuse negative damping, a frequency that is none and unknown words."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if real(self.frequency, "damping frequency [Hz]") <= 0.0:
-            raise InvalidInput(f"damping frequency {self.frequency} Hz is not above 0: try 8.0")
+        if not 1e-3 <= real(self.frequency, "damping frequency [Hz]") <= 1e6:
+            raise InvalidInput(
+                f"damping frequency {self.frequency} Hz is not between 1 mHz and 1 MHz: try 8.0"
+            )
 
     @property
     def stiffness(self) -> float:

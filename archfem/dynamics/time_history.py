@@ -39,6 +39,9 @@ from archfem.threads import on_one_thread
 
 logger = logging.getLogger("archfem")
 
+LEAST_STEP = 1e-6
+"""Shortest time step that can be meant [s]: a second has a million of them."""
+
 STEP = 0.005
 """Time step by which strategies are compared where steps have lengths of their own [s]."""
 
@@ -156,6 +159,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)
         start = equation.at_rest(rest.q, memory=rest.model.memory)
+    start.check(model)
     stepper = stepper_for(method, equation, start, dt or STEP, newton)
     first = _first(stepper, start, dt or STEP)
     recorder = _recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
@@ -205,8 +209,8 @@ def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[flo
         return model.prediction.dt, model.prediction.pace or TOLERANCE
     if dt is None:
         return None, TOLERANCE
-    if not 0.0 < real(dt, "dt [s]") <= 0.1:
-        raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
+    if not LEAST_STEP <= real(dt, "dt [s]") <= 0.1:
+        raise InvalidInput(f"dt {dt!r} s is not between {LEAST_STEP:g} and 0.1 s")
     return dt, TOLERANCE
 
 
@@ -305,5 +309,7 @@ def last_state(history: History) -> State:
         name for name in ("q", "velocity", "acceleration", "memory") if f"last_{name}" in dataset
     ]
     return State(
-        float(dataset.attrs["last_time"]), *(dataset[f"last_{name}"].values for name in names)
+        float(dataset.attrs["last_time"]),
+        *(dataset[f"last_{name}"].values for name in names),
+        structure=dataset.attrs.get("structure"),
     )

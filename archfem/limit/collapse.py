@@ -17,6 +17,7 @@ from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
 from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.structure import Structure
+from archfem.shown import Shown
 
 logger = logging.getLogger("archfem")
 
@@ -50,8 +51,8 @@ _SENTENCES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Collapse:
+@dataclass(frozen=True, eq=False, repr=False)
+class Collapse(Shown, picture="collapse.draw_found"):
     """What limit analysis found.
 
     Attributes:
@@ -71,6 +72,7 @@ class Collapse:
             and the most that it can be [Pa], with the number of the block, the piece's ends and the
             sense of the pressure along x; else None.
         live: the actions that grew, or the settlement that was followed.
+        structure: that was asked about; None where it is not known.
     """
 
     factor: float
@@ -82,6 +84,7 @@ class Collapse:
     solutions: WithoutDilatancy | None = None
     soil: xr.Dataset | None = None
     live: tuple[BodyForce | PointLoad | Settlement, ...] = ()
+    structure: Structure | None = None
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
@@ -92,6 +95,10 @@ class Collapse:
     def sliding_names(self) -> tuple[str, ...]:
         """Names of the joints that slide, in the order of `sliding`."""
         return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return f"Collapse: {self}"
 
     def __str__(self) -> str:
         """Outcome, factor and failing joints, by number and name, in one line."""
@@ -171,7 +178,7 @@ def collapse_factor(
     """
     asked = (live,) if isinstance(live, Settlement) else tuple(loads(live))
     weighed = self_weight(structure, friction, strength, fill)
-    return replace(_found(structure, weighed, live, friction), live=asked)
+    return replace(_found(structure, weighed, live, friction), live=asked, structure=structure)
 
 
 def _found(

@@ -5,6 +5,7 @@ All of it is linear in the coordinates: readings are D q + d.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, cast
 from weakref import WeakKeyDictionary
 
@@ -16,6 +17,7 @@ from archfem.joints.faces import face_matrix
 from archfem.joints.operator import JointOperator
 from archfem.models.model import Model
 from archfem.models.moving import Moving
+from archfem.models.turning_places import TurningCells
 
 _made: WeakKeyDictionary[Model, "Gauges"] = WeakKeyDictionary()
 
@@ -143,14 +145,15 @@ class MovedGauges(Readings):
         Args:
             q: coordinates (n,).
         """
-        gap, slip, turn = self.model.measures(q).T
-        cells, blocks = self.model.cells, len(self.model.structure.blocks)
-        moved = cells.displacement(q)
-        count = np.maximum(np.bincount(cells.block, minlength=blocks), 1)
-        middles = [np.bincount(cells.block, column, blocks) / count for column in moved.T]
-        return np.concatenate(
-            [gap, 2.0 * np.arcsin(0.5 * turn), slip, np.column_stack(middles).ravel()]
-        )
+        found: Array = self.over(q[None])[0]
+        return found
+
+    @cached_property
+    def _middles(self) -> TurningCells:
+        """The blocks as points."""
+        cells = self.model.cells
+        assert isinstance(cells, TurningCells)
+        return cells.middles(len(self.model.structure.blocks))
 
     def over(self, states: Array) -> Array:
         """Return the readings of many states (steps, r).
@@ -158,4 +161,6 @@ class MovedGauges(Readings):
         Args:
             states: coordinates (steps, n).
         """
-        return np.array([self.read(q) for q in states])
+        gap, slip, turn = np.moveaxis(self.model.measures(states), -1, 0)
+        middles = self._middles.displacement(states).reshape(len(states), -1)
+        return np.concatenate([gap, 2.0 * np.arcsin(0.5 * turn), slip, middles], axis=1)

@@ -228,13 +228,13 @@ class Moving:
         return self._at(q).resultants
 
     def measures(self, q: Array) -> Array:
-        """Return opening at mid-depth, slip and turn of every joint (n_joints, 3) [m, m, -].
+        """Return opening at mid-depth, slip and turn of every joint (…, n_joints, 3) [m, m, -].
 
         Args:
-            q: coordinates (n,).
+            q: coordinates of one state or of many (…, n).
         """
-        found: Array = all_measures(self.joints, _plain(q))
-        return found
+        found: Array = all_measures(self.joints, _plain(np.atleast_2d(q)))
+        return found.reshape(*q.shape[:-1], *found.shape[1:])
 
     def mismatch(self, q: Array) -> tuple[float, str]:
         """Return how far faces have slid past the facets they are paired by, and at which joint.

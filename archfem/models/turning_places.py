@@ -48,34 +48,38 @@ class TurningCells(Cells):
             arms[own] = np.column_stack([motion[own, 1], -motion[own, 0]])
         rigid = np.zeros(self.lift.shape[1], bool)
         rigid[np.concatenate([turn, turn - 1, turn - 2])] = True
-        return arms, self.lift @ sparse.diags((~rigid).astype(float))
+        elastic = (self.lift @ sparse.diags((~rigid).astype(float))).tocsr()
+        elastic.eliminate_zeros()
+        return arms, elastic
 
-    def displacement(self, q: Array) -> Array:
-        """Return the displacement of every point (m, 2) [m].
+    def middles(self, blocks: int) -> "TurningCells":
+        """Return one point for each block, which moves as its points do on the mean.
 
         Args:
-            q: coordinates (n,).
+            blocks: their number.
+        """
+        share = 1.0 / np.bincount(self.block)[self.block]
+        place = (self.block, np.arange(len(share)))
+        mean = sparse.csr_matrix((share, place), (blocks, len(share)))
+        turns = np.full(blocks, -1)
+        turns[self.block] = self.turns
+        lift = (sparse.kron(mean, sparse.identity(2)) @ self.lift).tocsr()
+        return TurningCells(mean @ self.places, np.arange(blocks), (), lift, None, turns)
+
+    def displacement(self, q: Array) -> Array:
+        """Return the displacement of every point (…, m, 2) [m].
+
+        Args:
+            q: coordinates of one state or of many (…, n).
         """
         arms, elastic = self._about
         framed = self.turns >= 0
-        turn = np.where(framed, q[self.turns], 0.0)
-        shift = np.where(framed, [q[self.turns - 2], q[self.turns - 1]], 0.0)
-        strained = (elastic @ q).reshape(-1, 2)
+        turn, x, y = (np.where(framed, q[..., self.turns - k], 0.0) for k in (0, 2, 1))
+        strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
+        u, v, (rx, ry) = strained[..., 0], strained[..., 1], arms.T
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
-        return np.column_stack(
-            [
-                shift[0]
-                + less * arms[:, 0]
-                - s * arms[:, 1]
-                + c * strained[:, 0]
-                - s * strained[:, 1],
-                shift[1]
-                + s * arms[:, 0]
-                + less * arms[:, 1]
-                + s * strained[:, 0]
-                + c * strained[:, 1],
-            ]
-        )
+        across = x + less * rx - s * ry + c * u - s * v
+        return np.stack([across, y + s * rx + less * ry + s * u + c * v], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

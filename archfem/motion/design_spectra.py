@@ -6,10 +6,12 @@ from typing import Protocol
 import numpy as np
 
 from archfem.annotated import check_fields
-from archfem.arguments import real, said
+from archfem.arguments import real, said, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion.oscillator import check
+
+LARGEST = 10.0  # spectral acceleration that no code gives [g]: more can only be a wrong unit
 
 
 class DesignSpectrum(Protocol):
@@ -81,8 +83,9 @@ class Tbec2018:
     def __post_init__(self) -> None:
         real(self.ss, "map value S_S [g]")
         real(self.s1, "map value S_1 [g]")
-        if not (0.0 < self.ss < np.inf and 0.0 < self.s1 < np.inf):
-            raise InvalidInput(f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are > 0")
+        if not (0.0 < self.ss <= LARGEST and 0.0 < self.s1 <= LARGEST):
+            told = f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are between 0 and"
+            raise InvalidInput(f"{told} {LARGEST:g} g")
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
@@ -178,8 +181,10 @@ class Eurocode8:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if not real(self.ag, "design ground acceleration [g]") > 0.0:
-            raise InvalidInput(f"design ground acceleration {self.ag!r} g: expected more than 0")
+        if not 0.0 < real(self.ag, "design ground acceleration [g]") <= LARGEST:
+            raise InvalidInput(
+                f"design ground acceleration {self.ag!r} g is not in 0 to {LARGEST:g}"
+            )
         check_fields(self)
         if self.type not in _GROUND or self.ground not in _GROUND[1]:
             raise InvalidInput(
@@ -238,6 +243,7 @@ class TableSpectrum:
     vertical_values: Array | None = None
 
     def __post_init__(self) -> None:
+        unmasked(self.periods, "periods of a spectrum table")
         periods = np.asarray(self.periods, dtype=float)
         object.__setattr__(self, "periods", periods)
         grows = periods.ndim == 1 and len(periods) > 1 and bool(np.all(np.diff(periods) > 0.0))
@@ -246,11 +252,14 @@ class TableSpectrum:
         for name in ("values", "vertical_values"):
             if getattr(self, name) is None and name == "vertical_values":
                 continue
+            unmasked(getattr(self, name), f"{name} of a spectrum table")
             row = np.asarray(getattr(self, name), dtype=float)
             if row.shape != periods.shape or not np.all((row > 0.0) & np.isfinite(row)):
                 raise InvalidInput(
                     f"{name} of a spectrum table: expected {len(periods)} positive values in g"
                 )
+            if row.max() > LARGEST:
+                raise InvalidInput(f"{name} reach {row.max():.3g} g, more than {LARGEST:g} g")
             object.__setattr__(self, name, row)
 
     def horizontal(self, periods: float | Array) -> Array:

@@ -15,14 +15,15 @@ from archfem.errors import InvalidInput
 from archfem.motion import signals
 from archfem.motion.records.read import read_components
 from archfem.motion.synthetic import accelerogram
+from archfem.shown import Shown
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = "horizontal", "vertical", "transverse"
 
 
 @methods_as_annotated
-@dataclass(frozen=True, eq=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Shown, picture="motions.draw_motion"):
     """The acceleration of the ground in up to three directions, which begin together.
 
     Components keep their own lengths, zero before and after; what changes one returns a new motion.
@@ -45,13 +46,17 @@ class Motion:
     transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (is_number(self.dt) and self.dt > 0.0):
-            raise InvalidInput(f"dt {said(self.dt)} s: samples are a positive number apart")
+        if not (is_number(self.dt) and self.dt >= 1e-6):
+            raise InvalidInput(f"dt {said(self.dt)} s: samples are at least 1e-6 s apart")
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
                 object.__setattr__(self, component, signals.checked(samples, component))
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return f"Motion '{self.name}': {self.duration:.4g} s, peak {self.pga:.3g} m/s²"
 
     @classmethod
     def read(
@@ -179,12 +184,9 @@ class Motion:
         Args:
             times: of any shape (n in all) [s]; straight between samples, zero outside the record.
         """
-        moments = np.asarray(times, dtype=float).ravel()
-        both = np.zeros((len(moments), 2))
-        for axis, name in enumerate(COMPONENTS[:2]):
-            if name in self.components:
-                both[:, axis] = signals.between(self.component(name), moments / self.dt)
-        return both
+        moments, up = np.asarray(times, dtype=float).ravel() / self.dt, self.vertical
+        rows = self.horizontal, np.zeros(1) if up is None else up
+        return np.column_stack([signals.between(row, moments) for row in rows])
 
     def scaled(self, factor: float) -> "Motion":
         """Return the motion with all components multiplied by a factor.
@@ -302,9 +304,8 @@ class Motion:
         if other is None:
             return replace(self, vertical=None)
         self._check_step(other)
-        return replace(
-            self, vertical=other.horizontal if other.vertical is None else other.vertical
-        )
+        up = other.horizontal if other.vertical is None else other.vertical
+        return replace(self, vertical=up)
 
     def with_transverse(self, other: "Motion") -> "Motion":
         """Return the motion with the horizontal of another one as its transverse.
@@ -320,9 +321,7 @@ class Motion:
 
     def _check_step(self, other: "Motion") -> None:
         if not np.isclose(other.dt, self.dt, rtol=1e-6):
-            steps = (
-                f"{other.name!r} has a step of {other.dt:g} s and {self.name!r} of {self.dt:g} s"
-            )
+            steps = f"step of {other.name!r} {other.dt:g} s, of {self.name!r} {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
     def _each(self, change: Callable[[Array], Array]) -> "Motion":

@@ -4,7 +4,7 @@ import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import integrate
 
-from archfem.arguments import pieces
+from archfem.arguments import pieces, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
@@ -26,6 +26,7 @@ def checked(samples: Array | None, component: str) -> Array:
     Raises:
         InvalidInput: it is not one row of finite numbers, or exceeds 5 g.
     """
+    unmasked(samples, f"{component} acceleration")
     try:
         row = np.array(samples, dtype=float)
     except (TypeError, ValueError) as error:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.arguments import instance, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import oscillator
@@ -44,6 +44,7 @@ def response_spectrum(
         3.0
     """
     instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    unmasked(periods, "periods [s]")
     try:
         natural = np.asarray(periods, dtype=float)
     except (TypeError, ValueError) as error:

@@ -9,6 +9,7 @@
     relaxation   a structure creeps to rest where Newton's method fails
     search       the next equilibrium, from the last one
     equilibrium  dead load and other loads that stay
+    plausible    whether friction can hold what a dead load asks of it
     path         paths of equilibrium under a load that grows
     support_path the same under the dead load, over a support that moves
     pushover     a load grows until hardly anything resists

@@ -10,6 +10,7 @@ import xarray as xr
 from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import judged
 from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce
 from archfem.masonry.stages import Stage, placed
@@ -18,6 +19,7 @@ from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
 from archfem.models.unfinished import Unfinished
+from archfem.shown import Shown
 from archfem.statics.newton import Newton, Solver
 from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
 from archfem.threads import on_one_thread
@@ -26,8 +28,8 @@ SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Shown, picture="dead.draw_dead_load"):
     """A structure at rest.
 
     Attributes:
@@ -56,6 +58,11 @@ class Equilibrium:
                 f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
                 f"points, the model {model.size} and {len(model.memory)}: give the same model's"
             )
+        if model.structure.fingerprint != self.model.structure.fingerprint:
+            raise InvalidInput(
+                f"the state is of another structure, '{self.model.structure.name}', whose blocks "
+                f"are elsewhere than those of '{model.structure.name}': give the same model's"
+            )
         built = self.model.built if isinstance(self.model, Jointed) else None
         if built is not None and isinstance(model, Jointed):
             model = model.begun(built)
@@ -68,6 +75,15 @@ class Equilibrium:
         faces = gauges.faces(gauges.read(self.q))
         resultants, moved = self.model.resultants(self.q), isinstance(self.model, Moving)
         return joint_dataset(self.model.structure, resultants, faces=faces, moved=moved)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        own, model = judged(self.joints), self.model
+        return (
+            f"Equilibrium of '{model.structure.name}' ({model.fidelity}, {model.size} coordinates)"
+            f": |e| ≤ {float(abs(own['eccentricity']).max()):.3f}, "
+            f"V/N ≤ {float(own['friction'].max()):.3f}, N ≥ {float(own['N'].min()) / 1e3:.3g} kN"
+        )
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint carries.

@@ -14,6 +14,7 @@ from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model, check_model
 from archfem.packages import needed
+from archfem.shown import Shown
 from archfem.statics import dense_eigen
 from archfem.statics.equilibrium import Equilibrium
 from archfem.tables import aligned
@@ -23,8 +24,8 @@ SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(Shown, picture="modes.draw_modes"):
     """The lowest modes of a model.
 
     Attributes:
@@ -38,6 +39,14 @@ class Modes:
     frequencies: Array
     shapes: Array
     masses: Array
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        share, low, high = self.mass_ratios.sum(axis=0), *self.frequencies[[0, -1]]
+        return (
+            f"Modes of '{self.model.structure.name}': {len(self.frequencies)} from {low:.2f} to "
+            f"{high:.2f} Hz, with {share[0]:.0%} of the mass along x and {share[1]:.0%} along y"
+        )
 
     @property
     def periods(self) -> Array:

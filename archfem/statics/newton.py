@@ -22,6 +22,10 @@ from archfem.statics.superlu import SuperLU
 ROUGHLY = 1e-7
 """Residual, relative to the load, above which round-off is no excuse."""
 
+HOLLOW = 1e-3
+"""Rounding of forces, relative to the load, that must not be taken for equilibrium. Of stones that
+are displaced by a metre it is below 1e-5."""
+
 SEARCHES = {"basic": 12, "cp": 60}
 """Line searches in the order tried, and the iterations each may take; more than a dozen full
 steps are a cycle of statuses."""
@@ -85,6 +89,7 @@ class Solver:
         self.settings = settings or Newton()
         self._engine: Engine = _engine(size, self.settings)
         self._scale = 1.0
+        self._stiffest = 0.0
 
     def solve(
         self,
@@ -117,8 +122,11 @@ class Solver:
             iterations += found.iterations
             if not found.failure:
                 return Solved(found.q, iterations, found.rest)
+        failure = found.failure
+        if found.rest <= self.settings.tolerance * scale:
+            failure = f"nothing but rounding holds it, displaced by {abs(found.q).max():.1e}"
         raise DidNotConverge(
-            f"no equilibrium after {iterations} iterations: {found.failure}, residual "
+            f"no equilibrium after {iterations} iterations: {failure}, residual "
             f"{found.rest:.2e} against a load of {scale:.2e}"
         )
 
@@ -126,8 +134,11 @@ class Solver:
         """Return whether a residual is within the tolerance, or nothing but round-off.
 
         Large rigid motions of stiff blocks leave a residual of the order of the rounding of
-        tangent times displacement, below which no iteration can go.
+        tangent times displacement, below which no iteration can go. Where that is of the order of
+        the load, a block has gone so far that what is left of its stiffness by rounding holds it.
         """
+        if 8.0 * np.finfo(float).eps * self._stiffest * abs(q).max() > HOLLOW * self._scale:
+            return False
         if rest <= self.settings.tolerance * self._scale:
             return True
         if rest > ROUGHLY * self._scale:
@@ -136,22 +147,21 @@ class Solver:
         return bool(rest <= 8.0 * np.finfo(float).eps * rounding)
 
     def _checked(self, tangent: Tangent) -> Tangent:
-        """Refuse methods for symmetric matrices where the tangent is not symmetric."""
+        """Note how stiff tangents are; refuse methods for symmetric ones where one is not."""
         chosen = self.settings.petsc
         asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
-        if not asked:
-            return tangent
 
-        def symmetric(q: Array) -> sparse.csr_matrix:
+        def checked(q: Array) -> sparse.csr_matrix:
             matrix = tangent(q)
-            if abs(matrix - matrix.T).max() > ASYMMETRY * abs(matrix).max():
+            self._stiffest = max(self._stiffest, float(abs(matrix.data).max(initial=0.0)))
+            if asked and abs(matrix - matrix.T).max() > ASYMMETRY * abs(matrix).max():
                 raise InvalidInput(
                     f"petsc = {asked} is for symmetric matrices, and where joints slide the "
                     "tangent is not: leave it out, and each tangent is factorised by LU"
                 )
             return matrix
 
-        return symmetric
+        return checked
 
 
 def _engine(size: int, settings: Newton) -> Engine:

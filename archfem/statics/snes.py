@@ -1,7 +1,8 @@
 """Newton's method by PETSc SNES, with all its options."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import count
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -34,6 +35,7 @@ class Snes:
         self._matrix: PETSc.Mat | None = None
         self._loaded: sparse.csr_matrix | None = None
         self._equations: Equations | None = None
+        self._raised: BaseException | None = None
         self._solution = PETSc.Vec().createSeq(size)
         self._rest = PETSc.Vec().createSeq(size)
         self._searches: dict[str, PETSc.SNES] = {}
@@ -49,6 +51,9 @@ class Snes:
 
         Returns:
             What came of it.
+
+        Raises:
+            Error: of PETSc; errors of the equations are raised as they are.
         """
         self._equations = equations
         if self._matrix is None:
@@ -60,7 +65,13 @@ class Snes:
             self._searches[search] = self._new(search, most)
         snes = self._searches[search]
         self._solution.array[:] = start
-        snes.solve(None, self._solution)
+        self._raised = None
+        try:
+            snes.solve(None, self._solution)
+        except PETSc.Error:
+            if self._raised is not None:  # newer versions put their own error in its place
+                raise self._raised from None
+            raise
         reason, rest = int(snes.getConvergedReason()), snes.getFunctionNorm()
         failure = "" if reason > 0 else _REASONS.get(reason, f"SNES reason {reason}")
         # SNES may report success after a line search broke down at the start: look again.
@@ -92,7 +103,7 @@ class Snes:
         return snes
 
     def _evaluate(self, snes: PETSc.SNES, q: PETSc.Vec, result: PETSc.Vec) -> None:
-        result.array[:] = self._equations.residual(q.array_r)  # type: ignore[union-attr]
+        result.array[:] = self._asked(self._equations.residual, q)  # type: ignore[union-attr]
 
     def _judge(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         reasons = PETSc.SNES.ConvergedReason
@@ -106,8 +117,16 @@ class Snes:
         return self._equations.fits(rest, self._solution.array_r, self._loaded)
 
     def _load(self, snes: PETSc.SNES, q: PETSc.Vec, matrix: PETSc.Mat, _: PETSc.Mat) -> None:
-        tangent = self._equations.tangent(q.array_r)  # type: ignore[union-attr]
+        tangent = self._asked(self._equations.tangent, q)  # type: ignore[union-attr]
         if tangent is not self._loaded:
             matrix.setValuesCSR(tangent.indptr, tangent.indices, tangent.data)
             matrix.assemble()
             self._loaded = tangent
+
+    def _asked(self, function: Callable[[Array], Any], q: PETSc.Vec) -> Any:
+        """What a function says of a vector; an error of its own is kept."""
+        try:
+            return function(q.array_r)
+        except BaseException as error:
+            self._raised = error
+            raise

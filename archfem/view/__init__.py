@@ -22,7 +22,7 @@
     studies    factors at first mechanism, case by case
     incremental  curves of incremental dynamic analysis; fragility
     sensitivity  tornado and convergence
-    films      films and stills: all that knows imageio and its encoder
+    films      films, stills and a viewer: all that knows imageio, its encoder and pyvista
     pages      the player of a run, and documents, for a browser
 
 It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.

@@ -9,6 +9,8 @@ from .falls import draw_fall as draw_fall
 from .films.modes import film_modes as film_modes
 from .films.scenes import film as film
 from .films.scenes import picture as picture
+from .films.viewer import Viewer as Viewer
+from .films.viewer import viewer as viewer
 from .freebody import draw_free_body as draw_free_body
 from .incremental import draw_fragility as draw_fragility
 from .incremental import draw_ida as draw_ida

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.arrays import Array
+from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.rigid_motion import motion_of
@@ -62,6 +63,25 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
     entitle(axes, f"{structure.name}: {_caption(found)}")
     legend(axes)
     return figure
+
+
+def draw_found(found: Collapse) -> Figure:
+    """Draw what was found for the structure that it knows, as by `draw_collapse`.
+
+    Args:
+        found: what limit analysis found.
+
+    Returns:
+        The page.
+
+    Raises:
+        InvalidInput: it does not know its structure.
+    """
+    if found.structure is None:
+        raise InvalidInput(
+            "this result does not know its structure: use draw_collapse(structure, …)"
+        )
+    return draw_collapse(found.structure, found)
 
 
 def draw_capacity(

@@ -1,24 +1,26 @@
 """The dead load in one picture: thrust lines, and what is largest and least in numbers."""
 
+from string import ascii_lowercase
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from archfem.joints.criteria import Criteria, judged
 from archfem.statics.equilibrium import Equilibrium
 from archfem.view.structure import draw_structure
-from archfem.view.style import EDGE, INK, SMALL, entitle, plain
+from archfem.view.style import INK, LETTER, NORMAL, SMALL, SYMBOL, entitle, renew_legend
 
-AWAY = 22.0
-"""Distance of words from the joint that they are about [points]."""
+AWAY = 9.0
+"""Distance of a letter from the joint that it is about [points]."""
 
 
 def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Figure:
     """Draw a structure under its dead load: its thrust lines, and numbers at the joints.
 
-    Numbers stand at those joints of rings and piers that have the largest and the least N, the
-    largest |e| and the largest V / N; in the title stand the weight and the span of N.
+    Letters mark those joints of rings and piers that have the largest and the least N, the largest
+    |e| and the largest V / N; below stand their numbers, and in the title weight and span of N.
 
     Args:
         dead: the equilibrium.
@@ -32,13 +34,12 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
     axes, normal = figure.axes[0], judged(dead.joints)["N"].values / 1e3
     entitle(
         axes,
-        f"{structure.name}: dead load, weight {structure.weight / 1e3:.3g} kN, "
+        f"{structure.name}: dead load, weight {structure.weight / 1e3:.4g} kN, "
         f"N from {normal.min():.3g} to {normal.max():.3g} kN",
     )
-    for number, words in _telling(dead).items():
-        _tell(axes, dead, number, words)
-    axes.margins(0.09, 0.12)
-    plain(figure)
+    for letter, (number, words) in zip(ascii_lowercase, _telling(dead).items(), strict=False):
+        _tell(axes, dead, number, letter=letter, words=words)
+    renew_legend(figure)
     return figure
 
 
@@ -61,15 +62,13 @@ def _telling(dead: Equilibrium) -> dict[int, list[str]]:
     return said
 
 
-def _tell(axes: Axes, dead: Equilibrium, number: int, words: list[str]) -> None:
-    """Write beside a joint, beyond its extrados."""
+def _tell(axes: Axes, dead: Equilibrium, number: int, *, letter: str, words: list[str]) -> None:
+    """Put a letter beside a joint, beyond its extrados, and what it stands for into the legend."""
     joint = dead.model.structure.joints[number]
-    x, y = joint.tangent
-    where = {"ha": "left" if x > 0.3 else "right" if x < -0.3 else "center"}
-    where |= {"va": "bottom" if y > 0.3 else "top" if y < -0.3 else "center"}
     axes.annotate(
-        "\n".join([joint.name, *words]), tuple(joint.ends[1]), (AWAY * x, AWAY * y),
-        textcoords="offset points", fontsize=SMALL, color=INK, zorder=8, annotation_clip=False,
-        arrowprops={"arrowstyle": "-", "color": EDGE, "lw": 0.7, "shrinkA": 0, "shrinkB": 1},
-        path_effects=[withStroke(linewidth=2.0, foreground="white")], **where,
+        letter, tuple(joint.ends[1]), tuple(AWAY * joint.tangent), textcoords="offset points",
+        fontsize=NORMAL, fontweight="bold", color=INK, zorder=8, ha="center", va="center",
     )  # fmt: skip
+    letters = int((axes.figure.get_figwidth() - SYMBOL) / (LETTER * SMALL))
+    label = fill(f"{joint.name}: {', '.join(words)}", letters)
+    axes.plot([], [], ls="", marker=f"${letter}$", color=INK, ms=5, mew=0.4, label=label)

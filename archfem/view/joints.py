@@ -8,7 +8,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, judged, sliding_limits
@@ -29,7 +31,7 @@ TWIN = 1e-6
 the structure."""
 
 
-def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
+def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
     Friction has the sense of the shear force. Lines are interrupted while a joint is open; limits
@@ -37,7 +39,7 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
 
     Args:
         run: what happened.
-        joints: their names, or their numbers.
+        joints: their names, or their numbers; by default the two that tell most.
 
     Returns:
         The page: the ground's motion, and a row for each joint.
@@ -45,6 +47,7 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
     Raises:
         InvalidInput: there is no such joint.
     """
+    joints = telling_joints(run) if joints is None else joints
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
     chosen, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
@@ -137,15 +140,25 @@ def _friction(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
         _note(axes, f"◆ beyond, up to {most:.3g}", (0.0, 0.0), HINGE)
 
 
-def telling_joints(structure: Structure, run: History) -> list[int]:
+def _twins(structure: Structure | None, numbers: Array, first: int) -> NDArray[np.bool_]:
+    """Whether joints of some numbers are mirror images of one of them (n,)."""
+    if structure is None:
+        return np.zeros(len(numbers), dtype=bool)
+    middles, ends = structure.middles[numbers], structure.ends[..., 0]
+    image = np.array([ends.min() + ends.max() - middles[first, 0], middles[first, 1]])
+    found: NDArray[np.bool_] = np.linalg.norm(middles - image, axis=1) < TWIN * structure.size
+    return found
+
+
+def telling_joints(run: History) -> list[int]:
     """Return two joints that tell most of a run: one by where its thrust is, one by its friction.
 
     The first has the largest |e|, or opens; the second slides for the longest time, or else comes
-    nearest to it. It is not the mirror image of the first, which does much the same.
+    nearest to it. It is not the mirror image of the first, which does much the same, where the
+    run knows its structure.
 
     Args:
-        structure: that was shaken.
-        run: of it.
+        run: what happened.
     """
     own = judged(run.joints)
     numbers = own["joint"].values
@@ -154,10 +167,7 @@ def telling_joints(structure: Structure, run: History) -> list[int]:
     use = (own["friction"] / own["friction_limit"]).max("time").fillna(0.0).values
     slid = (own["slide"].transpose("time", "joint").values * step_lengths(run.time)[:, None]).sum(0)
     order = np.lexsort([-tilt, -np.where(np.isfinite(use), use, 0.0), -np.round(slid, 9)])
-    middles = structure.middles[numbers]
-    low, high = structure.ends[..., 0].min(), structure.ends[..., 0].max()
-    image = np.array([low + high - middles[first, 0], middles[first, 1]])
-    twin = np.linalg.norm(middles - image, axis=1) < TWIN * structure.size
+    twin = _twins(run.structure, numbers, first)
     others = [k for k in order if k != first and not twin[k]] or [k for k in order if k != first]
     return [int(numbers[k]) for k in (first, *others[:1])]
 

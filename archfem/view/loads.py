@@ -38,15 +38,16 @@ def draw_loads(
             arrowprops={"arrowstyle": "-|>", "color": LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
         room = [start, tip, start + np.array([0.0, AWAY * structure.size])]
-        axes.plot(*np.array(room).T, lw=0.0, label="_")  # the view has room for it
-        label = "_" if number else "live load"
-        axes.plot([], [], color=LOAD, lw=2.2, marker=">", ms=5, label=label)
+        axes.update_datalim(np.array(room))
+        if not number:
+            axes.plot([], [], color=LOAD, lw=2.2, marker=">", ms=5, label="live load")
         away = (0, 5) if way[1] < 0.5 or abs(way[0]) > 0.5 else (6, 0)
         where = start if way[1] < -0.5 else 0.5 * (start + tip)
         axes.annotate(
             f"{of} {words}".strip(), tuple(where), away, textcoords="offset points", ha="center",
             va="bottom", fontsize=SMALL, color=LOAD, zorder=9,
         )  # fmt: skip
+    axes.autoscale_view()
 
 
 def _arrow(structure: Structure, action: Action) -> tuple[Array, Array, str]:

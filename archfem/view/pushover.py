@@ -22,7 +22,7 @@ NEAR = 0.98
 
 
 def draw_pushover(
-    pushes: Mapping[str, Pushover],
+    pushes: Pushover | Mapping[str, Pushover],
     *,
     limits: Mapping[str, float] | None = None,
     reach: float | None = None,
@@ -34,7 +34,7 @@ def draw_pushover(
     in contact beside it.
 
     Args:
-        pushes: what to call each pushover, and the pushover.
+        pushes: one, or what to call each pushover, and the pushover.
         limits: what to call known limits, and their factors, drawn as dashed lines.
         reach: of the displacement axis [m]; by default where the curves have become flat.
         axes: where to draw; by default a new figure.
@@ -45,6 +45,7 @@ def draw_pushover(
     Raises:
         InvalidInput: there is no pushover, or too many to tell apart.
     """
+    pushes = {"pushover": pushes} if isinstance(pushes, Pushover) else pushes
     if not 1 <= len(pushes) <= len(LINES):
         raise InvalidInput(f"{len(pushes)} pushovers in one picture: give 1 to {len(LINES)}")
     page = Page(figsize=(COLUMN, 3.8), layout="constrained")

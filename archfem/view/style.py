@@ -51,8 +51,11 @@ LONG = 4.0
 LETTER = 0.56 / 72.0
 """Width of a letter, relative to the size of its type in points [inch]."""
 
-ENTRY = 1.35
-"""Room that an entry of a legend takes [inch]."""
+LINE = 0.17
+"""Height of a line of a legend [inch]."""
+
+SYMBOL = 0.6
+"""Room that an entry of a legend takes beside its words [inch]."""
 
 TICK = 0.55
 """Room that the label of a tick takes [inch]."""
@@ -142,11 +145,27 @@ def legend(axes: Axes) -> None:
     """
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
-        fitting = max(1, min(4, int(page.get_figwidth() / ENTRY)))
-        page.legend(loc="outside lower center", ncols=fitting, frameon=False, fontsize=SMALL)
+        labels = axes.get_legend_handles_labels()[1]
+        longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
+        fitting = int(page.get_figwidth() / (SYMBOL + longest * LETTER * SMALL))
+        columns = max(1, min(4, fitting))
+        page.legend(loc="outside lower center", ncols=columns, frameon=False, fontsize=SMALL)
     else:
         axes.legend(frameon=False, fontsize=SMALL)
     plain(page)
+
+
+def renew_legend(page: Figure) -> None:
+    """Explain anew what is labelled, where more was drawn after a page was explained.
+
+    Args:
+        page: with axes that have it to themselves.
+    """
+    for old in page.legends:
+        old.remove()
+    legend(page.axes[0])
+    lines = sum(1 + text.get_text().count("\n") for text in page.legends[0].get_texts())
+    page.set_figheight(page.get_figheight() + LINE * (lines - 1))
 
 
 def canvas(structure: Structure) -> Figure:

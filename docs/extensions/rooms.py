@@ -116,7 +116,7 @@ def write_pages(folder: Path) -> None:
         lines += table(sorted(values, key=lambda name: (name.count("."), name.lower())))
         told = inspect.getdoc(importlib.import_module(f"archfem.{room}")) or ""
         modules = [line for line in told.splitlines() if line.startswith("    ")]
-        lines += [*title("Its modules", "-"), "::", "", *modules, ""]
+        lines += [*title("Its modules", "-"), ".. code-block:: text", "", *modules, ""]
         keep(folder / f"{room}.rst", lines)
     for name, says in PLAIN.items():
         module = f"archfem.{name}"
@@ -141,7 +141,7 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
         if not blank and indent < inside:
             inside = 0
         if not blank and not section and not inside and indent >= outer + 4 and not before.strip():
-            told += [" " * outer + "::", ""]
+            told += [" " * outer + ".. code-block:: text", ""]
             inside = indent
         if not blank and not inside:
             outer = indent
@@ -175,8 +175,8 @@ def without_types(lines: list[str]) -> list[str]:
 
 
 def escaped(line: str) -> str:
-    """A line in which bars, stars and final underscores are just that, outside of backticks."""
-    parts = re.split(r"(``[^`]*``|`[^`]*`)", line)
+    """A line in which bars, stars and final underscores are just that, but around *words*."""
+    parts = re.split(r"(``[^`]*``|`[^`]*`|(?<!\S)\*[^\W\d][\w ]*\*)", line)
     for k in range(0, len(parts), 2):
         parts[k] = re.sub(r"([|*]|_(?!\w))", r"\\\1", parts[k])
     return "".join(parts)

@@ -76,7 +76,7 @@ def test_pairs_that_lack_and_cases_that_differ_are_said(kept):
     found = af.cases.opened(kept)
     assert (list(found.runs), found.missing) == (["first"], ("second",))
     assert found.player().scene.run is found.runs["first"]
-    with pytest.raises(af.InvalidInput, match=r"no run 'third': name one of \['first'\]"):
+    with pytest.raises(af.InvalidInput, match=r"no run 'third': there are \['first'\]"):
         found.player("third")
     assert found.report() == kept / "report.html"
     words = " ".join(read_page((kept / "report.html").read_text(encoding="utf-8")).words)

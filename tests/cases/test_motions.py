@@ -106,6 +106,20 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
         ground_suite(suite_settings({"pairs": {"one": given}}), tmp_path)
 
 
+def test_a_vertical_that_is_made_has_the_peak_that_is_asked_for():
+    """It used to be the vertical of a motion whose horizontal had that peak: two thirds of it."""
+    level = {"seed": 1, "pga": 1.0, "duration": 2.0}
+    upright = {"synthetic": {"seed": 2, "pga": 2.0, "duration": 2.0}}
+    asked = motion_settings({"synthetic": level, "vertical": upright})
+    made = ground_motion(asked)
+    assert abs(made.vertical).max() == pytest.approx(2.0, rel=1e-12)
+    assert made.pga == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(af.InvalidInput, match="vertical_ratio: a vertical has none"):
+        motion_settings(
+            {"synthetic": level, "vertical": {"synthetic": {"seed": 2, "vertical_ratio": 0.5}}}
+        )
+
+
 @pytest.mark.parametrize(
     ("target", "period", "value"),
     [

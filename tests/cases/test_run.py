@@ -8,6 +8,7 @@ import pytest
 import archfem as af
 from archfem.cases import inputs
 from archfem.cases import run as analysis
+from archfem.cases.kept import finished
 
 
 def names(results):
@@ -84,7 +85,7 @@ def test_a_step_that_fails_ends_its_run_only(small, tmp_path):
     assert second.error is None
     alone = case.alone("first")
     assert af.History.read(first.path).ended is af.dynamics.Ending.FAILED
-    assert analysis.finished(first.path, alone, alone.ground_suite().motions[0]) is None
+    assert finished(first.path, alone, alone.ground_suite().motions[0]) is None
 
     def never_begun(*_):
         raise af.DidNotConverge("no equilibrium")
@@ -101,10 +102,10 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
     (motion,) = case.ground_suite().motions
     shaken = analysis.shaken(case, motion, analysis.at_rest(case))
     path = shaken.save(tmp_path / "history.nc")
-    assert analysis.finished(path, case, motion).outcome == shaken.outcome
-    assert analysis.finished(path, case, motion.scaled(1.01)) is None
+    assert finished(path, case, motion).outcome == shaken.outcome
+    assert finished(path, case, motion.scaled(1.01)) is None
     at2(tmp_path / "level.AT2", [0.0, 0.06, -0.06, 0.0], 0.01)
-    assert analysis.finished(path, case, motion) is None  # before it asks what the ground does
+    assert finished(path, case, motion) is None  # before it asks what the ground does
 
 
 @pytest.mark.parametrize("what", ["drawing", "program"])

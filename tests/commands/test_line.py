@@ -68,7 +68,7 @@ def test_a_missing_record_is_told_before_anything_is_computed(tmp_path, capsys):
     for command in (["check"], ["run", "--out", str(tmp_path / "out")]):
         assert main([command[0], str(tmp_path / "case.toml"), *command[1:]]) == 1
         out, error = capsys.readouterr()
-        assert "cannot read the record" in error
+        assert "there is no record" in error
         assert "dead load" not in out
 
 

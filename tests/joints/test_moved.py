@@ -6,7 +6,7 @@ import pytest
 from archfem.joints.moving import frames
 from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
 from archfem.joints.moving.overlap import Faces
-from archfem.joints.moving.poses import Sides, pose, swing
+from archfem.joints.moving.poses import Sides, gather, pose, swing
 
 SEEDS = range(12)
 
@@ -21,22 +21,21 @@ def random_poses(seed):
 
 
 def measured(poses, angle):
-    found = np.empty(3)
-    frames.measures(poses[0], poses[1], angle, found)
-    return found
+    return np.array(frames.measures(tuple(poses[0]), tuple(poses[1]), angle))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
-    ends, rates, now = np.empty((2, 3)), np.empty((3, 4)), np.empty((3, 4))
-    frames.follow(before, after, angle, ends, rates, now)
-    for end, poses in zip(ends, (before, after), strict=True):
-        assert end == pytest.approx(measured(poses, angle), abs=2e-15)
-    lower, higher = after - before
-    moved = np.array([*(higher - lower)[:2], lower[2], higher[2]])
-    assert np.abs(rates @ moved - (ends[1] - ends[0])).max() < 4e-15
+    lower, higher = (tuple(map(tuple, each)) for each in np.stack([before, after], axis=1))
+    start, end, rates, *_ = frames.follow(lower, higher, angle)
+    for found, poses in ((start, before), (end, after)):
+        assert found == pytest.approx(measured(poses, angle), abs=2e-15)
+    low, high = after - before
+    moved = np.array([*(high - low)[:2], low[2], high[2]])
+    for row, change in zip(np.eye(3), np.subtract(end, start), strict=True):
+        assert abs(frames.pushed(rates, tuple(row)) @ moved - change) < 4e-15
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
@@ -171,10 +170,11 @@ def test_the_pose_follows_its_discrete_derivative(seed, turns):
     rng = np.random.default_rng(seed)
     sides = two_joints(3, 0.5, True, rng, fill=not turns).sides
     before, after = rng.normal(size=(2, 12))
-    poses, moves, found = np.empty((2, 2, 3)), np.zeros((2, 2, 3, 6)), np.empty(3)
-    swing(sides, 0, 1, before, after, poses, moves)
-    for row, q in zip(poses[:, 1], (before, after), strict=True):
-        pose(sides, 0, 1, q, found)
-        assert row == pytest.approx(found, abs=4e-15)
-    change = poses[1, 1] - poses[0, 1]
-    assert np.abs(moves[0, 1] @ (after - before)[6:] - change).max() < 1e-14
+    ends, _, (mean, _) = swing(sides, 0, 1, before, after)
+    for found, q in zip(ends, (before, after), strict=True):
+        assert found == pytest.approx(pose(sides, 0, 1, q), abs=4e-15)
+    moves = np.zeros((3, 6))
+    for way, row in zip(np.eye(3), moves, strict=True):
+        gather(sides, 0, 1, mean, tuple(way), row)
+    change = np.subtract(ends[1], ends[0])
+    assert np.abs(moves @ (after - before)[6:] - change).max() < 1e-14

@@ -354,8 +354,5 @@ def test_sides_that_cannot_agree():
 def test_an_outline_that_crosses_itself():
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
     bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
-    with pytest.raises(af.errors.MeshError, match="cannot mesh block 'bow'"):
-        mesh(
-            af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE),
-            af.models.Discretisation(cells=(2, 2)),
-        )
+    with pytest.raises(af.InvalidStructure, match="'bow' crosses or touches itself"):
+        af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE)

@@ -83,3 +83,14 @@ def test_what_only_petsc_and_slepc_can_do_says_how_they_are_had(monkeypatch):
     many = sparse.identity(dense_eigen.MOST + 1, format="csr")
     with pytest.raises(af.errors.NotInstalled, match="conda-forge"):
         dense_eigen.lowest(many, many, 1)
+
+
+@pytest.mark.parametrize("library", ["PETSc", "SciPy"])
+def test_what_only_rounding_holds_is_no_equilibrium(library, request):
+    """A stiff block that flies away, but for a stiffness of the size of rounding: 1e9 m far."""
+    if library == "SciPy":
+        request.getfixturevalue("alone")
+    stiff = sparse.csr_matrix([[1e11, -1e11], [-1e11, 1e11 + 1e-4]])
+    load = np.array([0.0, 1e5])
+    with pytest.raises(af.DidNotConverge, match=r"rounding holds it|singular|iterations"):
+        Solver(2).solve(lambda q: stiff @ q - load, lambda q: stiff, np.zeros(2), 1e5)

@@ -137,6 +137,11 @@ def source_section(results: Results) -> Section:
     )
     rows = [("computed with", words) for words in made]
     rows.append(("report written with", versions()))
+    rows += [
+        (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
+        for name, run in results.runs.items()
+        if "inputs" in run.dataset.attrs
+    ]
     rows.append(("SHA-256 of the case", digest(results.case.text().encode())))
     pieces: list[Any] = [Grid((), rows)]
     pieces += [

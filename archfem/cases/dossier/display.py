@@ -9,7 +9,7 @@ from archfem.models.model import Model
 from archfem.view.pages.player import Player
 from archfem.view.pages.scenes import LARGEST, Scene
 
-LEAST = 400_000
+LEAST = 800_000
 """Size of a player's packed part at least, however many there are [bytes]."""
 
 
@@ -43,7 +43,8 @@ def display_model(case: Case, run: History) -> tuple[Model | None, str]:
     if model.size != run.dataset.sizes["coordinate"]:
         return None, (
             "Stones are drawn where they stand: the run was made with a model of "
-            f"{run.dataset.sizes['coordinate']} coordinates, and its case gives one of {model.size}."
+            f"{run.dataset.sizes['coordinate']} coordinates, and its case gives one of "
+            f"{model.size}."
         )
     return model, ""
 

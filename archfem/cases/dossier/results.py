@@ -73,7 +73,7 @@ def applied(run: History, name: str) -> Motion:
     """
     times, ground = run.time, run.dataset["ground"].values
     dt = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-    even = times[0] + dt * np.arange(int(round((times[-1] - times[0]) / dt)) + 1)
+    even = times[0] + dt * np.arange(round((times[-1] - times[0]) / dt) + 1)
     level, upright = (np.interp(even, times, column) for column in ground.T)
     return Motion(level, dt, upright if upright.any() else None, name)
 

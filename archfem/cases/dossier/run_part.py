@@ -6,7 +6,7 @@ import numpy as np
 
 from archfem.cases.dossier.display import player_of
 from archfem.cases.dossier.results import Results, not_held
-from archfem.cases.summary import joint_rows, pair_rows
+from archfem.cases.summary import LOOSE, joint_rows, pair_rows
 from archfem.dynamics.history import History
 from archfem.joints.criteria import judged
 from archfem.statics.strength import utilisation_sentence
@@ -143,15 +143,20 @@ def facts_of(results: Results) -> list[tuple[str, str]]:
     opened = " (joints came apart)" if open_ones else ""
     alone = results.case.suite is None
     facts += [
-        ("largest ground acceleration", f"{peak:.2f} m/s²"),
+        ("peak of the ground", f"{peak:.2f} m/s²"),
         ("largest |e|", f"{max(map(float, tilts.values())):.3f}{opened}"),
-        ("largest V / N", f"{max(map(float, slips.values())):.3g}"),
+        ("largest V / N", _ratio(max(map(float, slips.values())))),
         ("mechanism by count", _counted(moving, len(runs), alone, runs)),
     ]
     if any(run.fall is not None for run in runs.values()):
         words = next(run.fall.kind for run in runs.values() if run.fall)
         facts.append(("what is left", words if alone else f"{len(fallen)} of {len(runs)} fall"))
     return facts
+
+
+def _ratio(value: float) -> str:
+    """V / N, which says nothing of a joint that is all but open."""
+    return f"{value:.3f}" if value < LOOSE else f"> {LOOSE:g}"
 
 
 def _counted(moving: list[str], count: int, alone: bool, runs: Any) -> str:

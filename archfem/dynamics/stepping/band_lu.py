@@ -4,11 +4,12 @@ Row i of a band of half-width b holds columns i - b … i + 2 b of a matrix: exc
 the right. The matrix need not be symmetric.
 """
 
-import numba
 import numpy as np
 
+from archfem.joints.moving.compiled import computing
 
-@numba.njit(cache=True)
+
+@computing
 def eliminate(band, vector):  # type: ignore
     """Solve a system in place.
 
@@ -43,7 +44,7 @@ def eliminate(band, vector):  # type: ignore
     return True
 
 
-@numba.njit(cache=True)
+@computing
 def _exchange(band, vector, k, half):  # type: ignore
     """Bring the largest entry of a column into row k; returns the row it was in, -1 if none is."""
     size, pivot, largest = len(vector), k, abs(band[k, half])

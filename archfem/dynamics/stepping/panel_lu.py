@@ -8,12 +8,12 @@ onto the coordinates that joints move.
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.elimination import Elimination, Indices
+from archfem.joints.moving.compiled import computing, summing
 
 SMALL = 1e-6
 """Pivot, relative to the rest of its row, below which rows would have to be exchanged."""
@@ -32,7 +32,7 @@ class Panels(NamedTuple):
         targets: which entries its elimination changes further down, row by row.
         changing: groups to eliminate once entries change.
         base: all entries, of other groups eliminated.
-        added: which entry each of those belongs to that are added, -1 to none (k,).
+        added: which entry each rate of the joints belongs to, -1 to none (j, 2, s, 2, s).
     """
 
     first: Indices
@@ -46,7 +46,9 @@ class Panels(NamedTuple):
     added: Indices
 
 
-NO_PANELS = Panels(*(7 * (np.zeros(0, np.int64),)), np.zeros(0), np.zeros(0, np.int64))
+_NONE = np.zeros(0, np.int64)
+
+NO_PANELS = Panels(*(7 * (_NONE,)), np.zeros(0), np.zeros((0, 2, 0, 2, 0), np.int64))
 """Where a band serves."""
 
 
@@ -56,7 +58,8 @@ def panels_of(matrix: sparse.csr_matrix, elimination: Elimination, pairs: Indice
     Args:
         matrix: what of it does not change, in the order of elimination (n, n).
         elimination: of a pattern that has all its entries.
-        pairs: row and column of what is added later, negative where there is nothing (k, 2).
+        pairs: row and column of each rate of the joints, negative where there is none
+            (2, j, 2, s, 2, s).
 
     Raises:
         LinAlgError: what does not change cannot be eliminated without row exchanges.
@@ -69,21 +72,22 @@ def panels_of(matrix: sparse.csr_matrix, elimination: Elimination, pairs: Indice
         np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
     )
     rows = np.concatenate(elimination.rows).astype(np.int64)
-    layout = Panels(first, below, rows, places, updates, *(4 * (rows[:0],)))
+    layout = NO_PANELS._replace(first=first, below=below, rows=rows, places=places, updates=updates)
     targets = [np.broadcast_arrays(own[:, None], own) for own in elimination.rows]
     ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
     entries, base = matrix.tocoo(), np.zeros(places[-1])
     np.add.at(base, _entries(layout, entries.row, entries.col), entries.data)
-    used = pairs[:, 0] >= 0
-    added = np.full(len(pairs), -1)
-    added[used] = _entries(layout, *pairs[used].T)
+    used = pairs[0] >= 0
+    added = np.full(used.shape, -1)
+    added[used] = _entries(layout, *pairs[:, used])
     changes = np.zeros(len(width), bool)
-    changes[elimination.group_of[pairs[used].min(axis=1)]] = True
+    changes[elimination.group_of[pairs[:, used].min(axis=0)]] = True
     for group, parent in enumerate(elimination.parent):
         if changes[group] and parent >= 0:
             changes[parent] = True
     panels = layout._replace(targets=_entries(layout, *ends), added=added, base=base)
-    if not eliminated(panels._replace(changing=np.flatnonzero(~changes)), base):
+    never = panels._replace(changing=np.flatnonzero(~changes))
+    if not eliminated(never, base, np.empty(matrix.shape[0])):
         raise np.linalg.LinAlgError("a fill without joints is not held by its own inertia")
     return panels._replace(changing=np.flatnonzero(changes))
 
@@ -103,52 +107,59 @@ def _entries(panels: Panels, rows: Any, columns: Any) -> Indices:
     return np.asarray(panels.places[group] + np.where(inner | (rows <= columns), upper, lower))
 
 
-@numba.njit(cache=True)
-def renewed(panels, added, entries):  # type: ignore
+@computing
+def renewed(panels, rates, entries, room):  # type: ignore
     """Split the matrix into triangles.
 
     Args:
         panels: `Panels`.
-        added: to its entries (k,).
+        rates: of the joints, which are added (j, 2, s, 2, s).
         entries: filled, as `back` takes them.
+        room: for intermediate results (n,).
 
     Returns:
         Whether no pivot has become small, by which row exchanges would be needed.
     """
-    entries[:] = panels.base
-    for k in range(len(added)):
-        if panels.added[k] >= 0:
-            entries[panels.added[k]] += added[k]
-    return eliminated(panels, entries)
+    for k in range(len(entries)):
+        entries[k] = panels.base[k]
+    added = panels.added
+    for joint in range(added.shape[0]):
+        for side in range(2):
+            for k in range(added.shape[2]):
+                for other in range(2):
+                    for m in range(added.shape[4]):
+                        if added[joint, side, k, other, m] >= 0:
+                            place = added[joint, side, k, other, m]
+                            entries[place] += rates[joint, side, k, other, m]
+    return eliminated(panels, entries, room)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def eliminated(panels, entries):  # type: ignore
-    """Eliminate the groups that change; whether no pivot has become small.
+@computing
+def eliminated(panels, entries, room):  # type: ignore
+    """Eliminate the groups that change.
 
     Args:
         panels: `Panels`.
         entries: of the matrix, then of its triangles.
+        room: for intermediate results (n,).
+
+    Returns:
+        Whether no pivot has become small.
     """
-    first, below = panels.first, panels.below
-    most = 0
     for group in panels.changing:
-        most = max(most, below[group + 1] - below[group])
-    room = np.empty(most)
-    for group in panels.changing:
-        width, count = first[group + 1] - first[group], below[group + 1] - below[group]
-        place, size = panels.places[group], width + count
-        top = entries[place : place + width * size].reshape((width, size))
-        left = entries[place + width * size : place + width * (size + count)]
-        left = left.reshape((width, count))
+        start, end = panels.places[group], panels.places[group + 1]
+        width = panels.first[group + 1] - panels.first[group]
+        count = panels.below[group + 1] - panels.below[group]
+        top = entries[start : start + width * (width + count)].reshape((width, width + count))
+        left = entries[start + width * (width + count) : end].reshape((width, count))
+        targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
         if not _split(top, left):
             return False
-        targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
-        _passed_on(top, left, targets.reshape((count, count)), room[:count], entries)
+        _passed_on(top, left, targets, room, entries)
     return True
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@summing
 def _split(top, left):  # type: ignore
     """Eliminate the columns of a group within its blocks; whether no pivot is small."""
     width, size = top.shape
@@ -175,22 +186,23 @@ def _split(top, left):  # type: ignore
     return True
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@summing
 def _passed_on(top, left, targets, room, entries):  # type: ignore
     """Take what a group's elimination changes from the entries further down."""
     width, count = left.shape
     for i in range(count):
-        room[:] = 0.0
+        for j in range(count):
+            room[j] = 0.0
         for k in range(width):
             factor, row = left[k, i], top[k, width:]
             for j in range(count):
                 room[j] += factor * row[j]
-        own = targets[i]
+        own = targets[i * count : (i + 1) * count]
         for j in range(count):
             entries[own[j]] -= room[j]
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@summing
 def back(panels, entries, vector, room):  # type: ignore
     """Solve a system in place by its triangles.
 
@@ -200,14 +212,22 @@ def back(panels, entries, vector, room):  # type: ignore
         vector: right side, then solution (n,).
         room: for intermediate results (n,).
     """
-    first, below, groups = panels.first, panels.below, len(panels.first) - 1
-    for group in range(groups):
+    _down(panels, entries, vector, room)
+    _up(panels, entries, vector, room)
+
+
+@summing
+def _down(panels, entries, vector, room):  # type: ignore
+    """Solve with the lower triangle."""
+    first, below = panels.first, panels.below
+    for group in range(len(first) - 1):
         start, width = first[group], first[group + 1] - first[group]
         rows = panels.rows[below[group] : below[group + 1]]
         count, place = len(rows), panels.places[group]
         lower = place + width * (width + count)
         total = room[:count]
-        total[:] = 0.0
+        for i in range(count):
+            total[i] = 0.0
         for k in range(width):
             value = vector[start + k]
             for i in range(k + 1, width):
@@ -217,11 +237,18 @@ def back(panels, entries, vector, room):  # type: ignore
                 total[i] += value * column[i]
         for i in range(count):
             vector[rows[i]] -= total[i]
-    for group in range(groups - 1, -1, -1):
+
+
+@summing
+def _up(panels, entries, vector, room):  # type: ignore
+    """Solve with the upper triangle."""
+    first, below = panels.first, panels.below
+    for group in range(len(first) - 2, -1, -1):
         start, width = first[group], first[group + 1] - first[group]
         rows = panels.rows[below[group] : below[group + 1]]
         count, own = len(rows), room[: width + len(rows)]
-        own[:width] = vector[start : start + width]
+        for k in range(width):
+            own[k] = vector[start + k]
         for i in range(count):
             own[width + i] = vector[rows[i]]
         for k in range(width - 1, -1, -1):

@@ -5,13 +5,13 @@
 
 from typing import Any
 
-import numba
 import numpy as np
 from numba.core import types
 from numba.extending import overload
 from scipy import sparse
 
 from archfem.arrays import Array
+from archfem.joints.moving.compiled import inlined
 
 Rows = tuple[Any, Any, Array]
 """A sparse matrix by rows: indptr, indices, data."""
@@ -73,7 +73,7 @@ def stored(matrix: Any) -> Any:
     raise NotImplementedError
 
 
-@numba.njit(cache=True)
+@inlined
 def row_times(matrix, row, vector):  # type: ignore
     """Return one row of a matrix times a vector.
 

@@ -11,7 +11,6 @@ hold and slide in turn, are shortened until they leave less out of balance.
 
 from typing import Any, ClassVar, NamedTuple, Self
 
-import numba
 import numpy as np
 from numba.extending import overload
 from scipy import sparse
@@ -23,9 +22,10 @@ from archfem.dynamics.stepping.elimination import Elimination, Indices
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
-from archfem.dynamics.stepping.sparse_rows import Rows, rows_of, stored, times
+from archfem.dynamics.stepping.sparse_rows import Rows, row_times, rows_of, stored
 from archfem.dynamics.stepping.strategy import Reordered
 from archfem.dynamics.stepping.turning_newton import sought
+from archfem.joints.moving.compiled import computing
 from archfem.joints.moving.moved import Answer, Moved, answer, joint_energy
 from archfem.joints.moving.poses import Sides
 from archfem.models.moving import Moving
@@ -174,12 +174,11 @@ def _narrow(model: Moving) -> Any:
 
 
 def _rates(sides: Sides) -> Indices:
-    """Rows and columns of `Answer.rate`, negative where there is none (k, 2)."""
+    """Rows and columns of `Answer.rate`, negative where there is none (2, j, 2, s, 2, s)."""
     own = np.where(np.arange(sides.index.shape[-1]) < sides.size[:, :, None], sides.index, -1)
     rows, columns = np.broadcast_arrays(own[:, :, :, None, None], own[:, None, None])
-    pairs = np.stack([rows.ravel(), columns.ravel()], axis=-1)
-    pairs[pairs.min(axis=1) < 0] = -1
-    return pairs
+    none = (rows < 0) | (columns < 0)
+    return np.stack([np.where(none, -1, rows), np.where(none, -1, columns)])
 
 
 class Turned(NamedTuple):
@@ -246,49 +245,51 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     (old, new), looks = states, 0
     _load(system, kept, old, ground)
     for whole in WHOLE:
-        kept.move[:] = system.step[0] * old[1]
+        for k in range(len(kept.move)):
+            kept.move[k] = system.step[0] * old[1, k]
         found, done = sought(system, kept, old[0], new[0], whole)
         looks += found
         if done:
-            new[1] = (2.0 / system.step[0]) * kept.move - old[1]
-            new[2] = (new[1] - old[1]) / system.step[0]
+            for k in range(len(kept.move)):
+                new[1, k] = (2.0 / system.step[0]) * kept.move[k] - old[1, k]
+                new[2, k] = (new[1, k] - old[1, k]) / system.step[0]
             return looks
     return -1
 
 
-@numba.njit(cache=True)
+@computing
 def _load(system, kept, old, ground):  # type: ignore
     """Forces that do not depend on the end of the step."""
-    constant, image = kept.constant, kept.image
-    times(system.mass, old[1], image)
+    constant, body, blocks = kept.constant, system.body, stored(system.blocks) > 0
     for k in range(len(constant)):
-        inertia = 2.0 / system.step[0] * image[k]
-        constant[k] = system.weight[k] + inertia
-        constant[k] -= ground[0] * system.body[0, k] + ground[1] * system.body[1, k]
-    if stored(system.blocks) > 0:
-        times(system.blocks, old[0], image)
-        constant -= image
+        inertia = 2.0 / system.step[0] * row_times(system.mass, k, old[1])
+        constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
+        if blocks:
+            constant[k] -= row_times(system.blocks, k, old[0])
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
     """Mean resultants and energies of a step, and what joints remember at its end."""
-    (resultants, energy), room, image = results, system.room, kept.image
-    new, move = states[1], kept.move
-    dt, late = system.step
+    (resultants, energy), room, new = results, system.room, states[1]
     resultants[:] = room.resultants
-    times(system.mass, new[1], image)
-    energy[0] = 0.5 * np.sum(new[1] * image)
-    system.slid[:] = room.slid
-    energy[1] = joint_energy(system.turning, new[0], system.slid) - np.sum(system.weight * new[0])
-    across = ground[0] * system.body[0] + ground[1] * system.body[1]
-    energy[2] = -np.sum(move * across)
-    energy[3] = np.sum(room.lost)
-    if stored(system.blocks) > 0:
-        times(system.blocks, new[0], image)
-        energy[1] += 0.5 * np.sum(new[0] * image)
-        times(system.blocks, move, image)
-        energy[3] += late * np.sum(move * image)
-    if stored(system.viscous) > 0:
-        times(system.viscous, move, image)
-        energy[3] += np.sum(move * image) / dt
+    _energies(system, kept.move, new, ground, energy)
     memory[:] = system.slid[: len(memory)]
+
+
+@computing
+def _energies(system, move, new, ground, energy):  # type: ignore
+    """Find energies of a step; what joints remember from now on is what they do at its end."""
+    (dt, late), room = system.step, system.room
+    energy[0] = energy[1] = energy[2] = energy[3] = 0.0
+    for k in range(len(room.slid)):
+        system.slid[k] = room.slid[k]
+    for k in range(len(room.lost)):
+        energy[3] += room.lost[k]
+    for k in range(len(move)):
+        energy[0] += 0.5 * new[1, k] * row_times(system.mass, k, new[1])
+        energy[1] -= system.weight[k] * new[0, k]
+        energy[2] -= move[k] * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
+        energy[1] += 0.5 * new[0, k] * row_times(system.blocks, k, new[0])
+        energy[3] += late * move[k] * row_times(system.blocks, k, move)
+        energy[3] += move[k] * row_times(system.viscous, k, move) / dt
+    energy[1] += joint_energy(system.turning, new[0], system.slid)

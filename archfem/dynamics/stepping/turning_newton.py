@@ -9,7 +9,8 @@ import numpy as np
 
 from archfem.dynamics.stepping.band_lu import eliminate
 from archfem.dynamics.stepping.panel_lu import back, renewed
-from archfem.dynamics.stepping.sparse_rows import times
+from archfem.dynamics.stepping.sparse_rows import row_times
+from archfem.joints.moving.compiled import computing
 from archfem.joints.moving.moved import pass_joints
 
 TURNS, LOOKS, SHORTEST = 60, 150, 1.0 / 64.0
@@ -33,41 +34,51 @@ def sought(system, kept, before, after, whole):  # type: ignore
     Returns:
         Looks at what is out of balance, and whether the end was found.
     """
-    move, rest, along, (enough, rounded) = kept.move, kept.rest, kept.along, system.enough
+    enough, rounded = system.enough
     last, ahead, looks = np.inf, 0.0, 1
-    after[:] = before + move
     left = _left(system, kept, before, after)
     for turn in range(TURNS):
         if left <= enough or (last <= rounded and left <= 1e4 * enough):
             return looks, True
         if looks > LOOKS or not _corrected(system, kept, left <= SLOWLY * ahead):
             return looks, False
-        along[:] = rest
-        last, share = np.max(np.abs(along)), 1.0
+        last, share = _went(kept.move, kept.rest, kept.along), 1.0
         if not last < np.inf:
             kept.known[0] = False
             return looks, False
-        move += along
         while True:
-            after[:] = before + move
             found = _left(system, kept, before, after)
             looks += 1
             if found < left or turn < whole or share <= SHORTEST:
                 break
             share *= 0.5
-            move -= share * along
+            for k in range(len(kept.move)):
+                kept.move[k] -= share * kept.along[k]
         ahead, left, last = left, found, share * last
     return looks, False
 
 
-@numba.njit(cache=True)
+@computing
+def _went(move, rest, along):  # type: ignore
+    """Go by a correction, and keep it; returns the largest part of it."""
+    largest = 0.0
+    for k in range(len(move)):
+        along[k] = rest[k]
+        move[k] += along[k]
+        if not abs(along[k]) <= largest:
+            largest = abs(along[k])
+    return largest
+
+
+@computing
 def _corrected(system, kept, serve):  # type: ignore
     """Find the correction, by a factor that serves if there is one; whether there is one."""
     if len(system.band) > 0:
         _assemble(system, kept)
         return eliminate(kept.band, kept.rest)
     if not (serve and kept.known[0]):
-        kept.known[0] = renewed(system.panels, system.room.rate.reshape(-1), kept.entries)
+        rate = system.room.rate
+        kept.known[0] = renewed(system.panels, rate, kept.entries, kept.image)
     if kept.known[0]:
         back(system.panels, kept.entries, kept.rest, kept.image)
     return kept.known[0]
@@ -76,25 +87,36 @@ def _corrected(system, kept, serve):  # type: ignore
 @numba.njit(cache=True)
 def _left(system, kept, before, after):  # type: ignore
     """Find the forces out of balance; returns their norm."""
-    rest, image, joints = kept.rest, kept.image, system.turning
-    pass_joints(joints, before, after, system.step[1], system.slid, system.room)
-    times(system.effective, kept.move, image)
-    rest[:] = kept.constant - image
-    index, sizes, force = joints.sides.index, joints.sides.size, system.room.force
-    for joint in range(len(index)):
+    for k in range(len(after)):
+        after[k] = before[k] + kept.move[k]
+    pass_joints(system.turning, before, after, system.step[1], system.slid, system.room)
+    return _balance(system, kept)
+
+
+@computing
+def _balance(system, kept):  # type: ignore
+    """Write down the forces out of balance; returns their norm."""
+    rest, sides, force, total = kept.rest, system.turning.sides, system.room.force, 0.0
+    for k in range(len(rest)):
+        rest[k] = kept.constant[k] - row_times(system.effective, k, kept.move)
+    for joint in range(len(force)):
         for side in range(2):
-            for k in range(sizes[joint, side]):
-                rest[index[joint, side, k]] -= force[joint, side, k]
-    return np.sqrt(np.sum(rest * rest))
+            for k in range(sides.size[joint, side]):
+                rest[sides.index[joint, side, k]] -= force[joint, side, k]
+    for k in range(len(rest)):
+        total += rest[k] * rest[k]
+    return np.sqrt(total)
 
 
-@numba.njit(cache=True)
+@computing
 def _assemble(system, kept):  # type: ignore
     """The derivative of the forces by the end of the step."""
     band, rate = kept.band, system.room.rate
     index, sizes = system.turning.sides.index, system.turning.sides.size
     half = (band.shape[1] - 1) // 3
-    band[:] = system.band
+    for row in range(len(band)):
+        for k in range(band.shape[1]):
+            band[row, k] = system.band[row, k]
     for joint in range(len(index)):
         for side in range(2):
             for k in range(sizes[joint, side]):

@@ -4,7 +4,9 @@
     frames   opening, slip and turn of faces that have moved far
     poses    where the faces of blocks are that turn as far as they like
     overlap  the law over the overlap of faces that have slid far
-    rubbing  the shear of a joint, with friction and cohesion
+    rubbing  the shear of a point, with friction and cohesion
+    carrying what a joint carries by both
+    compiled how functions that only compute are compiled
     moved    a step of the joints: forces, memory, and their derivatives
 
 Start reading at `moved`.

@@ -4,14 +4,14 @@ Where faces stretch, points slide by s + x η, η how much longer the higher fac
 lower, and the forces that do the work on η are Σ x_i τ̄_i.
 """
 
-import numba
 import numpy as np
 
+from archfem.joints.moving.compiled import inlined
 from archfem.joints.moving.overlap import carried, lap, slope, stored
 from archfem.joints.moving.rubbing import limits, rubbed
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def carry(faces, joint, ends, late, slid, left):  # type: ignore
     """Return what a joint carries over a step.
 
@@ -51,7 +51,7 @@ def carry(faces, joint, ends, late, slid, left):  # type: ignore
     return force, rates, (rubs[9], rubs[10]), rubs[0], rubs[2] + scale * lag
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _edge(faces, joint, ends, laps, known):  # type: ignore
     """Push of faces off their edges, of which less overlaps the further they slide; its rates."""
     if faces.paired[joint]:
@@ -70,7 +70,7 @@ def _edge(faces, joint, ends, laps, known):  # type: ignore
     return stiff * way * push, (stiff * way * by_opening, by_slip, stiff * way * by_turn)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _summed(faces, joint, ends, leaning, late, memory):  # type: ignore
     """Sums over the points of a joint: of what they press and its rates, and of what they rub."""
     (g0, g1, r0, r1), measures = ends
@@ -102,7 +102,7 @@ def _summed(faces, joint, ends, leaning, late, memory):  # type: ignore
     return (total, moment, by_gap, by_place, by_square, lost), rubs
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _rub(faces, point, step, known, memory, sums):  # type: ignore
     """Add the shear of a point to the sums of a joint, and remember how far it has slid."""
     (((_, s0, _), (_, s1, _), (e0, e1)), late), (slid, left) = step, memory

@@ -19,15 +19,16 @@ Sines of angles at the end of a step follow from those at its start by addition 
 what a step turns are short series.
 """
 
-import numba
 import numpy as np
+
+from archfem.joints.moving.compiled import inlined
 
 SMALL = 0.25
 """Angle up to which series are taken [rad]; the terms left out are below 1e-17, of the derivative
 of sin x / x below 1e-14 of it."""
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def small_turn(x):  # type: ignore
     """Return cos x, sin x / x and the derivative of the latter.
 
@@ -45,7 +46,7 @@ def small_turn(x):  # type: ignore
     return c, s, x * (-1 / 3 + y * (1 / 30 + y * (-1 / 840 + y * (1 / 45360 - y * (1 / 3991680)))))
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def both(x):  # type: ignore
     """Return cos x and sin x.
 
@@ -56,7 +57,7 @@ def both(x):  # type: ignore
     return c, x * s
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def added(c, s, more_c, more_s):  # type: ignore
     """Return cosine and sine of the sum of two angles.
 
@@ -69,7 +70,7 @@ def added(c, s, more_c, more_s):  # type: ignore
     return c * more_c - s * more_s, s * more_c + c * more_s
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def measures(lower, higher, angle):  # type: ignore
     """Return opening, slip and turn of a joint [m, m, -].
 
@@ -84,7 +85,7 @@ def measures(lower, higher, angle):  # type: ignore
     return c * x + s * y, c * y - s * x, 2.0 * np.sin(0.5 * (higher[2] - lower[2]))
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def follow(lower, higher, angle):  # type: ignore
     """Return the measures at both ends of a step, and their derivatives.
 
@@ -122,7 +123,7 @@ def follow(lower, higher, angle):  # type: ignore
     return start, end, rates, now, ((c, s), (c1, s1), (x, y), (shrunk, falls), by_turn)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def pushed(rates, force):  # type: ignore
     """Return Dᵀ f: the force on the jump, and the moments on both faces [N, N, N m, N m].
 
@@ -136,7 +137,7 @@ def pushed(rates, force):  # type: ignore
     return x, y, middle - apart, middle + apart
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def seen(now, row):  # type: ignore
     """Return a row times a derivative: by the jump's x and y, and by the faces' angles.
 
@@ -149,7 +150,7 @@ def seen(now, row):  # type: ignore
     return c * row[0] - s * row[1], s * row[0] + c * row[1], middle - apart, middle + apart
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def curved(step, rates, now, force, law):  # type: ignore
     """Return the derivative of Dᵀ f by the jump and the angles at the end, row by row.
 
@@ -179,7 +180,7 @@ def curved(step, rates, now, force, law):  # type: ignore
     )
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _mixed(a, first, b, second, more):  # type: ignore
     """Return a sum of three rows, of which two have factors."""
     return (

@@ -2,16 +2,16 @@
 
 from pathlib import Path
 
-import numba
 import numpy as np
 
 from archfem.files import forget_stale
 from archfem.joints.facets import PLACES, SHARES
+from archfem.joints.moving.compiled import inlined
 
 forget_stale(Path(__file__).parent)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def point_means(a, b, first, second):  # type: ignore
     """Return means over a step of closing and of opening at a place, rate of the latter, and time.
 
@@ -33,7 +33,7 @@ def point_means(a, b, first, second):  # type: ignore
     return 0.5 * min(a, b) * closed, 0.5 * max(a, b) * opened, rate, closed
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def facet_means(ends, first, second):  # type: ignore
     """Return the same integrated with the linear functions of a facet of unit length.
 
@@ -70,7 +70,7 @@ def facet_means(ends, first, second):  # type: ignore
     return (n0, n1), (t0, t1), (r00, r01, r11), (s0, s1)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _cut(ends):  # type: ignore
     """Where a facet opens or closes at the start and at the end, 0 if nowhere; and its pieces."""
     a, c, b, d = ends
@@ -79,7 +79,7 @@ def _cut(ends):  # type: ignore
     return low, high, (0.0, min(low, high), max(low, high), 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _whole_means(ends, rate):  # type: ignore
     """What `facet_means` returns of a facet that is closed, or open, everywhere and all the way."""
     a, c, b, d = ends
@@ -90,7 +90,7 @@ def _whole_means(ends, rate):  # type: ignore
     return none, means, (rate / 3.0, rate / 6.0, rate / 3.0), none
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def closed_means(ends, first, second, facet):  # type: ignore
     """Return the mean time for which a facet of unit length is closed, or a place, and its rate.
 
@@ -132,7 +132,7 @@ def closed_means(ends, first, second, facet):  # type: ignore
     return (s0, s1), (r00, r01, r11)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _closed_rate(a, b, first, second):  # type: ignore
     """Part of a step for which a place is closed, and its derivative."""
     if (a <= 0.0) == (b <= 0.0):
@@ -144,7 +144,7 @@ def _closed_rate(a, b, first, second):  # type: ignore
     return time, -(first * by_first + second * by_second) / whole
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def shear_means(first, change, late, limit):  # type: ignore
     """Return what a point that slides during a step carries, as `joints.law.shear_over_step`.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.joints.moving.carrying import carry
+from archfem.joints.moving.compiled import computing, inlined
 from archfem.joints.moving.frames import curved, follow, measures, pushed, seen
 from archfem.joints.moving.overlap import Faces, lap, stored
 from archfem.joints.moving.poses import Sides, gather, pose, shape, stretched, swing, swing_bend
@@ -76,7 +77,7 @@ def answer(joints: Moved) -> Answer:
     )
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def find_measures(joints, joint, q):  # type: ignore
     """Return opening, slip and turn of a joint, positive to the left of its normal [m, m, -].
 
@@ -89,41 +90,50 @@ def find_measures(joints, joint, q):  # type: ignore
     return measures(lower, higher, joints.angle[joint])
 
 
-@numba.njit(cache=True, error_model="numpy")
-def all_measures(joints, q):  # type: ignore
-    """Return opening, slip and turn of the joints of the structure (n_joints, 3) [m, m, -].
+@numba.njit(cache=True)
+def all_measures(joints, states):  # type: ignore
+    """Return opening, slip and turn of the joints of the structure (k, n_joints, 3) [m, m, -].
 
     Slip and turn with their signs. Of a joint in pieces, the plane nearest to the openings, and the
     mean slip, as `faces.face_matrix` has them.
 
     Args:
         joints: `Moved`.
-        q: coordinates (n,).
+        states: coordinates (k, n).
     """
-    found, depths = np.zeros((joints.wholes, 3)), joints.faces.depth
-    sums = np.zeros((joints.wholes, 4))  # Σd, Σd a, Σd a² with the pieces' own, Σd a g with theirs
-    for joint in range(len(joints.angle)):
-        own = find_measures(joints, joint, q)
-        whole, depth, place = joints.whole[joint], depths[joint], joints.aside[joint]
-        spread = 0.25 * depth**3
-        found[whole, 0] += depth * own[0]
-        found[whole, 1] += depth * joints.hand[joint] * own[1]
-        sums[whole, 0] += depth
-        sums[whole, 1] += depth * place
-        sums[whole, 2] += depth * place**2 + spread
-        sums[whole, 3] += depth * place * own[0] - spread * joints.hand[joint] * own[2]
-    for whole in range(joints.wholes):
-        total, first, second, tilted = sums[whole]
-        middle = first / total
-        turn = middle * found[whole, 0] - tilted
-        turn /= second - middle * first
-        found[whole, 0] = found[whole, 0] / total + turn * middle
-        found[whole, 1] /= total
-        found[whole, 2] = turn
+    found, sums = np.zeros((len(states), joints.wholes, 3)), np.empty((joints.wholes, 4))
+    for k in range(len(states)):
+        _all_measures(joints, states[k], sums, found[k])
     return found
 
 
-@numba.njit(cache=True, error_model="numpy")
+@computing
+def _all_measures(joints, q, sums, found):  # type: ignore
+    """Find the measures in one state; sums are Σd, Σd a, Σd a² with the pieces' own, Σd a g."""
+    for whole in range(joints.wholes):
+        for k in range(4):
+            sums[whole, k] = 0.0
+    for joint in range(len(joints.angle)):
+        own, hand = find_measures(joints, joint, q), joints.hand[joint]
+        whole, depth, place = joints.whole[joint], joints.faces.depth[joint], joints.aside[joint]
+        spread = 0.25 * depth**3
+        found[whole, 0] += depth * own[0]
+        found[whole, 1] += depth * hand * own[1]
+        sums[whole, 0] += depth
+        sums[whole, 1] += depth * place
+        sums[whole, 2] += depth * place**2 + spread
+        sums[whole, 3] += depth * place * own[0] - spread * hand * own[2]
+    for whole in range(joints.wholes):
+        total, first = sums[whole, 0], sums[whole, 1]
+        middle = first / total
+        turn = middle * found[whole, 0] - sums[whole, 3]
+        turn /= sums[whole, 2] - middle * first
+        found[whole, 0] = found[whole, 0] / total + turn * middle
+        found[whole, 1] /= total
+        found[whole, 2] = turn
+
+
+@numba.njit(cache=True)
 def paired_slips(joints, q):  # type: ignore
     """Return how far pieces have slid whose places stay opposite, over their length (j,) [-].
 
@@ -138,7 +148,7 @@ def paired_slips(joints, q):  # type: ignore
     return found
 
 
-@numba.njit(cache=True, error_model="numpy")
+@computing
 def joint_energy(joints, q, slid):  # type: ignore
     """Return the energy stored in all joints [J].
 
@@ -160,7 +170,7 @@ def joint_energy(joints, q, slid):  # type: ignore
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True)
 def pass_joints(joints, before, after, late, slid, found):  # type: ignore
     """Find what joints do over a step.
 
@@ -172,39 +182,44 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
         slid: how far each point has slid for good before (p,) [m].
         found: `Answer`, filled.
     """
-    sides, faces = joints.sides, joints.faces
-    stretches = sides.stretch.shape[2] > 0
-    longer = np.empty((2, 2, sides.stretch.shape[2]))
+    longer = np.empty((2, 2, joints.sides.stretch.shape[2]))
     found.resultants[:] = 0.0
     for joint in range(len(joints.angle)):
-        first, swings, ways = swing(sides, joint, 0, before, after)
-        second, others, more = swing(sides, joint, 1, before, after)
-        start, end, rates, now, step = follow(first, second, joints.angle[joint])
-        stretch = stretched(sides, joint, before), stretched(sides, joint, after)
-        force, law, lengthens, shear, lost = carry(
-            faces, joint, (start, end, stretch), late, slid, found.slid
-        )
-        found.lost[joint] = lost
-        whole, hand = joints.whole[joint], joints.hand[joint]
-        found.resultants[whole, 0] -= force[0]
-        found.resultants[whole, 1] += hand * shear
-        found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
-        x, y, low, high = pushed(rates, force)
-        lower, higher = (-x, -y, low), (x, y, high)
-        gather(sides, joint, 0, ways[0], lower, found.force[joint, 0])
-        gather(sides, joint, 1, more[0], higher, found.force[joint, 1])
-        _spread(sides, joint, (ways, more), curved(step, rates, now, force, law), found.rate)
-        if sides.turns[joint, 0]:
-            swing_bend(sides, joint, 0, swings, lower, found.rate)
-        if sides.turns[joint, 1]:
-            swing_bend(sides, joint, 1, others, higher, found.rate)
-        if stretches:
-            by_all, of_all = seen(now, law[3]), pushed(rates, (0.0, lengthens[0], 0.0))
-            _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), longer)
-            _stretch(sides, joint, (force[3], lengthens[1]), longer, found)
+        _pass(joints, joint, (before, after), late, slid, longer, found)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
+def _pass(joints, joint, states, late, slid, longer, found):  # type: ignore
+    """Find what a joint does over a step."""
+    sides, faces, (before, after) = joints.sides, joints.faces, states
+    first, swings, ways = swing(sides, joint, 0, before, after)
+    second, others, more = swing(sides, joint, 1, before, after)
+    start, end, rates, now, step = follow(first, second, joints.angle[joint])
+    stretch = stretched(sides, joint, before), stretched(sides, joint, after)
+    force, law, lengthens, shear, lost = carry(
+        faces, joint, (start, end, stretch), late, slid, found.slid
+    )
+    found.lost[joint] = lost
+    whole, hand = joints.whole[joint], joints.hand[joint]
+    found.resultants[whole, 0] -= force[0]
+    found.resultants[whole, 1] += hand * shear
+    found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
+    x, y, low, high = pushed(rates, force)
+    lower, higher = (-x, -y, low), (x, y, high)
+    gather(sides, joint, 0, ways[0], lower, found.force[joint, 0])
+    gather(sides, joint, 1, more[0], higher, found.force[joint, 1])
+    _spread(sides, joint, (ways, more), curved(step, rates, now, force, law), found.rate)
+    if sides.turns[joint, 0]:
+        swing_bend(sides, joint, 0, swings, lower, found.rate)
+    if sides.turns[joint, 1]:
+        swing_bend(sides, joint, 1, others, higher, found.rate)
+    if sides.stretch.shape[2] > 0:
+        by_all, of_all = seen(now, law[3]), pushed(rates, (0.0, lengthens[0], 0.0))
+        _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), longer)
+        _stretch(sides, joint, (force[3], lengthens[1]), longer, found)
+
+
+@inlined
 def _spread(sides, joint, ways, curved, rate):  # type: ignore
     """Write down the derivative of the forces on both blocks by the coordinates of both."""
     (xx, xy, xa, xb), (yx, yy, ya, yb), (ax, ay, aa, ab), (bx, by, ba, bb) = curved
@@ -221,7 +236,7 @@ def _spread(sides, joint, ways, curved, rate):  # type: ignore
     _columns(sides, joint, (1, 1), (high, higher), ((xx, xy, xb), (yx, yy, yb), (bx, by, bb)), rate)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _columns(sides, joint, where, ways, curved, rate):  # type: ignore
     """Write down the derivative of the forces on a block by the coordinates of one."""
     (side, other), (way, now), first = where, ways, 0
@@ -238,7 +253,7 @@ def _columns(sides, joint, where, ways, curved, rate):  # type: ignore
         gather(sides, joint, side, way, push, rate[joint, side, :, other, k])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@computing
 def _pulls(sides, joint, ways, rows, longer):  # type: ignore
     """Find how the stretch changes with all coordinates, and all forces with the stretch."""
     for end in range(2):
@@ -247,7 +262,7 @@ def _pulls(sides, joint, ways, rows, longer):  # type: ignore
         gather(sides, joint, 1, ways[end][1], (x, y, high), longer[end, 1])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@computing
 def _stretch(sides, joint, law, longer, found):  # type: ignore
     """Add what the stretch of the faces does: its force, and how all forces change with it."""
     for side, sign in ((0, -1.0), (1, 1.0)):

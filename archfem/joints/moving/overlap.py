@@ -14,10 +14,10 @@ ends; `rubbing` gives the shear τ̄, and `carrying` puts all together.
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
 from archfem.arrays import Array
+from archfem.joints.moving.compiled import inlined
 from archfem.joints.moving.means import facet_means, point_means
 
 
@@ -50,7 +50,7 @@ class Faces(NamedTuple):
     paired: Any
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def overlap(depth, slip):  # type: ignore
     """Return the length on which the faces overlap, and its derivative by the slip.
 
@@ -64,7 +64,7 @@ def overlap(depth, slip):  # type: ignore
     return length, -np.sign(slip)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def lap(faces, joint, slip):  # type: ignore
     """Return the length on which the law of a joint acts, and its derivative by the slip.
 
@@ -78,7 +78,7 @@ def lap(faces, joint, slip):  # type: ignore
     return overlap(faces.depth[joint], slip)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def stored(faces, joint, length, opening, turn):  # type: ignore
     """Return Φ, half the mean square of the closing over the overlap, and its derivatives.
 
@@ -117,7 +117,7 @@ def stored(faces, joint, length, opening, turn):  # type: ignore
     return 0.5 * (first * whole + step * tilted), whole, tilted - 0.5 * whole
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def carried(ends, late, facet):  # type: ignore
     """Return means of ∫φ_i <gap>₋ over a step on a facet of unit length, or of <gap>₋.
 
@@ -146,7 +146,7 @@ def carried(ends, late, facet):  # type: ignore
     return normal, (half / 3.0 - rates[0], half / 6.0 - rates[1], half / 3.0 - rates[2])
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def slope(before, after, first, last):  # type: ignore
     """Return Δℓ/Δs over a step, and its derivative by the slip at the end.
 

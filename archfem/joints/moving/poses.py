@@ -14,9 +14,8 @@ E ξ.
 
 from typing import Any, NamedTuple
 
-import numba
-
 from archfem.arrays import Array
+from archfem.joints.moving.compiled import computing, inlined
 from archfem.joints.moving.frames import added, both, small_turn
 
 
@@ -45,7 +44,7 @@ class Sides(NamedTuple):
     held: Array
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _shaped(sides, joint, side, q):  # type: ignore
     """U ξ and Θ ξ of a face."""
     x = y = turn = 0.0
@@ -57,7 +56,7 @@ def _shaped(sides, joint, side, q):  # type: ignore
     return x, y, turn
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _turned(arm, shift, half):  # type: ignore
     """R r - r + R u, of cosine and sine of half the angle; and cosine and sine of the angle."""
     (rx, ry), (dx, dy), (ch, sh) = arm, shift, half
@@ -67,7 +66,7 @@ def _turned(arm, shift, half):  # type: ignore
     return (x, y), (c, s)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def stretched(sides, joint, q):  # type: ignore
     """Return by how much the higher face of a joint has become longer than the lower [m].
 
@@ -85,7 +84,7 @@ def stretched(sides, joint, q):  # type: ignore
     return total
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _straight(sides, joint, side, q):  # type: ignore
     """Pose of a face of a block without a frame."""
     dx, dy, turn = _shaped(sides, joint, side, q)
@@ -93,7 +92,7 @@ def _straight(sides, joint, side, q):  # type: ignore
     return held[joint, side, 0] + dx, held[joint, side, 1] + dy, held[joint, side, 2] + turn
 
 
-@numba.njit(cache=True, error_model="numpy")
+@computing
 def pose(sides, joint, side, q):  # type: ignore
     """Return the pose of a face [m, m, rad].
 
@@ -111,7 +110,7 @@ def pose(sides, joint, side, q):  # type: ignore
     return q[index[joint, side, 0]] + x, q[index[joint, side, 1]] + y, angle + turn
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def swing(sides, joint, side, before, after):  # type: ignore
     """Return the poses of a face at both ends of a step, and how the block turns.
 
@@ -156,7 +155,7 @@ def swing(sides, joint, side, before, after):  # type: ignore
     return (start, last), step, (((c, s), mean, arm), now)
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def shape(sides, joint, side, k, way):  # type: ignore
     """Return how a face goes with one of its shapes: x, y and angle.
 
@@ -173,7 +172,7 @@ def shape(sides, joint, side, k, way):  # type: ignore
     return factor * (c * u - s * v), factor * (s * u + c * v), turn
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def gather(sides, joint, side, way, push, found):  # type: ignore
     """Write down the generalised forces of a force on a face.
 
@@ -195,7 +194,7 @@ def gather(sides, joint, side, way, push, found):  # type: ignore
         found[k] = x * fx + y * fy + turn * ft
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def swing_bend(sides, joint, side, step, push, rates):  # type: ignore
     """Add the derivative of generalised forces on a face by the coordinates at the end.
 

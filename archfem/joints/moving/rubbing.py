@@ -3,14 +3,14 @@
 At each point a spring in series with a stop holds the shear, as `law.shear_over_step`.
 """
 
-import numba
 import numpy as np
 
+from archfem.joints.moving.compiled import inlined
 from archfem.joints.moving.means import closed_means, shear_means
 from archfem.joints.operator import TOUCHING
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def limits(faces, point, joint, pressed, lagged, late):  # type: ignore
     """Return Coulomb's limits of a facet over a step per length of the overlap, μ N + c A.
 
@@ -41,7 +41,7 @@ def limits(faces, point, joint, pressed, lagged, late):  # type: ignore
     return ends, (rates[0] + hold * by[0], rates[1] + hold * by[1], rates[2] + hold * by[2])
 
 
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def rubbed(first, change, late, limit):  # type: ignore
     """Return what `shear_means` gives of a point whether it slides or not, also over no step.
 

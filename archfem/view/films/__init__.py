@@ -1,4 +1,4 @@
-"""Films and stills of structures that move: all that knows imageio and its encoder.
+"""Films, stills and a viewer of structures that move: all that knows imageio and pyvista.
 
     writer   a film, written in one stroke
     pace     which instants a film shows, and how fast
@@ -11,6 +11,7 @@
     page     title, legend and the ground's motion around a structure
     scenes   films of runs, and stills
     modes    films of vibration shapes
+    viewer   pyvista's own viewer of a run
 
 Start reading at `scenes`.
 """

@@ -77,8 +77,7 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
         InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
     """
     target = film_path(path)
-    _check_picture(model, colour, magnification, size)
-    _check_run(model, run)
+    check_film(model, run, colour, magnification, size)
     falls = Falls.of(model.structure, run)
     known = kept_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
@@ -122,6 +121,29 @@ def picture(
     joints = joints_at(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
     return Page(setup, size).compose(still(setup, q, joints))[..., :3].copy()
+
+
+def check_film(
+    model: Model,
+    run: History,
+    colour: str,
+    magnification: float | None,
+    size: tuple[int, int] = SMALLEST,
+) -> None:
+    """Refuse what cannot be shown moving.
+
+    Args:
+        model: that made the run.
+        run: with fields.
+        colour: of the blocks.
+        magnification: of displacements, or None [-].
+        size: width and height [pixels].
+
+    Raises:
+        InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
+    """
+    _check_picture(model, colour, magnification, size)
+    _check_run(model, run)
 
 
 def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:

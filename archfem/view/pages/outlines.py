@@ -65,10 +65,13 @@ class Outlines:
         return np.array(frames).reshape(len(fields), -1, 2) + still
 
     def _following(self, model: Model) -> sparse.csr_matrix:
-        """From displacements of the cells' points to those of the outlines (2 p, 2 m).
+        """Matrix from displacements of the cells' points to those of the outlines.
 
         A point beside an edge turns with it, which is exact where the block is rigid, however far
         it turns.
+
+        Returns:
+            (2 p, 2 m), m the number of the cells' points.
         """
         cells, rows = model.cells, []
         still, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
@@ -79,8 +82,8 @@ class Outlines:
             edge, share, away = cells.foot(number, point)
             along = cells.places[edge[1]] - cells.places[edge[0]]
             across = np.array([-along[1], along[0]])
-            turned = np.outer(away, along) + np.outer([-away[1], away[0]], across)
-            turned /= along @ along
+            turning = np.outer(away, along) + np.outer([-away[1], away[0]], across)
+            turned = turning / float(along @ along)
             entries = np.hstack([(1.0 - share) * one - turned, share * one + turned])
             columns = np.repeat(2 * edge, 2) + np.tile([0, 1], 2)
             place = np.repeat([0, 1], 4), np.tile(columns, 2)

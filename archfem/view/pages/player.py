@@ -11,7 +11,7 @@ from archfem.models.model import Model
 from archfem.view.pages.document import rendered
 from archfem.view.pages.scenes import LARGEST, Scene
 
-TALLEST, FURNITURE, COLUMN = 520.0, 520.0, 900.0
+TALLEST, FURNITURE, COLUMN = 540.0, 550.0, 900.0
 """Height of the picture at most, of all that is around it, and the width of a notebook [pixels]."""
 
 

@@ -204,7 +204,8 @@ class Scene:
         """Numbers of the records that are kept, the last and that of the still among them."""
         count = len(self.run.time)
         shown = int(np.argmin(np.abs(self.run.time - self.still)))
-        return np.unique(np.append(np.arange(0, count, every), [shown, count - 1]))
+        kept: NDArray[np.intp] = np.append(np.arange(0, count, every), [shown, count - 1])
+        return np.unique(kept)
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

@@ -5,6 +5,9 @@
   const NOTHING = -(2 ** 29); // stands for an undefined value
   const WIDE = 1000; // width of the picture, in its own units
   const ARROW = [[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0], [0.1, 0.25], [0.1, 0.09], [-0.5, 0.09]];
+  const LENGTH = 0.55, APART = 0.14; // of arrows, relative to the depth of their joint
+  const SNUG = 0.9 / (2 * APART + 0.5 * LENGTH); // relative to the distance to the next joint
+  const SHORTEST = 30; // depth that arrows are made for at least, where there is room
   const KILO = 1e3;
 
   /** Undo what packing.py does: whole numbers of a quantum, differences, planes of bytes. */
@@ -162,6 +165,11 @@
         first += block.count;
         return own;
       });
+      const middles = scene.joints.map(({ ends: [one, other] }) => this.place([(one[0] + other[0]) / 2, (one[1] + other[1]) / 2]));
+      scene.joints.forEach((joint, j) => {
+        const apart = middles.map(([x, y], k) => (scene.joints[k].judged ? Math.hypot(x - middles[j][0], y - middles[j][1]) : 0));
+        joint.room = Math.min(...apart.filter((distance) => distance > 0));
+      });
       this.layers = Object.fromEntries(["wedges", "gap-rims", "gaps", "halos", "links", "thrusts", "slips", "hinges"].map((name) => [name, layer(name)]));
       this.mark = element("path", { class: "chosen" }, stage);
       const hits = layer("hits");
@@ -315,7 +323,8 @@
     arrows(joint, [[x0, y0], [x1, y1]], sense) {
       const depth = Math.max(Math.hypot(x1 - x0, y1 - y0), 1e-9), along = [(x1 - x0) / depth, (y1 - y0) / depth];
       const right = along[1] * joint.normal[0] + along[0] * joint.normal[1] > 0 ? 1 : -1;
-      const normal = [right * along[1], -right * along[0]], size = 0.55 * Math.max(depth, 30), away = 0.14 * Math.max(depth, 30);
+      const normal = [right * along[1], -right * along[0]], drawn = Math.min(Math.max(depth, SHORTEST), SNUG * joint.room);
+      const size = LENGTH * drawn, away = APART * drawn;
       const middle = [(x0 + x1) / 2, (y0 + y1) / 2];
       return [1, -1].map((side) => path(ARROW.map(([a, b]) => [0, 1].map((k) => middle[k] + side * (away * normal[k] + size * (sense * a * along[k] + b * normal[k])))), true));
     }
