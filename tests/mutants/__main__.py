@@ -18,7 +18,7 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
-from mutants.changes import changes
+from mutants.changes import changed, changes
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("motion", "masonry", "joints", "limit", "models", "statics", "dynamics")
@@ -42,8 +42,9 @@ def main() -> None:
             path = rng.choice(modules)
             for tests in _tests_of(Path(place), path):
                 _check(Path(place), tests)
-            line, words, text = rng.choice(changes((ROOT / path).read_text(encoding="utf-8")))
-            (Path(place) / path).write_text(text, encoding="utf-8")
+            source = (ROOT / path).read_text(encoding="utf-8")
+            number, (line, words) = rng.choice(list(enumerate(changes(source))))
+            (Path(place) / path).write_text(changed(source, number), encoding="utf-8")
             came = "killed" if _noticed(Path(place), path) else "SURVIVED"
             shutil.copy2(ROOT / path, Path(place) / path)
             tally[came] += 1

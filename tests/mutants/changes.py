@@ -1,7 +1,6 @@
 """Places of a module where a number is made, and what may be changed there."""
 
 import ast
-import copy
 from collections.abc import Iterator
 
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
@@ -12,27 +11,37 @@ FACTOR = 1.1
 """By which a number is multiplied; a whole number grows by one."""
 
 
-def changes(source: str) -> list[tuple[int, str, str]]:
-    """Return what may be changed in a module: line, what becomes of it, and the module so changed.
+def changes(source: str) -> list[tuple[int, str]]:
+    """Return what may be changed in a module: in which line, and what becomes of it.
 
     Words of errors, annotations, imports and what a function that only refuses does are left out.
 
     Args:
         source: of the module.
     """
+    return [
+        (node.lineno, f"{ast.unparse(node)} → {ast.unparse(other)}")
+        for node, _, other in _found(ast.parse(source))
+    ]
+
+
+def changed(source: str, number: int) -> str:
+    """Return a module with one change.
+
+    Args:
+        source: of the module.
+        number: of the change, among those that `changes` gives.
+    """
     tree = ast.parse(source)
-    found = []
-    for number, (node, _) in enumerate(_places(tree)):
-        if (changed := _changed(node)) is None:
-            continue
-        whole = copy.deepcopy(tree)
-        for k, (other, parent) in enumerate(_places(whole)):
-            if k == number:
-                _put(parent, other, changed)
-                break
-        words = f"{ast.unparse(node)} → {ast.unparse(changed)}"
-        found.append((node.lineno, words, ast.unparse(ast.fix_missing_locations(whole))))
-    return found
+    node, parent, other = _found(tree)[number]
+    _put(parent, node, other)
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _found(tree: ast.AST) -> list[tuple[ast.AST, ast.AST, ast.expr]]:
+    """Expressions that may be changed, each with what it stands in and what becomes of it."""
+    places = ((node, parent, _changed(node)) for node, parent in _places(tree))
+    return [(node, parent, other) for node, parent, other in places if other is not None]
 
 
 def _places(tree: ast.AST) -> Iterator[tuple[ast.AST, ast.AST]]:
