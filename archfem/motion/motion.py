@@ -47,7 +47,7 @@ class Motion(Shown, picture="motions.draw_motion"):
 
     def __post_init__(self) -> None:
         if not (is_number(self.dt) and self.dt >= 1e-6):
-            raise InvalidInput(f"dt {said(self.dt)} s: samples are at least 1e-6 s apart")
+            raise InvalidInput(f"dt {said(self.dt)} s is no positive number from 1e-6 on")
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
