@@ -84,8 +84,7 @@ class Tbec2018:
         real(self.ss, "map value S_S [g]")
         real(self.s1, "map value S_1 [g]")
         if not (0.0 < self.ss <= LARGEST and 0.0 < self.s1 <= LARGEST):
-            told = f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are between 0 and"
-            raise InvalidInput(f"{told} {LARGEST:g} g")
+            raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
@@ -111,9 +110,8 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative or not finite.
         """
-        natural = checked_periods(periods, np.inf)
         start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * branches(natural, (start, end, long), lowest=0.4)
+        return self.sds * branches(checked_periods(periods, np.inf), (start, end, long), lowest=0.4)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -146,8 +144,7 @@ _GROUND = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_UPRIGHT = {1: 0.90, 2: 0.45}  # a_vg / a_g
-_UPRIGHT_PERIODS = (0.05, 0.15, 1.0)
+_UPRIGHT, _UPRIGHT_PERIODS = {1: 0.90, 2: 0.45}, (0.05, 0.15, 1.0)  # a_vg / a_g; T_B, T_C, T_D [s]
 
 
 @dataclass(frozen=True)
@@ -182,9 +179,8 @@ class Eurocode8:
 
     def __post_init__(self) -> None:
         if not 0.0 < real(self.ag, "design ground acceleration [g]") <= LARGEST:
-            raise InvalidInput(
-                f"design ground acceleration {self.ag!r} g is not in 0 to {LARGEST:g}"
-            )
+            told = f"expected more than 0, up to {LARGEST:g}"
+            raise InvalidInput(f"design ground acceleration {self.ag!r} g: {told}")
         check_fields(self)
         if self.type not in _GROUND or self.ground not in _GROUND[1]:
             raise InvalidInput(
