@@ -106,6 +106,7 @@ def fits(value: Any, hint: Any) -> bool:
 
 _CALLABLE = get_origin(Callable[[], None])
 _TABLES = (Mapping, dict)
+_MISSING = object()
 
 
 def _is_plain(value: Any, kind: Any) -> bool:
@@ -120,7 +121,9 @@ def _is_plain(value: Any, kind: Any) -> bool:
         return True
     if getattr(kind, "_is_protocol", False):
         offered = [name for name in vars(kind) if not name.startswith("_")]
-        return all(inspect.getattr_static(value, name, None) is not None for name in offered)
+        return all(
+            inspect.getattr_static(value, name, _MISSING) is not _MISSING for name in offered
+        )
     return isinstance(value, kind)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.annotated import fits
 
 SQUARE = np.array([(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)])
 MASKED = np.ma.masked_array([1.0, 2.0], mask=[False, True])
@@ -195,3 +196,11 @@ def test_widths_and_gravities_that_cannot_be_meant():
     for key, value in (("width", 1e-300), ("gravity", 1e-200)):
         with pytest.raises(af.errors.InvalidStructure, match=f"{key} .* is not between"):
             replace(RING, **{key: value})
+
+
+def test_a_model_that_has_no_operator_is_a_model(stack):
+    """What a protocol asks for may be None, as the operator of blocks that move far is."""
+    far = af.build(stack, fidelity="rigid", displacements="large")
+    assert far.operator is None
+    assert fits(far, af.models.Model)
+    assert not fits(stack, af.models.Model)
