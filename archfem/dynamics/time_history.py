@@ -310,6 +310,6 @@ def last_state(history: History) -> State:
     ]
     return State(
         float(dataset.attrs["last_time"]),
-        *(dataset[f"last_{name}"].values for name in names),
+        **{name: dataset[f"last_{name}"].values for name in names},
         structure=dataset.attrs.get("structure"),
     )
