@@ -29,7 +29,7 @@ def checked(samples: Array | None, component: str) -> Array:
     unmasked(samples, f"{component} acceleration")
     try:
         row = np.array(samples, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
     if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
         raise InvalidInput(

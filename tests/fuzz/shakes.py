@@ -1,12 +1,13 @@
 """Random structures under random motions, displacements small and large."""
 
+import runpy
 from pathlib import Path
-
-from benchmarks.random_structures import Came as Shaken
-from benchmarks.random_structures import tried
 
 from archfem.dynamics.guard import WRONG
 from fuzz.trial import ANSWERED, FOREIGN, NONSENSE, REFUSED, Came
+
+SCRIPT = Path(__file__).parents[1] / "benchmarks" / "random_structures.py"
+tried = runpy.run_path(str(SCRIPT))["tried"]
 
 
 def ready() -> None:
@@ -18,8 +19,8 @@ def trial(seed: int, number: int, folder: Path) -> Came:
     """Shake one."""
     del folder
     displacements = ("small", "large")[number % 2]
-    told = f"benchmarks.random_structures.tried({1000 * seed + number}, {displacements!r})"
-    came: Shaken = tried(1000 * seed + number, displacements)
+    told = f"{SCRIPT.name}: tried({1000 * seed + number}, {displacements!r})"
+    came = tried(1000 * seed + number, displacements)
     if came.kind == "FOREIGN":
         return Came(FOREIGN, came.words, told)
     if came.steps and not abs(came.drift) <= WRONG:
