@@ -122,10 +122,9 @@ def unmasked(value: Any, name: str) -> None:
     Raises:
         InvalidInput: something is masked.
     """
-    if np.ma.is_masked(value):
-        raise InvalidInput(
-            f"{name} has {np.ma.count_masked(value)} values masked: fill them in, or leave them out"
-        )
+    hidden = int(np.sum(value.mask)) if isinstance(value, np.ma.MaskedArray) else 0
+    if hidden:
+        raise InvalidInput(f"{name} has {hidden} values masked: fill them in, or leave them out")
 
 
 def row(value: Any, name: str, count: int | None = None) -> tuple[Any, ...]:
