@@ -54,6 +54,9 @@ test-debian13:  ## the default tests in a Debian 13 made for them (root, deboots
 hard: .venv/compiled  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard
 
+mutants: .venv/compiled  ## changes in the physics, COUNT=60 of them, that the tests should notice
+	cd tests && ../$(PYTHON) -m mutants --count $(or $(COUNT),60) --seed $(or $(SEED),0)
+
 fuzz: .venv/compiled  ## odd input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
 	cd tests && ../$(PYTHON) -m fuzz --seed $(or $(SEED),0) $(if $(COUNT),--count $(COUNT))
 

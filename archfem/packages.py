@@ -42,7 +42,9 @@ NEEDS = {
     ),
     "PETSc": Need("its solvers", "it comes with FEniCSx, " + FROM),
     "SLEPc": Need("modes of large models", "it comes with FEniCSx, " + FROM),
-    "EGL": Need("films", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"),
+    "EGL": Need(
+        "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
+    ),
     "gmsh": Need(
         "meshes",
         "'pip install gmsh'; where libGLU or another library is what it lacks, 'apt-get install "
@@ -87,7 +89,7 @@ def lacking(name: str, why: str) -> str:
 
 
 def check_drawing() -> None:
-    """Refuse to draw films where VTK finds no library for it, which would end the process.
+    """Refuse to open a viewer where VTK finds no library for it, which would end the process.
 
     Raises:
         NotInstalled: there is none.

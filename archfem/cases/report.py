@@ -102,7 +102,7 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     files = write_motion(done.motion, folder) if case.suite is not None else []
     files += [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
-        from archfem.view.films.scenes import film  # loads pyvista, which is slow
+        from archfem.view.films.scenes import film  # loads the encoder
 
         files.append(film(dead.model, run, folder / "hinges.mp4"))
     return [*files, _write(text, folder / SUMMARY)]

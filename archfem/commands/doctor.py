@@ -121,10 +121,10 @@ def _fenicsx() -> Iterator[Finding]:
 
 
 def _drawing() -> Finding:
-    """The library with which films are drawn."""
+    """The library with which pyvista's viewer draws."""
     if packages.can_draw():
-        return Finding("library to draw films", "found")
-    return Finding("library to draw films", "missing", packages.NEEDS["EGL"].get)
+        return Finding("library of the viewer", "found")
+    return Finding("library of the viewer", "missing", packages.NEEDS["EGL"].get)
 
 
 def _ffmpeg() -> Finding:

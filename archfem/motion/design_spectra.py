@@ -110,9 +110,8 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative or not finite.
         """
-        natural = checked_periods(periods, np.inf)
         start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * branches(natural, (start, end, long), lowest=0.4)
+        return self.sds * branches(checked_periods(periods, np.inf), (start, end, long), lowest=0.4)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -145,8 +144,7 @@ _GROUND = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_UPRIGHT = {1: 0.90, 2: 0.45}  # a_vg / a_g
-_UPRIGHT_PERIODS = (0.05, 0.15, 1.0)
+_UPRIGHT, _UPRIGHT_PERIODS = {1: 0.90, 2: 0.45}, (0.05, 0.15, 1.0)  # a_vg / a_g; T_B, T_C, T_D [s]
 
 
 @dataclass(frozen=True)

@@ -321,7 +321,7 @@ class Motion(Shown, picture="motions.draw_motion"):
 
     def _check_step(self, other: "Motion") -> None:
         if not np.isclose(other.dt, self.dt, rtol=1e-6):
-            steps = f"step of {other.name!r} {other.dt:g} s, of {self.name!r} {self.dt:g} s"
+            steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
     def _each(self, change: Callable[[Array], Array]) -> "Motion":

@@ -8,6 +8,7 @@ import ast
 import importlib
 import inspect
 import re
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -48,6 +49,7 @@ FOREIGN = (
     "typing",
     "enum",
     "pandas",
+    "pd",
     "dolfinx",
     "petsc4py",
     "mpi4py",
@@ -213,10 +215,17 @@ def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Node) -> nodes.Nod
     return None
 
 
+@cache
+def classes() -> set[str]:
+    """Names of all classes of the package, as annotations name those that are loaded late."""
+    texts = [path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")]
+    return {name for text in texts for name in re.findall(r"^class (\w+)", text, re.MULTILINE)}
+
+
 def internal(target: str) -> bool:
     """Whether a name is one of the package that is not public, or a word of Python's."""
     if not target.startswith("archfem."):
-        return hasattr(__builtins__, target) or target in {"Array", "NDArray", "Any", "Self"}
+        return hasattr(__builtins__, target) or target in {"Array", "NDArray", "Any"} | classes()
     module, _, name = target.rpartition(".")
     try:
         return hasattr(importlib.import_module(module), name)

@@ -1,11 +1,13 @@
 """A user's own tagged mesh as a survey, and what is refused."""
 
-import gmsh
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.masonry.survey.tagged import part_of, physical_surfaces
+
+gmsh = pytest.importorskip("gmsh")
+pytest.importorskip("meshio")
 
 LAYERS = {"ground": af.masonry.Layer(fixed=True), "pier": af.masonry.Layer()}
 

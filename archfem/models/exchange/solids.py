@@ -40,7 +40,8 @@ class Solids:
     def block(self) -> NDArray[np.intp]:
         """Block of each point (m,)."""
         more = [np.full(len(points), number) for number, points in self._fixed]
-        return np.concatenate([self.model.cells.block, *more]).astype(np.intp)
+        found: NDArray[np.intp] = np.concatenate([self.model.cells.block, *more]).astype(np.intp)
+        return found
 
     @cached_property
     def polygons(self) -> list[NDArray[np.intp]]:

@@ -147,7 +147,10 @@ def assembled_vector(form: Any) -> NDArray[np.float64]:
 def points_of_vertices(grid: Any) -> Numbers:
     """Number of the geometry point of each vertex (n_vertices,)."""
     corners = connect(grid, 2, 0)
-    listed = grid.geometry.dofmap
+    try:
+        listed = grid.geometry.dofmaps[0]
+    except (AttributeError, TypeError):
+        listed = grid.geometry.dofmap
     result = np.zeros(grid.topology.index_map(0).size_local, dtype=np.int32)
     for cell in range(grid.topology.index_map(2).size_local):
         nodes = listed.links(cell) if hasattr(listed, "links") else listed[cell]

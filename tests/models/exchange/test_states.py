@@ -1,14 +1,15 @@
 """States as files, read back by programs that are not ours."""
 
 import ezdxf
-import meshio
 import numpy as np
 import pytest
-import pyvista
 import shapely
 
 import archfem as af
 from archfem.models.exchange.states import write_state
+
+meshio = pytest.importorskip("meshio")
+pyvista = pytest.importorskip("pyvista")
 
 
 @pytest.mark.parametrize("magnification", [1.0, 50.0])
