@@ -2,8 +2,8 @@
 
     python tests/benchmarks/drift_and_equality.py [--count 40] [--seed 0]
 
-Of each of `random_structures`, with rigid stones, steps of 5 ms and 4 s: by average acceleration and
-HHT(-0.1), whose joints never slide, and by the conserving scheme, how many runs end plain, in doubt
+Of each of `random_structures`, with rigid stones, steps of 5 ms and 4 s: by average acceleration
+and HHT(-0.1), whose joints never slide, and by the conserving scheme, how many end plain, in doubt
 (energy drifts by more than 5 % at any step) or refused (50 %), and the largest drift that was
 answered; and of "contact" against "compliance" when N of a joint differs by 1e-6 of the largest.
 """
