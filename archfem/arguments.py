@@ -122,7 +122,7 @@ def unmasked(value: Any, name: str) -> None:
     Raises:
         InvalidInput: something is masked.
     """
-    hidden = int(np.count_nonzero(getattr(value, "mask", False)))
+    hidden = int(np.sum(value.mask)) if isinstance(value, np.ma.MaskedArray) else 0
     if hidden:
         raise InvalidInput(f"{name} has {hidden} values masked: fill them in, or leave them out")
 

@@ -252,6 +252,8 @@ def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path
     from archfem.cases.summary import pair_table
 
     text = pair_table(runs)
+    if doubtful := [name for name, run in runs.items() if run.doubts]:
+        text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
     _tell_written(write_pairs(runs, rest, text, folder))
     if any(run.ended is Ending.INTERRUPTED for run in runs.values()):

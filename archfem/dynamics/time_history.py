@@ -303,13 +303,16 @@ def last_state(history: History) -> State:
     Args:
         history: of that run, also as read from its file; the coordinates of the other run's model
             must be the same.
+
+    Raises:
+        InvalidInput: the history does not hold it.
     """
     dataset = history.dataset
-    names = [
-        name for name in ("q", "velocity", "acceleration", "memory") if f"last_{name}" in dataset
-    ]
-    return State(
-        float(dataset.attrs["last_time"]),
-        **{name: dataset[f"last_{name}"].values for name in names},
-        structure=dataset.attrs.get("structure"),
+    q, velocity, acceleration, memory = (
+        dataset[f"last_{name}"].values if f"last_{name}" in dataset else None
+        for name in ("q", "velocity", "acceleration", "memory")
     )
+    if q is None or velocity is None or acceleration is None:
+        raise InvalidInput("this history does not hold the state in which its run ended")
+    told = dataset.attrs
+    return State(float(told["last_time"]), q, velocity, acceleration, memory, told.get("structure"))

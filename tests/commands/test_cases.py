@@ -125,6 +125,8 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     assert run(small) == DOUBTFUL  # what is kept keeps its doubts
     summary = (small.parent / "out" / "first" / "summary.txt").read_text()
     assert summary.startswith("in doubt: energy drifts\n")
+    table = (small.parent / "out" / "suite.txt").read_text()
+    assert "in doubt, as their summaries say: first\n" in table
     said = capsys.readouterr().out
     assert "first: finished before" in said
     assert "second: finished before" not in said
