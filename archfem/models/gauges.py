@@ -162,5 +162,7 @@ class MovedGauges(Readings):
             states: coordinates (steps, n).
         """
         gap, slip, turn = np.moveaxis(self.model.measures(states), -1, 0)
-        middles = self._middles.displacement(states).reshape(len(states), -1)
+        middles = self._middles.displacement(states).reshape(
+            len(states), 2 * len(self._middles.turns)
+        )
         return np.concatenate([gap, 2.0 * np.arcsin(0.5 * turn), slip, middles], axis=1)

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 
 from archfem.dynamics.stepping.open_points import chosen
+from archfem.joints.moving.compiled import computing, inlined, summing
 
 FEW = 60
 """Rows up to which the problem is solved directly."""
@@ -15,7 +16,7 @@ ROUGH = 1e-3
 """Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
 
 
-@numba.njit(cache=True)
+@computing
 def taken_out(law, known, wanted):  # type: ignore
     """Sum up λ of the rows.
 
@@ -35,7 +36,7 @@ def taken_out(law, known, wanted):  # type: ignore
         wanted[local[row]] = along[row - openings, 0]
 
 
-@numba.njit(cache=True)
+@computing
 def rates(law, known):  # type: ignore
     """Find derivatives of λ of the rows, as entries of a matrix in the room of the law.
 
@@ -81,7 +82,7 @@ def rates(law, known):  # type: ignore
     return count
 
 
-@numba.njit(cache=True, inline="always")
+@inlined
 def _enter(entries, number, entry):  # type: ignore
     """Set an entry: its row, column and value."""
     entries[0][number, 0], entries[0][number, 1] = entry[0], entry[1]
@@ -177,7 +178,7 @@ def factorised(matrix, size):  # type: ignore
     return exchanges
 
 
-@numba.njit(cache=True, fastmath={"contract", "reassoc"})
+@summing
 def _substitute(matrix, exchanges, right):  # type: ignore
     """Solve a system in place by its factor."""
     size = len(right)

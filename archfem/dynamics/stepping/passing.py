@@ -20,6 +20,7 @@ from archfem.dynamics.stepping.path_forces import between
 from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import is_of
 from archfem.dynamics.stepping.sparse_rows import stored, times
+from archfem.joints.moving.compiled import computing
 from archfem.joints.moving.means import facet_means, point_means
 
 
@@ -101,7 +102,7 @@ def _sum_up(law, resultants):  # type: ignore
             resultants[number, 1] += pressed[point].shear
 
 
-@numba.njit(cache=True)
+@computing
 def _go_on(law, kept, energy, memory):  # type: ignore
     """Take what joints do to the energies of closed ones, and go on to the start of the next step.
 
@@ -136,7 +137,7 @@ def _go_on(law, kept, energy, memory):  # type: ignore
     energy[1] += law.stored
 
 
-@numba.njit(cache=True)
+@computing
 def _lagged(law, gap):  # type: ignore
     """What the lag of damping takes on openings, less that if joints were closed."""
     start, points, carried, lost = law.start, law.points, law.work.stretches, 0.0

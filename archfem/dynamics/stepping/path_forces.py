@@ -4,13 +4,13 @@ The law of `path_law`. A facet is cut where it opens or closes at either end of 
 gaps, as in `facets.Facets`; where it stays closed or open all the way, what it carries is linear.
 """
 
-import numba
 import numpy as np
 
+from archfem.joints.moving.compiled import computing, inlined
 from archfem.joints.moving.means import facet_means, point_means, shear_means
 
 
-@numba.njit(cache=True)
+@computing
 def press(law, gap, stretches):  # type: ignore
     """Find what stretches of joints carry across them over the step.
 
@@ -50,7 +50,7 @@ def press(law, gap, stretches):  # type: ignore
                 found.last += share * passed.far
 
 
-@numba.njit(cache=True)
+@inlined
 def _open_point(point, passed, means, end, shares):  # type: ignore
     """What a point carries of a facet, or a spring, that opens or closes on its path."""
     (normal, _, rate, time), (a, b), stiffness = means, shares, point.stiffness
@@ -60,7 +60,7 @@ def _open_point(point, passed, means, end, shares):  # type: ignore
     passed.far = stiffness * (rate[end] * a + rate[end + 1] * b)
 
 
-@numba.njit(cache=True)
+@inlined
 def _means(ends, rates, facets):  # type: ignore
     """What `facet_means` gives of a facet, or with zeros `point_means` of a spring."""
     if facets:
@@ -69,7 +69,7 @@ def _means(ends, rates, facets):  # type: ignore
     return (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0)
 
 
-@numba.njit(cache=True)
+@inlined
 def between(ends, share):  # type: ignore
     """Return the value at a point of a stretch.
 
@@ -80,7 +80,7 @@ def between(ends, share):  # type: ignore
     return (1.0 - share) * ends[0] + share * ends[1]
 
 
-@numba.njit(cache=True)
+@computing
 def slide(law, gap, rows):  # type: ignore
     """Find what the points of rows of slips carry along the joints over the step.
 

@@ -41,6 +41,7 @@ from archfem.dynamics.stepping.small_problem import (
     solved_by,
 )
 from archfem.dynamics.stepping.sparse_rows import add_rows
+from archfem.joints.moving.compiled import computing
 
 WHOLE = 4
 """Passes that take whole steps anyhow."""
@@ -109,7 +110,7 @@ def _foreseen(law, gap, before, force):  # type: ignore
     return near
 
 
-@numba.njit(cache=True)
+@computing
 def _involve(law, near):  # type: ignore
     """Add to rows of slips at work the openings that press on their points."""
     points, stretches = law.points, law.stretches
@@ -289,7 +290,7 @@ def _moved(law, problem, free, forces, careful):  # type: ignore
         share *= 0.5
 
 
-@numba.njit(cache=True)
+@computing
 def _go(law, known, z, wanted):  # type: ignore
     """Take gaps of the rows as the guess, and find λ that they ask for."""
     (rows, among), guess = known, law.guess
