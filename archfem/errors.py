@@ -2,9 +2,17 @@
 
 from typing import Any
 
+LONGEST = 4000
+"""Most letters of an error: what it quotes may have been of any length."""
+
 
 class ArchfemError(Exception):
     """Anything archfem refuses or fails to do."""
+
+    def __init__(self, message: str = "") -> None:
+        if len(message) > LONGEST:
+            message = f"{message[: LONGEST - 500]} … {message[-490:]}"
+        super().__init__(message)
 
 
 class InvalidInput(ArchfemError, ValueError):
@@ -21,6 +29,22 @@ class MeshError(ArchfemError):
 
 class StudyStopped(ArchfemError):
     """A study that could not go on; what was finished is kept: make good what is said, go on."""
+
+
+class DiskFull(ArchfemError, OSError):
+    """A file for which there is no room: make room, or give another folder, and run again.
+
+    Attributes:
+        errno: as the system has it.
+    """
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.errno = code
+
+
+class NotInstalled(ArchfemError, ImportError):
+    """A package that is asked for and not there: get it as said, or ask for what needs it not."""
 
 
 class DidNotConverge(ArchfemError):

@@ -5,9 +5,11 @@
 
 import re
 from functools import cache
-from math import isfinite, tan
+from math import degrees, inf, isfinite, pi, prod, tan
 from typing import Any
 
+from archfem.annotated import as_annotated
+from archfem.arguments import is_number, said
 from archfem.errors import InvalidInput
 
 mm = 1e-3  # m
@@ -29,6 +31,18 @@ ACCELERATION = "m/s**2"
 ANGLES = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
 """Units that pass for pure numbers and are none."""
 
+LONGEST = 100
+"""Most letters of a quantity."""
+
+HIGHEST = 12
+"""Highest power that a unit has, all those in a quantity multiplied."""
+
+_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
+_RAISED = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
+
+_DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+"""Degrees as most write them, read without the registry of units."""
+
 
 @cache
 def _registry() -> Any:
@@ -37,6 +51,7 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
+@as_annotated
 def in_unit(value: Any, unit: str, key: str) -> float:
     """Return a number, or a number with a unit, as a number in the given unit.
 
@@ -49,21 +64,63 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     Raises:
         InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
             number is wanted.
+
+    Example:
+        >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
+        1480000000.0
     """
     if isinstance(value, str):
         number = _converted(value, unit, key)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value)
+        number = float(value) if is_number(value) else inf
     else:
-        raise InvalidInput(f"{key} = {value!r} is not a number: give one in {unit}")
+        raise InvalidInput(f"{key} = {said(value)} is not a number: give one in {unit}")
     if not isfinite(number):
-        raise InvalidInput(f"{key} = {value!r} is not finite: give a number in {unit}")
+        raise InvalidInput(f"{key} = {said(value)} is not finite: give a number in {unit}")
     return number
+
+
+def in_degrees(value: Any, key: str) -> float:
+    """Return an angle as a number of degrees.
+
+    Args:
+        value: 159, "159 degree", "2.775 rad"; a bare number is in degrees, and refused up to 2π,
+            where it is more likely meant in radians: with its unit it is taken at its word.
+        key: what to call the value in an error.
+
+    Raises:
+        InvalidInput: it is no angle, text without a unit, or a bare number of so few degrees.
+    """
+    if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
+        return float(plain[1])
+    if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
+        raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
+    number = in_unit(value, "degree", key)
+    if not isinstance(value, str) and 0.0 < abs(number) <= 2.0 * pi:
+        raise InvalidInput(
+            f"{key} = {value!r} would be a few degrees only, and looks like radians: give "
+            f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if you mean that'
+        )
+    return number
+
+
+def _check_text(text: str, unit: str, key: str) -> None:
+    """Refuse what would be worked out for hours before it is found not to be a quantity."""
+    if len(text) > LONGEST:
+        raise InvalidInput(
+            f"{key} = {said(text)} is no quantity, for it has {len(text)} letters: write a number "
+            f"in {unit}"
+        )
+    powers = [found[1] for found in _POWER.finditer(text)]
+    if _RAISED.search(text) or None in powers or prod(int(power) for power in powers) > HIGHEST:
+        raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 
 def _converted(text: str, unit: str, key: str) -> float:
     import pint
 
+    for words in (text, unit):
+        _check_text(words, unit, key)
     registry = _registry()
     wanted = "dimensionless" if unit == "1" else unit
     if unit == ACCELERATION:

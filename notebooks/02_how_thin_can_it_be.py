@@ -16,6 +16,7 @@
 # matters. Then there is a thinnest semicircle that stands at all. **How thin is it?**
 
 # %%
+# %matplotlib inline
 import os
 
 import numpy as np

@@ -7,6 +7,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
+from verified import Table, verified  # noqa: F401  (a fixture)
 
 import archfem as af
 
@@ -15,6 +16,16 @@ STEPPING = (
     *("view", "statics", "masonry"),
 )
 """Tests that step through time, and so need compiled functions: the more, the earlier."""
+
+
+def pytest_addoption(parser):
+    help = "run the tests that tell of what they verify, and write it there"
+    parser.addoption("--verified", metavar="FILE.json", help=help)
+
+
+def pytest_configure(config):
+    if config.getoption("--verified") and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Table(config.getoption("--verified")))
 
 
 def pytest_collection_modifyitems(config, items):
@@ -30,6 +41,8 @@ def pytest_collection_modifyitems(config, items):
 
     if hasattr(config, "workerinput"):
         items.sort(key=place)
+    if config.getoption("--verified"):
+        items[:] = [item for item in items if "verified" in item.fixturenames]
 
 
 @pytest.fixture(scope="session")
@@ -53,8 +66,12 @@ def stack():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures are made, but their files stay empty: printing them takes most of the time."""
-    figure = "matplotlib.figure.Figure.savefig"
-    monkeypatch.setattr(figure, lambda self, path, **given: Path(path).touch())
+
+    def unprinted(figure, target, **given):
+        if not hasattr(target, "write"):
+            Path(target).touch()
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", unprinted)
 
 
 @pytest.fixture

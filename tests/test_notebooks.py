@@ -25,6 +25,27 @@ def test_every_notebook_has_a_number():
     assert {path.stem for path in FOLDER.glob("*.py")} == set(EXPECTED)
 
 
+def cells_of(notebook):
+    """What a notebook says and runs, cell by cell, without the note on how it was shipped."""
+    return [
+        (cell.cell_type, cell.source)
+        for cell in notebook.cells
+        if not cell.source.startswith("```{note}")
+    ]
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_notebooks_are_shipped_as_their_scripts_ran(name):
+    """`make notebooks` brings what is shipped up to date; all of it is below 6 MB."""
+    jupytext = pytest.importorskip("jupytext")
+    script, shipped = (jupytext.read(FOLDER / f"{name}.{end}") for end in ("py", "ipynb"))
+    assert cells_of(shipped) == cells_of(script)
+    outputs = [output for cell in shipped.cells for output in cell.get("outputs", [])]
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+    assert not any(output.output_type == "error" for output in outputs)
+    assert (FOLDER / f"{name}.ipynb").stat().st_size < 6e6 / len(EXPECTED)
+
+
 LONG = ("05_speed_against_error", "06_a_roman_bridge")
 """What these arrive at, tests of predicted errors and of the weight on bases check as well."""
 

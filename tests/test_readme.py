@@ -1,5 +1,6 @@
-"""The README's Python runs as it stands, and prints what it says."""
+"""The README and the pages of the documentation: code runs, and what they name is there."""
 
+import json
 import re
 from functools import reduce
 from pathlib import Path
@@ -8,24 +9,96 @@ import pytest
 
 import archfem as af
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+MADE = ("made", "build", "notebooks")
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if path.parent.name not in MADE
+}
+WORDS = "\n".join(PAGES.values())
+
+RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.DOTALL)
+"""A block of Python, and what it prints if the next block says so."""
+
+SLOW = ("docs/tutorial.md", "docs/index.md")
+"""What these run, the README's own lines do as well."""
+
+
+def run_blocks(page, capsys):
+    """Run a page's Python from first to last, each block on what those before left."""
+    space = {"__name__": "__main__"}
+    for code, printed in RUN.findall(PAGES[page]):
+        exec(compile(code, page, "exec"), space)
+        told = capsys.readouterr().out
+        if printed:
+            assert told.strip() == printed.strip()
+
+
+def with_python():
+    for page, text in PAGES.items():
+        if "```python\nimport" in text and page != "README.md":  # others show lines alone
+            yield pytest.param(page, marks=pytest.mark.slow if page in SLOW else ())
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 200
 
 
 def test_python_blocks_run_and_print_what_follows(tmp_path, monkeypatch, capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    (printed,) = re.findall(r"prints\n\n```text\n(.*?)```", README, re.DOTALL)
+    assert README.count("```python") == 1
     monkeypatch.chdir(tmp_path)
-    exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
-    assert capsys.readouterr().out.strip() == printed.strip()
+    run_blocks("README.md", capsys)
     assert (tmp_path / "out" / "ring.nc").is_file()
 
 
+@pytest.mark.parametrize("page", list(with_python()))
+def test_pages_run_and_print_what_follows(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    run_blocks(page, capsys)
+
+
 def test_commands_are_targets_of_the_makefile():
-    targets = (Path(__file__).parents[1] / "Makefile").read_text(encoding="utf-8")
-    for command in set(re.findall(r"`?make (demo|test[a-z-]*|lint|[a-z]+-[a-z]+)", README)):
-        assert re.search(rf"^{command}:", targets, re.MULTILINE)
+    targets = (ROOT / "Makefile").read_text(encoding="utf-8")
+    found = set(re.findall(r"`make ([a-z0-9-]+)", WORDS)) | set(
+        re.findall(r"^make ([\w-]+)", WORDS, re.M)
+    )
+    assert {"demo", "test", "docs", "notebooks", "verification"} <= found
+    for command in found:
+        assert re.search(rf"^{command}:", targets, re.MULTILINE), command
 
 
-@pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", README))))
+def test_files_of_commands_are_there():
+    for name in set(re.findall(r"(?:meshes|tests/benchmarks)/\w+\.(?:toml|py)", WORDS)):
+        assert (ROOT / name).is_file(), name
+
+
+def test_commands_are_those_of_the_command_line(capsys):
+    with pytest.raises(SystemExit):
+        af.commands.main(["--help"])
+    known = capsys.readouterr().out
+    shell = "\n".join(re.findall(r"```sh\n(.*?)```", WORDS, re.DOTALL))
+    found = re.findall(r"^archfem (\w+)", shell, re.MULTILINE) + re.findall(
+        r"`archfem (\w+)", WORDS
+    )
+    assert {"run", "study", "motion"} <= set(found)
+    for command in set(found):
+        assert f" {command} " in known, command
+
+
+@pytest.mark.parametrize("name", sorted(set(re.findall(r"\baf\.([A-Za-z_][\w.]*\w)", WORDS))))
 def test_names_in_the_text_are_there(name):
-    reduce(getattr, name.split("."), af)
+    """By their lists: to load what draws films takes its time."""
+    *places, last = name.split(".")
+    assert last in dir(reduce(getattr, places, af))
+
+
+def test_the_table_of_verification_names_tests_that_tell():
+    for row in json.loads((ROOT / "docs" / "verification.json").read_text(encoding="utf-8")):
+        assert "verified(" in (ROOT / row["test"]).read_text(encoding="utf-8")
+
+
+def test_links_of_the_readme_lead_somewhere():
+    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (ROOT / target).exists(), target

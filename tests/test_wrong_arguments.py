@@ -1,10 +1,15 @@
 """Arguments of a wrong kind end in an error of ours that says what was given, and what to give."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.annotated import fits
 
+SQUARE = np.array([(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)])
+MASKED = np.ma.masked_array([1.0, 2.0], mask=[False, True])
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
 QUAKE = af.Motion(np.zeros(11), dt=0.01)
 
@@ -53,6 +58,20 @@ MADE = [
         lambda: af.Motion.synthetic(seed=1.5),
         "seed of a synthetic motion = 1.5 is not a whole number",
     ),
+    (lambda: af.Motion(np.zeros(5), 1e-300), "dt 1e-300 s"),
+    (lambda: af.Motion(MASKED, 0.01), "horizontal acceleration has 1 values masked: fill them in"),
+    (lambda: af.response_spectrum(QUAKE, MASKED), r"periods \[s\] has 1 values masked"),
+    (
+        lambda: af.motion.TableSpectrum([1.0, 2.0], MASKED),
+        "values of a spectrum table has 1 values",
+    ),
+    (lambda: af.Block(np.ma.masked_less(SQUARE, 0.0), af.STONE, "a"), "outline of block 'a' has 2"),
+    (lambda: af.Material(30e9, 0.2, 2000.0), "is the number of a density.* have 1.962e.04"),
+    (lambda: af.Material(30e9, 0.2, 1e-300), "is not between 0.001 N/m³ and"),
+    (lambda: af.Tbec2018(1.0, 1e300, "ZC"), r"S_1 1e\+300 g: both are between 0 and 10 g"),
+    (lambda: af.Eurocode8(1e300, "B"), "expected more than 0, up to 10"),
+    (lambda: af.motion.TableSpectrum([1.0, 2.0], [1.0, 1e300]), "more than 10 g"),
+    (lambda: af.StiffnessDamping(0.05, 1e-300), "is not between 1 mHz and 1 MHz"),
     (lambda: af.Material("30 GPa", 0.2, 2e4), "young of 'material' = '30 GPa' is not a finite"),
     (lambda: af.Contact(1e9, None), "shear_stiffness of 'contact' = None is not a finite number"),
     (lambda: af.Tbec2018("1", 0.3, "ZC"), "map value S_S .* = '1' is not a finite number"),
@@ -109,7 +128,7 @@ def test_cells_of_any_integer_and_row():
         ({"motion": 0.3}, "motion is a float: give a Motion"),
         ({"model": RING}, "model is a Structure: build one"),
         ({"dt": "0.005"}, r"dt \[s\] = '0.005' is not a finite number"),
-        ({"dt": 5}, "dt 5 s is not between 0 and 0.1 s"),
+        ({"dt": 5}, "dt 5 s is not between 1e-06 and 0.1 s"),
         ({"start": "rest"}, "start is a str: give dead_load"),
         ({"damping": 0.05}, r"damping is a float: give Rayleigh\(0.05"),
         ({"scheme": "hht"}, r"scheme is a str: give Conserving\(\), Newmark\(\) or HHT"),
@@ -140,3 +159,48 @@ def test_time_history(model, given, says):
 def test_pushover(model, given, says):
     with pytest.raises(af.InvalidInput, match=says):
         af.pushover(**{"model": model, "load": af.BodyForce(0.1)} | given)
+
+
+def test_a_start_of_another_structure_is_refused(model, tmp_path):
+    """Of as many coordinates, and joints of the same names."""
+    thicker = af.build(
+        af.circular_arch(radius=2.95, thickness=0.65, embrace=159.0, voussoirs=7), fidelity="rigid"
+    )
+    assert thicker.size == model.size
+    run = af.time_history(model, QUAKE, dt=0.005)
+    longer = af.Motion(np.zeros(21), dt=0.01)
+    dead, last = af.dead_load(model), af.dynamics.last_state(run)
+    for start in (dead, last):
+        with pytest.raises(af.InvalidInput, match="the state is of another structure"):
+            af.time_history(thicker, longer, dt=0.005, start=start)
+    with pytest.raises(af.InvalidInput, match="the state is of another structure"):
+        af.pushover(thicker, af.BodyForce(1.0), start=dead)
+    with pytest.raises(af.InvalidInput, match=r"q of the state has shape \(5,\)"):
+        af.time_history(model, longer, dt=0.005, start=replace(last, q=last.q[:5]))
+    hidden = np.ma.masked_array(last.q, mask=np.arange(len(last.q)) == 0)
+    with pytest.raises(af.InvalidInput, match="q of the state has 1 values masked"):
+        af.time_history(model, longer, dt=0.005, start=replace(last, q=hidden))
+    path = run.save(tmp_path / "history.nc")
+    assert af.History.read(path, RING).structure is RING
+    with pytest.raises(af.InvalidInput, match="but blocks are elsewhere"):
+        af.History.read(path, thicker.structure)
+
+
+@pytest.mark.parametrize("dt", [1e-12, 1.9e-14])
+def test_steps_too_short_to_be_meant_are_refused_before_memory_is_taken(model, dt):
+    with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
+        af.time_history(model, QUAKE, dt=dt)
+
+
+def test_widths_and_gravities_that_cannot_be_meant():
+    for key, value in (("width", 1e-300), ("gravity", 1e-200)):
+        with pytest.raises(af.errors.InvalidStructure, match=f"{key} .* is not between"):
+            replace(RING, **{key: value})
+
+
+def test_a_model_that_has_no_operator_is_a_model(stack):
+    """What a protocol asks for may be None, as the operator of blocks that move far is."""
+    far = af.build(stack, fidelity="rigid", displacements="large")
+    assert far.operator is None
+    assert fits(far, af.models.Model)
+    assert not fits(stack, af.models.Model)

@@ -1,4 +1,6 @@
 from .case import Case as Case
+from .folders import Opened as Opened
+from .folders import opened as opened
 from .limits import Limit as Limit
 from .run import Rest as Rest
 from .run import Result as Result

@@ -4,7 +4,6 @@ Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/
 not known, a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,13 +12,17 @@ from typing import Any
 
 import tomli_w
 
+from archfem.annotated import as_annotated
+from archfem.arguments import said
 from archfem.cases import motions as ground
 from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
 from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
 from archfem.cases.structures import planned
+from archfem.cases.toml import tables_in
 from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
+from archfem.dynamics.time_history import LEAST_STEP
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.stages import Stage
@@ -39,6 +42,7 @@ MODEL = {
     "points": int,
     "tolerance": "1",
     "displacements": str,
+    "file": str,
 }
 """What a `Discretisation` takes, which checks it, and a tolerance."""
 
@@ -74,6 +78,8 @@ SECTIONS = (
     "dead_load",
     "output",
 )
+MOST_BASES = 20
+"""Most files that are based one on the other."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,7 @@ class Case:
 
     Attributes:
         title: in words.
-        structure: what stands.
+        structure: what stands; its name is the title of the case.
         model: keywords of `build`.
         motion: what the file says of one ground motion, or None.
         suite: what it says of a suite of them, or None; without either there is dead load alone.
@@ -107,6 +113,7 @@ class Case:
     folder: Path = Path()
 
     @classmethod
+    @as_annotated
     def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Case":
         """Read a case file.
 
@@ -135,6 +142,7 @@ class Case:
             raise type(error)(f"{path}: {error}") from error
 
     @classmethod
+    @as_annotated
     def of(cls, settings: Table, folder: Path = Path()) -> "Case":
         """Return a case of tables such as a TOML file holds.
 
@@ -158,7 +166,7 @@ class Case:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
             title=str(settings.get("title", "case")),
-            structure=planned(settings, folder),
+            structure=_titled(planned(settings, folder), settings),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
@@ -184,8 +192,8 @@ class Case:
                 "built in stages; leave out one of both"
             )
         step = self.analysis.get("dt", 0.005)
-        if not 0.0 < step <= 0.1:
-            raise InvalidInput(f"analysis.dt = {step:g} s is not between 0 and 0.1 s")
+        if not LEAST_STEP <= step <= 0.1:
+            raise InvalidInput(f"analysis.dt = {step:g} s is not between {LEAST_STEP:g} and 0.1 s")
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
 
@@ -203,7 +211,11 @@ class Case:
     def discretisation(self) -> Discretisation:
         """What the structure is modelled by; its mesh does not count where "auto" is to choose."""
         idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
-        return Discretisation(**{key: self.model[key] for key in self.model if key not in idle})
+        told = {key: self.model[key] for key in self.model if key not in idle}
+        if "file" in told and self.chooses:
+            raise InvalidInput("model.file is one mesh, and fidelity = 'auto' chooses: name a rung")
+        told |= {key: self.folder / told[key] for key in ("file",) if key in told}
+        return Discretisation(**told)
 
     @property
     def tolerance(self) -> float:
@@ -249,6 +261,13 @@ class Case:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
         return ground.ground_suite(self.suite, self.folder)
 
+    def check_ground(self) -> None:
+        """Refuse motions that cannot be read, before anything is computed (`InvalidInput`)."""
+        if self.motion is not None:
+            self.ground_motion()
+        if self.suite is not None:
+            ground.ground_pairs(self.suite, self.folder)
+
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""
@@ -277,6 +296,11 @@ class Case:
         return tomli_w.dumps(self.settings)
 
 
+def _titled(structure: Structure, settings: Table) -> Structure:
+    """Return a structure that pictures call by the title of its case, where it has one."""
+    return replace(structure, name=str(settings.get("title", structure.name)))
+
+
 def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
     """Return the tables of a case file over those of its base.
 
@@ -287,20 +311,20 @@ def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
     Raises:
         InvalidInput: there is no such file, it is not TOML, or its base cannot be meant.
     """
-    if not path.is_file():
-        raise InvalidInput(f"there is no case file {path}")
+    settings = tables_in(path, "case file")
     if path.resolve() in above:
         raise InvalidInput(f"{path} is its own base: base must name another file")
-    try:
-        settings = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} is not TOML: {error}") from error
+    if len(above) >= MOST_BASES:
+        raise InvalidInput(f"{path} is the base of {MOST_BASES} files, one on another: merge them")
     base = settings.pop("base", None)
     if base is None:
         return settings
     if not isinstance(base, str):
         raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
     below = _tables(path.parent / base, (*above, path.resolve()))
-    for key in settings.pop("without", []):
+    without = settings.pop("without", [])
+    if not isinstance(without, list) or not all(isinstance(key, str) for key in without):
+        raise InvalidInput(f'{path}: without = {said(without)}: write ["section.key", …]')
+    for key in without:
         remove(below, key)
     return merged(below, settings)

@@ -1,14 +1,27 @@
-"""Files that a case reads besides its own: records and drawings."""
+"""What an answer hangs on besides the case's own words: the files it reads, and the program.
 
+Records and drawings count by their content, and archfem by that of its modules, so that nothing is
+taken for an answer that was found from another file or by another program.
+"""
+
+import hashlib
+import json
 from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from archfem.cases.settings import Table
 
+PACKAGE = Path(__file__).parents[1]
+
+LETTERS = 12
+"""Of the digest of the program that a version shows."""
+
 
 def input_files(settings: Table, folder: Path = Path()) -> list[Path]:
-    """Return the records and drawings that the tables of a case name, there or not.
+    """Return the records, drawings and meshes that the tables of a case name, there or not.
 
     Args:
         settings: the tables by name.
@@ -19,8 +32,47 @@ def input_files(settings: Table, folder: Path = Path()) -> list[Path]:
     own = folder / str(suite.get("folder", ""))
     for pair in _table(suite.get("pairs")).values():
         records += [own / name for name in _named(pair)]
-    drawings = [folder / str(structure["file"])] if "file" in structure else []
+    shapes = (structure, _table(settings.get("model")))
+    drawings = [folder / str(table["file"]) for table in shapes if "file" in table]
     return [*drawings, *records]
+
+
+def content_digest(path: Path) -> str:
+    """Return what tells the content of a file, read anew; a word where it cannot be read.
+
+    Args:
+        path: the file.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "missing"
+
+
+def package_version() -> str:
+    """Return the version of archfem that runs, with a digest of its modules behind it."""
+    return f"{import_module('archfem').__version__}+{_modules_digest()[:LETTERS]}"
+
+
+@cache
+def _modules_digest() -> str:
+    """Digest of all modules of archfem."""
+    told = hashlib.sha256()
+    for module in sorted(PACKAGE.rglob("*.py")):
+        told.update(str(module.relative_to(PACKAGE)).encode() + module.read_bytes())
+    return told.hexdigest()
+
+
+def inputs_digest(settings: Table, folder: Path = Path()) -> str:
+    """Return what tells a case, its files and the program from all others.
+
+    Args:
+        settings: the tables by name.
+        folder: where relative file names start.
+    """
+    files = [(path.name, content_digest(path)) for path in input_files(settings, folder)]
+    text = json.dumps([package_version(), settings, files], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _named(motion: Any) -> Iterator[str]:

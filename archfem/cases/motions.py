@@ -6,14 +6,28 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from archfem.cases.settings import Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum, Eurocode8, TableSpectrum, Tbec2018
 from archfem.motion.motion import Motion
+from archfem.motion.newer_codes import Asce2022, Eurocode2024, Ntc2018
 from archfem.motion.suite import Suite
 
 SYNTHETIC = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
-SOURCE = {"file": str, "column": int, "units": str, "dt": "s", "synthetic": dict}
+SOURCE = {
+    **{"file": str, "column": int, "units": str, "dt": "s"},
+    "synthetic": dict,
+    "samples": ["m/s**2"],
+}
+IDLE: dict[str, set[str]] = {
+    "file": set(),
+    "synthetic": {"column", "units", "dt"},
+    "samples": {"column", "units"},
+}
+"""Keys that say nothing of a motion from elsewhere than a file."""
+
 MOTION = {
     **SOURCE,
     "vertical": (str, dict),
@@ -36,6 +50,15 @@ SUITE = {
 TARGETS: dict[str, tuple[Callable[..., DesignSpectrum], Table]] = {
     "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
     "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
+    "NTC-2018": (
+        Ntc2018,
+        {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
+    ),
+    "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
+    "EC8-2024": (
+        Eurocode2024,
+        {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
+    ),
     "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
 }
 """Design spectra by name, for 5 % damping; accelerations are in g."""
@@ -53,7 +76,13 @@ def motion_settings(given: Any, section: str = "motion") -> dict[str, Any]:
     """
     settings = _source_settings(given, MOTION, section)
     if isinstance(settings.get("vertical"), dict):
-        settings["vertical"] = _source_settings(settings["vertical"], SOURCE, f"{section}.vertical")
+        upright = _source_settings(settings["vertical"], SOURCE, f"{section}.vertical")
+        if "vertical_ratio" in upright.get("synthetic", {}):
+            raise InvalidInput(
+                f"{section}.vertical.synthetic.vertical_ratio: a vertical has none, its pga is its "
+                "own peak"
+            )
+        settings["vertical"] = upright
     return settings
 
 
@@ -73,7 +102,7 @@ def ground_motion(settings: Table, folder: Path = Path(), section: str = "motion
     motion = motion if step is None else motion.resampled(step)
     if "vertical" in settings:
         upright = settings["vertical"]
-        other = _from_source({"file": upright} if isinstance(upright, str) else upright, folder)
+        other = _upright({"file": upright} if isinstance(upright, str) else upright, folder)
         other = other if step is None else other.resampled(step)
         if abs(other.dt - motion.dt) > 1e-6 * motion.dt:
             raise InvalidInput(
@@ -140,6 +169,23 @@ def target_spectrum(settings: Table) -> DesignSpectrum | None:
         raise InvalidInput(f"suite.target of {code}: {error}") from error
 
 
+def ground_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
+    """Return the pairs of a suite, read or made, under their own names, not matched yet.
+
+    Args:
+        settings: as checked by `suite_settings`.
+        folder: where relative file names start, or the name of the suite's own folder.
+
+    Raises:
+        InvalidInput: a file cannot be read.
+    """
+    files = folder / settings.get("folder", "")
+    return tuple(
+        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
+        for name, pair in settings["pairs"].items()
+    )
+
+
 def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
     """Return a suite of pairs, read or made, under their own names, and matched where asked.
 
@@ -151,14 +197,9 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
         InvalidInput: a file cannot be read or a pair not be matched.
         DidNotConverge: a pair did not come near the target.
     """
-    files = folder / settings.get("folder", "")
-    pairs = tuple(
-        replace(ground_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
-        for name, pair in settings["pairs"].items()
-    )
     suite = Suite(
         settings.get("name", "suite"),
-        pairs,
+        ground_pairs(settings, folder),
         scale=settings.get("scale", 1.0),
         reduction=settings.get("reduction", 1.0),
     )
@@ -168,22 +209,35 @@ def ground_suite(settings: Table, folder: Path = Path()) -> Suite:
 
 
 def _source_settings(given: Any, keys: Table, section: str) -> dict[str, Any]:
-    """Check a table that says where a motion is from: either a file, or made from a seed."""
+    """Check a table that says where a motion is from: a file, its own samples, or a seed."""
     settings = checked(given, keys, section)
-    if ("synthetic" in settings) == ("file" in settings):
+    sources = sorted({"file", "synthetic", "samples"} & set(settings))
+    if len(sources) != 1:
         raise InvalidInput(
-            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one"
+            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one, or "
+            f"samples = [ … ] and dt; it has {sources or 'none of them'}"
         )
     if "synthetic" in settings:
         settings["synthetic"] = checked(settings["synthetic"], SYNTHETIC, f"{section}.synthetic")
-        idle = sorted({"column", "units", "dt"} & set(settings))
-        if idle:
-            raise InvalidInput(f"{section}.{idle[0]} belongs to a file, not to a synthetic motion")
+    idle = sorted(IDLE[sources[0]] & set(settings))
+    if idle:
+        raise InvalidInput(f"{section}.{idle[0]} belongs to a file, not to {sources[0]}")
+    if sources == ["samples"] and "dt" not in settings:
+        raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
     return settings
 
 
+def _upright(settings: Table, folder: Path) -> Motion:
+    """A vertical, read or made: what is asked of one that is made is asked of its vertical."""
+    if "synthetic" not in settings:
+        return _from_source(settings, folder)
+    return Motion.synthetic(**settings["synthetic"], vertical_ratio=1.0)
+
+
 def _from_source(settings: Table, folder: Path) -> Motion:
-    """Read a file by its own keywords, or make a motion."""
+    """Read a file by its own keywords, take the samples that are given, or make a motion."""
+    if "samples" in settings:
+        return Motion(np.array(settings["samples"]), settings["dt"])
     if "synthetic" in settings:
         return Motion.synthetic(**settings["synthetic"])
     options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}

@@ -20,17 +20,17 @@ from archfem.statics.modes import Modes
 from archfem.statics.strength import use_table
 from archfem.view.accuracy import draw_accuracy
 from archfem.view.collapse import draw_collapse
+from archfem.view.dead import draw_dead_load
 from archfem.view.displaced import draw_during
 from archfem.view.envelopes import draw_envelope
 from archfem.view.falls import draw_fall
 from archfem.view.films.modes import film_modes
 from archfem.view.freebody import draw_free_body
-from archfem.view.joints import draw_joints
+from archfem.view.joints import draw_joints, telling_joints
 from archfem.view.modes import draw_modes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.names import draw_names
 from archfem.view.stress import draw_stress
-from archfem.view.structure import draw_structure
 from archfem.view.style import LINES, save
 
 SUMMARY = "summary.txt"
@@ -65,7 +65,7 @@ def write_dead(rest: Rest, folder: Path) -> list[Path]:
     """
     case, dead, model, structure = rest.case, rest.dead, rest.dead.model, rest.case.structure
     files = [
-        save(draw_structure(structure, dead.joints, criteria=case.criteria), folder / "dead.png"),
+        save(draw_dead_load(dead, criteria=case.criteria), folder / "dead.png"),
         save(draw_names(structure), folder / "names.png"),
     ]
     if rest.use is not None:
@@ -91,8 +91,7 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     """
     case, run, dead = done.case, done.history, rest.dead
     tilt = abs(judged(run.joints)["eccentricity"])
-    worst = tilt.max("time").fillna(0.5)
-    chosen = case.joints or [int(worst["joint"][k]) for k in worst.argsort()[::-1][:2]]
+    chosen = case.joints or telling_joints(run)
     figures = {
         "gravest.png": draw_during(dead.model, run, _gravest(run, tilt)),
         "envelope.png": draw_envelope({case.title: run}, dead=dead.joints),
@@ -103,7 +102,7 @@ def write_run(done: Run, rest: Rest, text: str, folder: Path) -> list[Path]:
     files = write_motion(done.motion, folder) if case.suite is not None else []
     files += [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
-        from archfem.view.films.scenes import film  # loads pyvista, which is slow
+        from archfem.view.films.scenes import film  # loads the encoder
 
         files.append(film(dead.model, run, folder / "hinges.mp4"))
     return [*files, _write(text, folder / SUMMARY)]

@@ -5,34 +5,36 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.inputs import inputs_digest
+from archfem.cases.kept import HISTORY, finished
+from archfem.cases.reportable import Reportable
+from archfem.cases.told import told_of
 from archfem.dynamics.damping import effective_range, first_effective
 from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.dynamics.time_history import Record, time_history
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge
 from archfem.limit.collapse import Collapse
 from archfem.models.build import build
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.plausible import dead_load_doubts
 from archfem.statics.strength import strength_use
 
-HISTORY = "history.nc"
-"""Name of a history's file."""
+if TYPE_CHECKING:
+    from archfem.cases.dossier.results import Results
 
 FRAMES = 10
 """Steps between two fields that are kept for an animation, unless the case says otherwise."""
-
-SAME = 1e-6
-"""Accelerations nearer than this are of the same motion [m/s²]; matching ends with round-off."""
 
 Shake = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 """Runs a motion of a case from its dead load, with damping, as `shaken` does."""
@@ -72,13 +74,18 @@ class Rest:
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
 
     @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the dead load doubtful, its model's rung included, a sentence each."""
+        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, self.case.criteria.friction))
+
+    @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
         """Damping of the runs, and in words how it was found, as by `damping_of`."""
         return damping_of(self.case, self.dead)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Reportable):
     """A case under one motion.
 
     Attributes:
@@ -98,6 +105,13 @@ class Run:
     kept: bool = False
     seconds: float = 0.0
     error: DidNotConverge | None = None
+
+    def results(self) -> "Results":
+        """Return what its report is written from."""
+        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+
+        folder = None if self.path is None else self.path.parent
+        return Results(self.case, {self.motion.name: self.history}, folder)
 
 
 Result = Collapse | Rest | Suite | Run
@@ -135,6 +149,7 @@ def carried_out(
             first step of a run could be made.
     """
     shake, folder = shake or shaken, None if folder is None else Path(folder)
+    (case if pairs is None else case.alone(*pairs)).check_ground()
     if case.limit is not None:
         yield case.limit.of(case.structure)
     rest = Rest.of(case)
@@ -246,50 +261,30 @@ def shaken(
         DidNotConverge: a step failed; `history` is the record up to it.
     """
     output = case.output
+    of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
     animated = FRAMES if output.get("animation", False) else None
     try:
-        run = time_history(
-            dead.model,
-            motion,
-            dt=case.analysis.get("dt"),
-            start=dead,
-            damping=damping or damping_of(case, dead)[0],
-            scheme=case.scheme,
-            record=Record(
-                every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-            ),
-            until=CountedMechanism() if case.analysis.get("halt", False) else None,
-            criteria=case.criteria,
-            method=method,
-        )
+        with told_of(case.title, motion.name):
+            run = time_history(
+                dead.model,
+                motion,
+                dt=case.analysis.get("dt"),
+                start=dead,
+                damping=damping or damping_of(case, dead)[0],
+                scheme=case.scheme,
+                record=Record(
+                    every=output.get("every", 1), fields_every=output.get("fields_every", animated)
+                ),
+                until=CountedMechanism() if case.analysis.get("halt", False) else None,
+                criteria=case.criteria,
+                method=method,
+            )
     except DidNotConverge as error:
         if error.history is not None:
-            error.history.dataset.attrs["case"] = case.text()
+            error.history.dataset.attrs |= of_case
         raise
-    run.dataset.attrs["case"] = case.text()
+    run.dataset.attrs |= of_case
     return run
-
-
-def finished(path: Path, case: Case, motion: Motion) -> History | None:
-    """Return what an earlier run left, where it ended by itself, of the same case and motion.
-
-    Args:
-        path: file of the history.
-        case: to compare with the one in the file.
-        motion: to compare with the ground motion in the file.
-
-    Returns:
-        The history; None where there is none, or one that broke off, or of another case or motion.
-    """
-    try:
-        run = History.read(path, case.structure)
-        whole = run.ended.by_itself
-    except InvalidInput:
-        return None
-    if not whole or run.dataset.attrs.get("case") != case.text():
-        return None
-    before, now = run.dataset["ground"].values, motion.at(run.time)
-    return run if np.allclose(before, now, rtol=0.0, atol=SAME) else None
 
 
 def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> Run:
@@ -297,7 +292,9 @@ def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> R
     case = rest.case.alone(motion.name)
     path = None if folder is None else folder / motion.name / HISTORY
     if path is not None and (history := finished(path, case, motion)) is not None:
-        return Run(case, motion, history, path, kept=True)
+        chosen = rest.dead.model.prediction  # by the first pair, which this one may not be
+        if chosen is None or history.dataset.attrs.get("predicted_error") == chosen.error:
+            return Run(case, motion, history, path, kept=True)
     return _run(case, motion, rest, path, shake)
 
 
@@ -309,6 +306,8 @@ def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake
     except DidNotConverge as error:
         history, failure = history_of(error), error
     seconds = perf_counter() - start
+    doubts = dict.fromkeys((*rest.doubts, *history.doubts))
+    history.dataset.attrs["doubts"] = "\n".join(doubts)
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)

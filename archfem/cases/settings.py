@@ -4,16 +4,21 @@ What a key may hold is written as a unit for a number, `NumberOr` for a number o
 words, a Python type or several, or a list of one unit or type for a list.
 """
 
-import tomllib
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from archfem.cases.toml import tables_of
 from archfem.errors import InvalidInput
 from archfem.masonry.naming import did_you_mean
-from archfem.units import in_unit
+from archfem.units import in_degrees, in_unit
 
 Table = Mapping[str, Any]
+
+_CHANGE = re.compile(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", re.DOTALL)
+_DOT = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")
+"""A path and a value parted by an equals sign, and a dot between names, neither in quotes."""
 
 _WORDS = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
 
@@ -110,7 +115,7 @@ def remove(settings: dict[str, Any], path: str) -> None:
     Raises:
         InvalidInput: there is none.
     """
-    *parents, last = path.split(".")
+    *parents, last = keys_of(path)
     table: Any = settings
     for parent in parents:
         table = table.get(parent, {}) if isinstance(table, dict) else {}
@@ -129,14 +134,15 @@ def change(settings: dict[str, Any], text: str) -> None:
     Raises:
         InvalidInput: the text is no change, or a parent of the key is not a table.
     """
-    path, equals, words = text.partition("=")
-    if not equals or not path.strip():
+    parted = _CHANGE.fullmatch(text)
+    if not parted or not parted[1].strip():
         raise InvalidInput(f"'{text}' is not a change: write section.key=value")
+    path, words = parted.groups()
     try:
-        value = tomllib.loads(f"value = {words}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = tables_of(f"value = {words}")["value"]
+    except InvalidInput:
         value = words.strip()
-    put(settings, path.strip(), value)
+    put(settings, path, value)
 
 
 def put(settings: dict[str, Any], path: str, value: Any) -> None:
@@ -150,7 +156,7 @@ def put(settings: dict[str, Any], path: str, value: Any) -> None:
     Raises:
         InvalidInput: a parent of the key is not a table.
     """
-    *parents, last = path.split(".")
+    *parents, last = keys_of(path)
     table: Any = settings
     for parent in parents:
         table = table.setdefault(parent, {})
@@ -159,8 +165,31 @@ def put(settings: dict[str, Any], path: str, value: Any) -> None:
     table[last] = value
 
 
+def keys_of(path: str) -> list[str]:
+    """Return the names of the tables on the way to a key, and the key.
+
+    Args:
+        path: with dots between them; a name may stand in quotes, as TOML has it, and must where it
+            holds a dot itself.
+
+    Raises:
+        InvalidInput: a quote does not end, or a name is empty.
+    """
+    names = [name.strip() for name in _DOT.split(path)]
+    bare = [name[1:-1] if re.fullmatch(r"""".*"|'.*'""", name) else name for name in names]
+    if not all(bare) or any(mark in name for name in bare for mark in "\"'"):
+        raise InvalidInput(
+            f"'{path}' names no key: write section.key, and names with dots in quotes, as in "
+            'contacts."stone to stone".friction'
+        )
+    return bare
+
+
 def _value(value: Any, kind: Any, key: str) -> Any:
     """Turn one value into what its key must hold."""
+    if kind == "degree":
+        number = in_degrees(value, key)
+        return value if isinstance(value, str) else number  # the unit insists on a small angle
     if isinstance(kind, str):
         return in_unit(value, kind, key)
     if isinstance(kind, NumberOr):

@@ -8,7 +8,9 @@ from archfem.cases.settings import NumberOr, Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.masonry.fill import jointed_fill
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
+from archfem.masonry.shapes.arcades import arcade, buttressed_arch
 from archfem.masonry.shapes.bridges import bridge
+from archfem.masonry.shapes.curves import arch_along, elliptical_arch, flat_arch, pointed_arch
 from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.shapes.rings import arch_on_piers, circular_arch, column
 from archfem.masonry.structure import Structure
@@ -38,6 +40,22 @@ PIERS = {
     "chords": int,
     **COMMON,
 }
+CURVE = {"span": "m", "rise": "m", "thickness": "m", "voussoirs": int, "chords": int, **COMMON}
+FLAT = {"span": "m", "thickness": "m", "voussoirs": int, "skewback": "degree", **COMMON}
+ALONG = {"intrados": [["m"]], "thickness": "m", "voussoirs": int, "chords": int, **COMMON}
+BUTTRESSED = {**CURVE, "embrace": "degree", "breadth": "m", "height": "m", "course": "m"}
+ARCADE = {
+    "spans": ["m"],
+    "heights": ["m"],
+    "breadths": ["m"],
+    "thicknesses": ["m"],
+    "voussoirs": [int],
+    "rises": ["m"],
+    "embraces": ["degree"],
+    "course": "m",
+    "chords": int,
+    **COMMON,
+}
 BRIDGE = {
     "arches": dict,
     "piers": dict,
@@ -60,6 +78,12 @@ USUAL_CONTACTS = {"stone/backfill": "soil to stone"}
 """How blocks of two materials touch, unless the case says otherwise."""
 SHAPES: dict[str, tuple[Callable[..., Structure], Table]] = {
     "circular_arch": (circular_arch, RING),
+    "pointed_arch": (pointed_arch, CURVE),
+    "elliptical_arch": (elliptical_arch, CURVE),
+    "flat_arch": (flat_arch, FLAT),
+    "arch_along": (arch_along, ALONG),
+    "buttressed_arch": (buttressed_arch, BUTTRESSED),
+    "arcade": (arcade, ARCADE),
     "column": (column, COLUMN),
     "arch_on_piers": (arch_on_piers, PIERS),
     "bridge": (bridge, BRIDGE),

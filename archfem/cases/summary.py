@@ -30,10 +30,24 @@ LOOSE = 100.0
 """Mobilised friction V / N beyond which a joint is all but open, and its value says nothing."""
 
 
+Rows = tuple[list[str], list[list[str]]]
+"""Titles of the columns of a table, and its rows."""
+
+
 def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
     """Return one line a joint: envelope, and when and how long it hinged, slid and was open.
 
     Only joints that are `judged` have a line.
+
+    Args:
+        joints: over time and joint.
+        dead: over joint, under dead load alone.
+    """
+    return aligned(*joint_rows(joints, dead))
+
+
+def joint_rows(joints: xr.Dataset, dead: xr.Dataset | None = None) -> Rows:
+    """Return the cells of `joint_table`.
 
     Args:
         joints: over time and joint.
@@ -59,11 +73,20 @@ def joint_table(joints: xr.Dataset, dead: xr.Dataset | None = None) -> str:
             start, longest = times[key][k]
             cells += [_seconds(start), _seconds(longest) if longest > 0.0 else "-"]
         rows.append(cells)
-    return aligned(head, rows)
+    return head, rows
 
 
 def pair_table(runs: Mapping[str, History]) -> str:
     """Return one line a run of a suite: its ground, the gravest joint, the mechanism, its end.
+
+    Args:
+        runs: what to call each run, and the run.
+    """
+    return aligned(*pair_rows(runs))
+
+
+def pair_rows(runs: Mapping[str, History]) -> Rows:
+    """Return the cells of `pair_table`.
 
     Args:
         runs: what to call each run, and the run.
@@ -97,7 +120,7 @@ def pair_table(runs: Mapping[str, History]) -> str:
                 _end(run),
             ]
         )
-    return aligned(head, rows)
+    return head, rows
 
 
 def _end(run: History) -> str:
@@ -143,7 +166,7 @@ def accuracy_words(found: Accuracy) -> str:
 
 
 def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
-    """Return what a run did: its verdict, the table of its joints, and the use of strength.
+    """Return what a run did: its verdict, how it was found, its joints, and the use of strength.
 
     Args:
         structure: what was shaken.
@@ -151,13 +174,45 @@ def run_words(structure: Structure, run: History, dead: xr.Dataset) -> str:
         dead: joints under dead load alone.
     """
     strength = utilisation_sentence(structure, run.joints)
-    return f"{run.verdict}\n\n{joint_table(run.joints, dead)}\n\n{strength}"
+    parts = [run.verdict, found_words(run), joint_table(run.joints, dead), strength]
+    return "\n\n".join(parts)
+
+
+def found_words(run: History) -> str:
+    """Return how the numbers of a run came about, and what speaks for them, in a few lines.
+
+    Args:
+        run: what happened.
+    """
+    told = run.dataset.attrs
+    predicted = (
+        f"predicted to err by {told['predicted_error']:.2g} in the largest |e|"
+        if "predicted_error" in told
+        else 'its error in |e| was not predicted, as fidelity = "auto" does'
+    )
+    lines = [
+        f"outcome: {run.outcome}; {told['steps']} steps by '{told['method']}'",
+        f"energy: drifts by {told['energy_drift']:+.1e} of the largest exchanged at most",
+        f"displacements: no block farther than {told['largest_displacement'] / mm:.3g} mm",
+        f"model: rung '{told['fidelity']}', {predicted}",
+        f"doubts: {len(run.doubts) or 'none'}",
+    ]
+    return "\n".join(lines)
 
 
 def motion_table(motions: Sequence[Motion]) -> str:
     """Return one line a component: its step and its intensity measures.
 
     The only component of a motion may have any direction, and is named so.
+
+    Args:
+        motions: each with a name.
+    """
+    return aligned(*motion_rows(motions))
+
+
+def motion_rows(motions: Sequence[Motion]) -> Rows:
+    """Return the cells of `motion_table`.
 
     Args:
         motions: each with a name.
@@ -184,7 +239,7 @@ def motion_table(motions: Sequence[Motion]) -> str:
                     f"{found.duration:.2f} s",
                 ]
             )
-    return aligned(head, rows)
+    return head, rows
 
 
 def match_table(matches: Sequence[Match]) -> str:

@@ -1,8 +1,11 @@
 """The command line: words after `archfem`, and what each command prints.
 
-    line     words as a command, and its exit code
-    cases    commands for one case, and for records
-    studies  the command for studies
+    line      words as a command, and its exit code
+    cases     commands for one case, and for records
+    films     the command for films
+    studies   the command for studies
+    examples  cases that archfem brings
+    doctor    what is installed, and what is missing
 
 It imports from all rooms. Start reading at `line`.
 """

@@ -2,13 +2,15 @@
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest, Result, Run, carried_out, expected_damping
+from archfem.commands.line import DOUBTFUL
 from archfem.dynamics.history import Ending, History
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.files import result_folder
 from archfem.joints.criteria import judged
 from archfem.limit.collapse import Collapse
 from archfem.motion.motion import Motion
@@ -16,11 +18,14 @@ from archfem.motion.suite import Suite
 from archfem.statics.strength import use_sentence
 
 
-def check(given: argparse.Namespace) -> None:
+def check(given: argparse.Namespace) -> int:
     """Read a case, do its limit analysis, find its dead load, read its motions.
 
     Args:
         given: `case`, a file, and `changes` to it.
+
+    Returns:
+        `DOUBTFUL` where it cannot be meant to rest as it does, else 0.
     """
     from archfem.cases.summary import collapse_words
 
@@ -28,6 +33,7 @@ def check(given: argparse.Namespace) -> None:
     print(case.title)
     if case.limit is not None:
         print(collapse_words(case.structure, case.limit.of(case.structure)))
+    case.check_ground()
     rest = Rest.of(case)
     _tell_rest(rest)
     if case.suite is not None:
@@ -35,7 +41,9 @@ def check(given: argparse.Namespace) -> None:
     elif case.motion is not None:
         motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, peak {motion.pga:.3f} m/s²")
-    print(f"{given.case}: ready; dead load in {rest.dead.iterations} iterations")
+    ready = f"in doubt, {len(rest.doubts)} times, as above" if rest.doubts else "ready"
+    print(f"{given.case}: {ready}; dead load in {rest.dead.iterations} iterations")
+    return DOUBTFUL if rest.doubts else 0
 
 
 def motion(given: argparse.Namespace) -> None:
@@ -43,17 +51,22 @@ def motion(given: argparse.Namespace) -> None:
 
     Args:
         given: `files`, the `column`, `units` and `dt` [s] of plain ones, and the folder `out`.
+
+    Raises:
+        InvalidInput: some files are no records; the others are told of before.
     """
     from archfem.cases.report import named_apart, write_motions
     from archfem.cases.summary import motion_table
 
-    options = {"column": given.column, "units": given.units, "dt": given.dt}
-    motions = named_apart(
-        [Motion.read(path, **options) for path in given.files],
-        [Path(path).name for path in given.files],
-    )
+    folder, options = result_folder(given.out), (given.column, given.units, given.dt)
+    read, refused = _records(given.files, *options)
+    motions = named_apart(list(read.values()), [Path(path).name for path in read])
     print(motion_table(motions))
-    _tell_written(write_motions(motions, Path(given.out)))
+    _tell_written(write_motions(motions, folder))
+    if refused:
+        raise InvalidInput(
+            f"{len(refused)} of {len(given.files)} files were refused, as said above"
+        )
 
 
 def accuracy(given: argparse.Namespace) -> None:
@@ -66,7 +79,7 @@ def accuracy(given: argparse.Namespace) -> None:
     from archfem.cases.summary import accuracy_words
     from archfem.dynamics.tradeoff import accuracy as compared
 
-    case = Case.read(given.case, given.changes)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     found = compared(
         case.structure,
         case.ground_motion(),
@@ -75,7 +88,7 @@ def accuracy(given: argparse.Namespace) -> None:
     )
     text = accuracy_words(found)
     print(text)
-    _tell_written(write_accuracy(found, text, Path(given.out)))
+    _tell_written(write_accuracy(found, text, folder))
 
 
 def compile_steps(given: argparse.Namespace) -> None:
@@ -112,40 +125,57 @@ def modes(given: argparse.Namespace) -> None:
     from archfem.cases.report import write_modes
     from archfem.statics.modes import modes as lowest
 
-    case = Case.read(given.case, given.changes)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     print(case.title)
     rest = Rest.of(case)
     _tell_rest(rest)
     found = lowest(rest.dead.model, given.count, about=rest.dead)
     text = f"{found.table()}\n\n{rest.damping[1]}"
     print(text)
-    _tell_written(write_modes(found, text, Path(given.out)))
+    _tell_written(write_modes(found, text, folder))
 
 
-def run(given: argparse.Namespace) -> None:
+def report(given: argparse.Namespace) -> None:
+    """Write one page of what a result folder holds.
+
+    Args:
+        given: `folder`, the page `out`, and `inputs`, the folder of the case's drawing, or None.
+    """
+    from archfem.cases.folders import opened
+
+    path = opened(given.folder, inputs=given.inputs).report(given.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def run(given: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures.
 
     Args:
         given: `case`, a file, `changes` to it, the folder `out`, and `workers` for pairs.
+
+    Returns:
+        `DOUBTFUL` where a run has doubts, else 0.
     """
-    case, folder = Case.read(given.case, given.changes), Path(given.out)
-    folder.mkdir(parents=True, exist_ok=True)
+    case, folder = Case.read(given.case, given.changes), result_folder(given.out)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     print(case.title)
     if given.workers > 1 and case.suite is not None:
         from archfem.studies.pairs import run_pairs
 
         run_pairs(case, folder, workers=given.workers)
-    tell(case, carried_out(case, folder), folder)
+    return DOUBTFUL if tell(case, carried_out(case, folder), folder) else 0
 
 
-def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
+def tell(case: Case, results: Iterable[Result], folder: Path) -> bool:
     """Print the results of a case as they come, and write their tables and pictures.
 
     Args:
         case: what was asked.
         results: as by `carried_out`.
         folder: for the files.
+
+    Returns:
+        Whether any run has doubts; its summary begins with them.
 
     Raises:
         DidNotConverge: a step of a run failed.
@@ -174,6 +204,7 @@ def tell(case: Case, results: Iterable[Result], folder: Path) -> None:
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _tell_pairs(suite, runs, rest, folder)
+    return bool(rest.doubts) or any(run.doubts for run in runs.values())
 
 
 def _tell_run(done: Run, rest: Rest) -> None:
@@ -181,6 +212,7 @@ def _tell_run(done: Run, rest: Rest) -> None:
 
     Raises:
         DidNotConverge: a step of the only run failed; one of a suite ends its own pair alone.
+        KeyboardInterrupt: Ctrl-C ended the only run.
     """
     from archfem.cases.report import is_written, write_run
     from archfem.cases.summary import run_words
@@ -205,6 +237,8 @@ def _tell_run(done: Run, rest: Rest) -> None:
     text = run_words(done.case.structure, history, rest.dead.joints)
     print(text)
     _tell_written(write_run(done, rest, text, done.path.parent))
+    if history.ended is Ending.INTERRUPTED and done.case.suite is None:
+        raise KeyboardInterrupt
 
 
 def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path) -> None:
@@ -218,6 +252,8 @@ def _tell_pairs(suite: Suite, runs: dict[str, History], rest: Rest, folder: Path
     from archfem.cases.summary import pair_table
 
     text = pair_table(runs)
+    if doubtful := [name for name, run in runs.items() if run.doubts]:
+        text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
     _tell_written(write_pairs(runs, rest, text, folder))
     if any(run.ended is Ending.INTERRUPTED for run in runs.values()):
@@ -249,6 +285,8 @@ def _tell_rest(rest: Rest) -> None:
     )
     if rest.use is not None:
         print(f"dead load: {use_sentence(rest.use)}")
+    for words in rest.doubts:
+        print(f"in doubt: {words}")
 
 
 def _tell_motions(suite: Suite) -> None:
@@ -256,6 +294,23 @@ def _tell_motions(suite: Suite) -> None:
     from archfem.cases.summary import match_table, motion_table
 
     print(match_table(suite.matches) if suite.matches else motion_table(suite.motions))
+
+
+def _records(
+    files: Sequence[str], column: int | None, units: str | None, dt: float | None
+) -> tuple[dict[str, Motion], list[InvalidInput]]:
+    """Read records: the motions by file, and why others were refused, which is told."""
+    read, refused = {}, []
+    for path in files:
+        try:
+            read[path] = Motion.read(path, column=column, units=units, dt=dt)
+        except InvalidInput as error:
+            refused.append(error)
+            if len(files) > 1:
+                print(f"archfem: {error}", file=sys.stderr)
+    if not read:
+        raise refused[0]
+    return read, refused
 
 
 def _tell_written(files: Iterable[Path]) -> None:

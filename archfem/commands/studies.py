@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from archfem.errors import InvalidInput
+from archfem.files import result_folder
 from archfem.studies.progress import status
 
 
@@ -12,8 +13,8 @@ def study(given: argparse.Namespace) -> None:
     """Carry out a study, or go on with it: its table, or tables of cases side by side.
 
     Args:
-        given: `case`, the file of a study, `changes` to its cases, the folder `out`, and `workers`
-            or `scheduler`; or `status`, the folder of a study.
+        given: `case`, the file of a study, `changes` to its cases, the folder `out`, `workers` or
+            `scheduler`, and whether to run its `own_code`; or `status`, the folder of a study.
 
     Raises:
         InvalidInput: neither a study and a folder were given, nor the folder of one.
@@ -25,11 +26,12 @@ def study(given: argparse.Namespace) -> None:
         raise InvalidInput("a study needs a file and a folder: archfem study STUDY.toml --out DIR")
     from archfem.studies.files import study_tables
 
-    sys.path.insert(0, str(Path(given.case).resolve().parent))  # find = "module:function" beside it
+    if given.own_code:  # find = "module:function" beside the file
+        sys.path.insert(0, str(Path(given.case).resolve().parent))
     if "cases" in study_tables(Path(given.case)):
-        _compare(given, Path(given.out))
+        _compare(given, result_folder(given.out))
     else:
-        _go_over(given, Path(given.out))
+        _go_over(given, result_folder(given.out))
 
 
 def _compare(given: argparse.Namespace, folder: Path) -> None:
@@ -55,7 +57,7 @@ def _go_over(given: argparse.Namespace, folder: Path) -> None:
     from archfem.studies.study import Study
     from archfem.studies.table import CSV, NETCDF
 
-    asked = Study.read(given.case, given.changes)
+    asked = Study.read(given.case, given.changes, own_code=given.own_code)
     print(f"{asked.title}: {len(asked.points)} points")
     found = asked.run(folder, workers=given.workers, client=given.scheduler)
     print(status(folder))

@@ -13,9 +13,12 @@
     guard         doubts about a run while it goes on
     glance        a quick look at joints at every step
     events        what ends a run: enough failed joints, or blocks that can move
+    corners       displacements of the corners of blocks
     recorder      what a run leaves behind
     sentences     what a run means, in words
     history       the record of a run, and its file
+    exports       what a run is written as for other programs
+    series        runs as series of files: VTU and PVD, XDMF
     verdicts      when a run first meets a mechanism, by each definition
     scales        by what factor a motion must be multiplied for a mechanism
     collapse_scale  by what factor until the structure falls
@@ -24,6 +27,7 @@
     yardstick     what a model and its steps err by
     smallness     what it errs by to take displacements as small
     probe         what a short run tells of a model
+    determined    how long a history is one, and not one of many
     tradeoff      speed against error over settings
 
 It imports from `motion`, `statics` and what is left of it. Start reading at `time_history`.

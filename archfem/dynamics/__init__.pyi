@@ -1,5 +1,7 @@
 from .collapse_scale import CollapseScale as CollapseScale
 from .damping import effective_damping as effective_damping
+from .determined import Predictability as Predictability
+from .determined import predictability as predictability
 from .events import CountedMechanism as CountedMechanism
 from .events import Event as Event
 from .events import EveryMechanism as EveryMechanism

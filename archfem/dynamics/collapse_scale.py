@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from archfem.annotated import as_annotated
 from archfem.arguments import instance
 from archfem.dynamics.falling.verdict import Fall
 from archfem.dynamics.history import history_of
@@ -89,6 +90,7 @@ class CollapseScale:
         return aligned(["step", "scale", "the structure", "at", "residual"], rows)
 
 
+@as_annotated
 def collapse_scale(
     model: Model,
     motion: Motion,

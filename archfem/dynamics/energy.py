@@ -17,8 +17,9 @@ from scipy import sparse
 from archfem.arrays import Array
 from archfem.models.model import Model
 
-STILL = 1e-6
-"""Energies below this fraction of that stored under self-weight count as none."""
+STILL = 1e-3
+"""Energies below this fraction of that stored under self-weight count as none: they change forces,
+which go with their root, by 3 % of the weight's."""
 
 
 class Meter:
@@ -77,38 +78,32 @@ class Balance:
         potential: energy at the start, that of the weight included [J].
 
     Attributes:
-        drift: energy that came from nowhere, or went nowhere, since the start [J].
-        gain: of mechanical energy beyond the work of the ground, which cannot be positive [J].
-        largest: the largest mechanical energy exchanged so far: kinetic, change of what is stored,
-            work of the ground [J].
+        largest: the largest energy exchanged so far: kinetic, change of what is stored, work of
+            the ground, what is lost [J].
     """
 
     def __init__(self, kinetic: float, potential: float) -> None:
         self._stored = kinetic + potential
         self._work = self._lost = 0.0
-        self.drift = self.gain = 0.0
         self.largest = max(kinetic, STILL * abs(potential), 1e-300)
 
-    def add(self, steps: Array) -> Array:
+    def add(self, steps: Array) -> tuple[Array, Array]:
         """Go on by some steps.
 
         Args:
             steps: their energies, a row a step, as by `Meter.step` (steps, 4) [J].
 
         Returns:
-            The drift after each step (steps,) [J].
+            The drift after each step: energy that came from nowhere, or went nowhere, since the
+            start (steps,) [J]; and the same as a fraction of the largest exchanged until then
+            (steps,) [-].
         """
         kinetic, potential, work, lost = steps.T
         change = kinetic + potential - self._stored
         works, losses = self._work + np.cumsum(work), self._lost + np.cumsum(lost)
         drift: Array = change - works + losses
         self._work, self._lost = works[-1], losses[-1]
-        self.drift, self.gain = float(drift[-1]), float(change[-1] - works[-1])
-        exchanged = [kinetic, np.abs(change), np.abs(works), np.full(1, self.largest)]
-        self.largest = float(np.max(np.concatenate(exchanged)))
-        return drift
-
-    @property
-    def fraction(self) -> float:
-        """Drift as a fraction of the largest energy exchanged or lost [-]."""
-        return self.drift / max(self.largest, self._lost)
+        exchanged = np.max([kinetic, np.abs(change), np.abs(works), losses], axis=0)
+        largest = np.maximum.accumulate(np.maximum(exchanged, self.largest))
+        self.largest = float(largest[-1])
+        return drift, drift / largest

@@ -1,4 +1,8 @@
-"""Doubts about a run while it goes on: energy from nowhere, displacements that are not small."""
+"""Doubts about a run while it goes on: energy from nowhere, displacements that are not small.
+
+Energy is judged after every step, whatever takes the steps and however many at a time: a stepper
+that hands on 128 of them is judged as one that hands on each, where a bound is passed.
+"""
 
 import logging
 
@@ -15,11 +19,12 @@ from archfem.models.moving import Moving
 logger = logging.getLogger("archfem")
 
 DOUBTFUL = 0.05
-"""Drift of energy, relative to the largest exchanged, above which a run is doubted aloud."""
+"""Drift of energy at any step, either way and relative to the largest exchanged until then, above
+which a run is doubted aloud: amplitudes, which go with its root, are then off by 2.5 %."""
 
 WRONG = 0.5
-"""Gain of energy beyond the work of the ground, relative to the largest exchanged, above which a
-run is wrong: damping aside, which only takes, half of what moves came from nowhere."""
+"""The same above which a run is wrong: half of what moves is the scheme's own, or has gone nowhere.
+What a scheme takes that damps by itself, as HHT does, is only doubted."""
 
 TURNED = 0.01
 """Turn of a joint above which a run with small displacements is doubted aloud: from there on those
@@ -39,39 +44,62 @@ class Guard:
     Args:
         model: that moves.
         start: its state at the start, as a batch of one.
+        damps: whether the scheme takes energy by itself, as it is meant to.
 
     Attributes:
-        worst: largest drift of energy so far, as a fraction of the largest exchanged [-].
-        largest_displacement: of any point of a block, at the looks taken [m].
-        largest_turn: of any joint, at the looks taken [rad].
+        worst: largest drift of energy at any step so far, as a fraction of the largest exchanged
+            until then [-].
+        largest_displacement: of the middle of any block at any step, and of any point of a block
+            at the looks taken [m].
+        largest_turn: of any joint at any step [rad].
+        doubts: what is doubtful so far, those of the model included, a sentence each.
     """
 
-    def __init__(self, model: Model, start: Batch) -> None:
+    def __init__(self, model: Model, start: Batch, *, damps: bool = False) -> None:
         self.model = model
-        self.worst = 0.0
+        self.worst, self._worst_time = 0.0, 0.0
         self.largest_displacement = 0.0
         self.largest_turn = 0.0
         self._balance = Balance(*start.energy[0, :2])
+        self._damps = damps
+        self._wrong: tuple[float, float] | None = None
+        self._gauges = Gauges.on(model)
         self._small = not isinstance(model, Moving)
         self._mismatch = (0.0, "")
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
-        self._told: set[str] = set()
+        self._told = {f"rung {k}": words for k, words in enumerate(model.doubts)}
 
-    def add(self, batch: Batch) -> Array:
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful so far, a sentence each, as it is known now."""
+        return tuple(self._told.values())
+
+    def add(self, batch: Batch, readings: Array) -> Array:
         """Look at the next steps.
 
         Args:
             batch: steps that follow those seen so far; the first is the start, alone.
+            readings: of the model's gauges at their ends (steps, r).
 
         Returns:
             The drift of energy after each step (steps,) [J].
         """
-        drift = self._balance.add(batch.energy)
-        fraction = self._balance.fraction
-        if not abs(fraction) <= abs(self.worst):
-            self.worst = fraction
+        drift, fractions = self._balance.add(batch.energy)
+        far = int(np.abs(fractions).argmax())  # a NaN is the largest
+        if not abs(fractions[far]) <= abs(self.worst):
+            self.worst, self._worst_time = float(fractions[far]), float(batch.times[far])
+        if self._wrong is None:
+            beyond = np.flatnonzero((fractions if self._damps else np.abs(fractions)) > WRONG)
+            if len(beyond):
+                first = int(beyond[0])
+                self._wrong = float(batch.times[first]), float(fractions[first])
+        moved = float(np.linalg.norm(self._gauges.middles(readings), axis=-1).max())
+        self.largest_displacement = max(self.largest_displacement, moved)
+        if self._small:
+            turned = float(np.abs(self._gauges.faces(readings)[:, 1]).max())
+            self.largest_turn = max(self.largest_turn, turned)
         for k in range(-self._steps % LOOK, len(batch.times), LOOK):
             self._look(batch.state(k))
         self._steps += len(batch.times)
@@ -81,10 +109,6 @@ class Guard:
     def _look(self, state: State) -> None:
         moved = np.abs(self.model.cells.displacement(state.q)).max()
         self.largest_displacement = max(self.largest_displacement, float(moved))
-        if self._small:
-            gauges = Gauges.on(self.model)
-            turned = gauges.faces(gauges.read(state.q))[1]
-            self.largest_turn = max(self.largest_turn, float(np.abs(turned).max()))
         if isinstance(self.model, Moving):
             self._mismatch = max(self._mismatch, self.model.mismatch(state.q))
 
@@ -95,18 +119,19 @@ class Guard:
             DidNotConverge: most of the energy came from nowhere, or blocks moved farther than the
                 structure is large; `last` is the state before the steps added last.
         """
-        time, size, balance = self._last.time, self.model.structure.size, self._balance
-        if not np.isfinite(balance.drift):
+        time, size = self._last.time, self.model.structure.size
+        if not np.isfinite(self.worst):
             raise DidNotConverge(
                 f"by t = {time:.4g} s displacements or speeds are not numbers any more: the start "
                 "cannot be meant, or the run needs damping or a smaller dt",
                 last=self._before,
             )
-        if balance.gain > WRONG * balance.largest:
+        if self._wrong is not None:
+            when, share = self._wrong
             raise DidNotConverge(
-                f"by t = {time:.4g} s {balance.gain / balance.largest:.0%} of the energy had come "
-                "from nowhere, so the history is wrong: use damping, the scheme HHT(-0.1) or a "
-                "smaller dt",
+                f"by t = {when:.4g} s {abs(share):.0%} of the energy had "
+                f"{'come from' if share > 0.0 else 'gone'} nowhere, so the history is wrong: use "
+                "the scheme Conserving, or damping and a smaller dt",
                 last=self._before,
             )
         if self._small and self.largest_displacement > size:
@@ -117,13 +142,17 @@ class Guard:
                 last=self._before,
             )
         self._judge_facets(time)
-        share = balance.fraction
-        if abs(share) > DOUBTFUL:
-            what = "came from nowhere" if share > 0.0 else "was lost to the scheme"
+        self._doubt(time)
+
+    def _doubt(self, time: float) -> None:
+        """Warn of what is doubtful, though nothing tells that it is wrong."""
+        if abs(self.worst) > DOUBTFUL:
+            what = "had come from nowhere" if self.worst > 0.0 else "was lost to the scheme"
             self._tell(
                 "energy",
-                f"energy drifts: by t = {time:.4g} s {abs(share):.0%} of the largest exchanged "
-                f"{what}; compare with a smaller dt, or with more damping",
+                f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst):.0%} of the "
+                f"largest exchanged {what}; compare with the scheme Conserving, with a smaller dt, "
+                "or with more damping",
             )
         if self._small and self.largest_turn > TURNED:
             self._tell(
@@ -156,7 +185,7 @@ class Guard:
         self._tell("facets", words)
 
     def _tell(self, kind: str, words: str) -> None:
-        """Warn of each kind of doubt once a run."""
+        """Warn of each kind of doubt once a run, and keep what is known of it last."""
         if kind not in self._told:
-            self._told.add(kind)
             logger.warning("%s", words)
+        self._told[kind] = words

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
+from archfem.dynamics.corners import displacement_of
+from archfem.dynamics.exports import Exports
 from archfem.dynamics.falling.verdict import Fall
-from archfem.dynamics.sentences import extremes, mechanism_lines
+from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.files import in_one_stroke
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.duration import step_lengths
 from archfem.joints.resultants import one_joint
@@ -23,6 +25,8 @@ from archfem.limit.verified import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
+from archfem.netcdf import read_dataset, write_dataset
+from archfem.shown import Shown
 
 SIGNS = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -54,8 +58,8 @@ class Ending(StrEnum):
         return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+@dataclass(frozen=True, eq=False, repr=False)
+class History(Exports, Shown, picture="joints.draw_joints"):
     """The record of one run.
 
     Attributes:
@@ -79,10 +83,16 @@ class History:
         return self.dataset[names]
 
     @property
+    def displacement(self) -> xr.DataArray:
+        """Displacements of corners of the blocks, as by `displacement_of` (time, point, xy) [m]."""
+        return displacement_of(self.dataset)
+
+    @property
     def criteria(self) -> Criteria:
         """What makes a joint fail, and how many failed joints make a mechanism."""
         return Criteria.of(self.dataset)
 
+    @as_annotated
     def judged_by(self, criteria: Criteria) -> "History":
         """Return the same run, judged by other criteria.
 
@@ -114,6 +124,17 @@ class History:
                 f"'{self.outcome}'; run it again"
             )
         return Ending(self.dataset.attrs["ended"])
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What makes the run doubtful, a sentence each.
+
+        Energy that drifts by more than 5 % at any step, joints that turn or blocks that move too
+        far for small displacements, a rung that is wrong for a block or whose predicted error is
+        larger than was asked for. Files of earlier versions tell none.
+        """
+        told = str(self.dataset.attrs.get("doubts", ""))
+        return tuple(words for words in told.split("\n") if words)
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
@@ -165,7 +186,8 @@ class History:
         The sentence tells the largest hinge rotation, slip and displacement, and what is left at
         the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
         and, where the structure is known, verified, each with its duration and its opening, and
-        whether any before it was too short to count. A run that did not finish says so first.
+        whether any before it was too short to count. A run that did not finish, and one that is in
+        doubt, say so first.
         """
         names = None
         if self.structure is not None:
@@ -173,6 +195,7 @@ class History:
         told = self.dataset.attrs
         whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
         lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
+        lines += [f"in doubt: {words}" for words in self.doubts]
         lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
         lines += mechanism_lines(self.joints, self._first, names, self._first_of_any_duration)
         return "\n".join(line for line in lines if line)
@@ -191,6 +214,11 @@ class History:
         if step_lengths(self.time).min() >= self.criteria.duration:
             return self._first
         return self.judged_by(replace(self.criteria, duration=0.0))._first
+
+    @as_annotated
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return in_a_line(self.dataset)
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint did over time.
@@ -213,11 +241,10 @@ class History:
             The file.
         """
         encoding = {name: {"zlib": True} for name, v in self.dataset.items() if v.ndim > 1}
-        with in_one_stroke(Path(path)) as draft:
-            self.dataset.to_netcdf(draft, engine="netcdf4", encoding=encoding)
-        return Path(path)
+        return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
+    @as_annotated
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
         """Return what `save` wrote; an earlier version's file is judged by the usual criteria.
 
@@ -227,17 +254,11 @@ class History:
                 what roles its parts have.
 
         Raises:
-            InvalidInput: there is no such file, or it is something else, or of another structure;
-                or nothing tells the roles of the parts.
+            InvalidInput: there is no such file, or it is damaged, something else, or of another
+                structure; or nothing tells the roles of the parts.
         """
-        if not Path(path).is_file():
-            raise InvalidInput(f"there is no history file {path}")
-        try:
-            with xr.open_dataset(path, engine="netcdf4") as opened:
-                dataset = opened.load()
-        except OSError as error:
-            raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
-        missing = {"N", "V", "M", "eccentricity"} - set(dataset)
+        dataset = read_dataset(path, "history file")
+        missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
         names = dataset["name"].values.astype(str).tolist()
@@ -245,6 +266,14 @@ class History:
             raise InvalidInput(
                 f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
                 f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+            )
+        if structure is not None and dataset.attrs.get("structure") not in (
+            None,
+            structure.fingerprint,
+        ):
+            raise InvalidInput(
+                f"{path} is of another structure: its joints have the names of those of "
+                f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
             )
         if structure is not None:
             roles = [joint.role for joint in structure.joints]

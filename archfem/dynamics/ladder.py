@@ -8,7 +8,9 @@ refined.
 import logging
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 
+from archfem.arguments import instance, real
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
 from archfem.dynamics.schemes import Viscous
@@ -50,6 +52,7 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
     damping: Damping = None,
     dt: float | None = None,
     displacements: str = "small",
+    file: str | Path | None = None,
 ) -> Model:
     """Return a model of a structure, on a rung that is named or chosen.
 
@@ -84,16 +87,23 @@ def build(  # noqa: PLR0913  (a discretisation by keywords, and what the choice 
         displacements: "small", or "large" where blocks may turn and slide as far as they like,
             and fall; not on the rung "monolithic". With "auto" the choice is made by small
             displacements, and holds as long as blocks hold together.
+        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and
+            `coarse`; for "rigid" and "auto" there is none.
 
     Raises:
         InvalidInput: an option is not one of those above.
         MeshError: the blocks cannot be cut as asked.
     """
-    if not 0.0 < tolerance < 1.0:
+    instance(structure, Structure, "structure", "give a Structure, e.g. circular_arch(…)")
+    if not 0.0 < real(tolerance, "tolerance on |e| [-]") < 1.0:
         raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
-    if fidelity == "auto":
+    if isinstance(fidelity, str) and fidelity == "auto":
+        if file is not None:
+            raise InvalidInput(f"file = {str(file)!r} is one mesh, and 'auto' chooses: name a rung")
         return choose(structure, tolerance, motion, damping, dt, displacements=displacements)
-    asked = Discretisation(fidelity, cells, cell, coarse, degree, quadrature, points, displacements)
+    asked = Discretisation(
+        fidelity, cells, cell, coarse, degree, quadrature, points, displacements, file
+    )
     return plain.build(structure, asked)
 
 
@@ -143,11 +153,15 @@ def choose(
     else:
         small = error_of_small(yardstick, steps)
     told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered), small)
+    chosen, doubts = model.predicted(told), []
     if not told.met:
-        logger.warning("%s", _unmet(told, in_model <= allowed))
+        doubts.append(_unmet(told, in_model <= allowed))
     if small > tolerance:
-        logger.warning("%s", _far(small, tolerance))
-    return model.predicted(told)
+        doubts.append(_far(small, tolerance))
+    for words in doubts:
+        logger.warning("%s", words)
+    chosen.doubts = (*model.doubts, *doubts)
+    return chosen
 
 
 def _steps(

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem.arrays import Array
+from archfem.dynamics.corners import corner_displacements
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import SIGNS, Ending, History
 from archfem.dynamics.steps import Batch, State
@@ -156,7 +157,8 @@ class Recorder:
             DidNotConverge: the guard is certain that what was kept is wrong.
         """
         self.state = batch.state(len(batch.times) - 1)
-        drift, readings = self.guard.add(batch), batch.read(self._gauges)
+        readings = batch.read(self._gauges)
+        drift = self.guard.add(batch, readings)
         self._reach.add(batch.times, readings)
         numbers = self._drift.count + np.arange(len(batch.times))
         kept = numbers % self.every == 0
@@ -202,14 +204,17 @@ class Recorder:
             dataset[name] = "time", values, words
         self._add_coordinates(dataset)
         dataset.attrs |= {
-            "title": f"time history of {structure.name} under {motion.name or 'motion'}",
+            "title": f"{structure.name}: {motion.name or 'time history'}",
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,
+            "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
             "energy_drift": self.guard.worst,
             "largest_displacement": self.guard.largest_displacement,
+            "largest_turn": self.guard.largest_turn,
+            "doubts": "\n".join(self.guard.doubts),
             "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)) if self.dt else 0,
             "shortest_step": float(self._smallest.values[1:].min(initial=np.inf)),
             "steps": self._drift.count - 1,
@@ -236,6 +241,7 @@ class Recorder:
         if frames := self._fields.count:
             dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
             dataset["q"] = ("frame", "coordinate"), self._fields.values
+            dataset.update(corner_displacements(self.model, self._fields.values))
         for name in ("q", "velocity", "acceleration"):
             dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
         if self.state.memory is not None:

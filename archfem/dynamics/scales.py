@@ -8,6 +8,7 @@ from math import inf, sqrt
 import numpy as np
 from tqdm import tqdm
 
+from archfem.annotated import as_annotated
 from archfem.dynamics.events import EveryMechanism, possible_counts
 from archfem.dynamics.falling.verdict import LOST, Fall
 from archfem.dynamics.history import Ending, history_of
@@ -175,6 +176,7 @@ class MechanismScales:
         ]
 
 
+@as_annotated
 def mechanism_scales(  # noqa: PLR0913  (what `time_history` takes, and the search)
     model: Model,
     motion: Motion,

@@ -74,6 +74,10 @@ class StiffnessDamping:
         frequency: at which damping has the ratio [Hz].
         joints: what it acts on beside the blocks, as in `Rayleigh`; only with "closed", the
             default, do open joints stay free.
+
+    Example:
+        >>> round(af.StiffnessDamping(0.05, 8.0).stiffness, 6)
+        0.001989
     """
 
     ratio: float
@@ -86,8 +90,10 @@ class StiffnessDamping:
         """Refuse negative damping, a frequency that is none and unknown words."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if real(self.frequency, "damping frequency [Hz]") <= 0.0:
-            raise InvalidInput(f"damping frequency {self.frequency} Hz is not above 0: try 8.0")
+        if not 1e-3 <= real(self.frequency, "damping frequency [Hz]") <= 1e6:
+            raise InvalidInput(
+                f"damping frequency {self.frequency} Hz is not between 1 mHz and 1 MHz: try 8.0"
+            )
 
     @property
     def stiffness(self) -> float:

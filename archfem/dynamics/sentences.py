@@ -129,3 +129,17 @@ def _in_all(joints: xr.Dataset) -> str:
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
     longest = float(longest_duration(flags)[0])
     return f"so many fail for {lasting(total)} in all, {lasting(longest)} at the longest"
+
+
+def in_a_line(dataset: xr.Dataset) -> str:
+    """Return what a run is: its title, how long it lasts, its largest |e|, and how it ended.
+
+    Args:
+        dataset: of the run.
+    """
+    told, times = dataset.attrs, dataset["time"].values
+    tilt = float(abs(judged(dataset)["eccentricity"]).max())
+    return (
+        f"History '{told.get('title', '')}': {len(times)} records to {times[-1]:.4g} s, "
+        f"|e| ≤ {tilt:.3f}; {told.get('outcome', '')}"
+    )

@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.arguments import unmasked
 from archfem.arrays import Array
+from archfem.errors import InvalidInput
 from archfem.models.gauges import Readings
+from archfem.models.model import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +24,7 @@ class State:
         acceleration: the rates of those (n,).
         memory: how far each joint point has slid for good (p,) [m], then which bonds are broken
             where any joint has one (2 p,), as `Model.memory`; None where nothing has.
+        structure: `fingerprint` of the structure whose state it is; None where nobody knows.
     """
 
     time: float
@@ -28,6 +32,30 @@ class State:
     velocity: Array
     acceleration: Array
     memory: Array | None = None
+    structure: str | None = None
+
+    def check(self, model: Model) -> None:
+        """Refuse a state that cannot be one of a model.
+
+        Args:
+            model: that is to go on from it.
+
+        Raises:
+            InvalidInput: it is of another structure or size, or has values masked.
+        """
+        for name in ("q", "velocity", "acceleration"):
+            unmasked(getattr(self, name), f"{name} of the state")
+            shape = np.shape(getattr(self, name))
+            if shape != (model.size,):
+                raise InvalidInput(
+                    f"{name} of the state has shape {shape}, and the model {model.size} "
+                    "coordinates: give a state of the same model"
+                )
+        if self.structure not in (None, model.structure.fingerprint):
+            raise InvalidInput(
+                "the state is of another structure, whose blocks are elsewhere than those of "
+                f"'{model.structure.name}': give the last_state of a run of the same model"
+            )
 
 
 @dataclass(frozen=True, eq=False)

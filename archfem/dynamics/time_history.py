@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
@@ -36,8 +35,12 @@ from archfem.models.moving import Moving
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.newton import Newton
+from archfem.threads import on_one_thread
 
 logger = logging.getLogger("archfem")
+
+LEAST_STEP = 1e-6
+"""Shortest time step that can be meant [s]: a second has a million of them."""
 
 STEP = 0.005
 """Time step by which strategies are compared where steps have lengths of their own [s]."""
@@ -82,6 +85,7 @@ _KINDS: dict[str, tuple[tuple[type, ...], str, str]] = {
 """Classes of arguments, what to call them, and what to give."""
 
 
+@on_one_thread
 def time_history(  # noqa: PLR0913  (one call, one object for each thing that may vary)
     model: Model,
     motion: Motion,
@@ -155,6 +159,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not isinstance(start, State):
         rest = start or dead_load(model, newton)
         start = equation.at_rest(rest.q, memory=rest.model.memory)
+    start.check(model)
     stepper = stepper_for(method, equation, start, dt or STEP, newton)
     first = _first(stepper, start, dt or STEP)
     recorder = _recorder(stepper, first, dt, motion.duration, record or Record(), criteria)
@@ -177,7 +182,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
 
 
 def _judged(history: History, model: Moving, state: State, motion: Motion) -> History:
-    """A run of a structure that may fall, with what it has left of it."""
+    """A run of a structure that may fall, with what it has left of it, unless broken off."""
+    if history.ended is Ending.INTERRUPTED:
+        return history
     tilts = history.ended is Ending.FINISHED and tilting(model, state)
     if history.ended is not Ending.PARTED and not tilts:
         return with_fall(history, left_standing(model, state))
@@ -202,8 +209,8 @@ def _steps(model: Model, dt: float | None, tolerance: float | None) -> tuple[flo
         return model.prediction.dt, model.prediction.pace or TOLERANCE
     if dt is None:
         return None, TOLERANCE
-    if not 0.0 < real(dt, "dt [s]") <= 0.1:
-        raise InvalidInput(f"dt {dt!r} s is not between 0 and 0.1 s")
+    if not LEAST_STEP <= real(dt, "dt [s]") <= 0.1:
+        raise InvalidInput(f"dt {dt!r} s is not between {LEAST_STEP:g} and 0.1 s")
     return dt, TOLERANCE
 
 
@@ -240,7 +247,7 @@ def _recorder(
         every=record.every,
         fields_every=record.fields_every,
         criteria=criteria,
-        guard=Guard(model, first),
+        guard=Guard(model, first, damps=isinstance(stepper.equation.scheme, HHT)),
         state=start,
     )
 
@@ -252,14 +259,13 @@ def _stepped(
     end: float,
 ) -> tuple[Ending, str]:
     """Record steps to the end of the motion, or up to an event; which of both, also in words."""
-    # Steps are too small for threads, which only get in each other's way.
     start = recorder.state
     batches = (
         stepper.batches(start, end)
         if isinstance(stepper, Pace)
         else stepper.batches(start, recorder.dt or STEP, end)
     )
-    with _bar(end - start.time) as bar, threadpool_limits(limits=1, user_api="blas"):
+    with _bar(end - start.time) as bar:
         for batch in batches:
             ended, reason, size = _reason(watches, batch, recorder.state.time)
             recorder.add(batch.cut(size), last=reason is not None)
@@ -297,11 +303,16 @@ def last_state(history: History) -> State:
     Args:
         history: of that run, also as read from its file; the coordinates of the other run's model
             must be the same.
+
+    Raises:
+        InvalidInput: the history does not hold it.
     """
     dataset = history.dataset
-    names = [
-        name for name in ("q", "velocity", "acceleration", "memory") if f"last_{name}" in dataset
-    ]
-    return State(
-        float(dataset.attrs["last_time"]), *(dataset[f"last_{name}"].values for name in names)
+    q, velocity, acceleration, memory = (
+        dataset[f"last_{name}"].values if f"last_{name}" in dataset else None
+        for name in ("q", "velocity", "acceleration", "memory")
     )
+    if q is None or velocity is None or acceleration is None:
+        raise InvalidInput("this history does not hold the state in which its run ended")
+    told = dataset.attrs
+    return State(float(told["last_time"]), q, velocity, acceleration, memory, told.get("structure"))

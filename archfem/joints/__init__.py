@@ -16,6 +16,7 @@
     rigid       G of rigid blocks
     sparsity    one sparsity pattern for a family of matrices
     resultants  N, V, M, eccentricity, mobilised friction, thrust line
+    table       what joints carry as CSV, Parquet or Excel
     duration    how long something holds, over steps of any lengths
     criteria    hinged, sliding, open: `Criteria`, and flags of joints by them
 

@@ -7,3 +7,5 @@ from .quadrature import Quadrature as Quadrature
 from .resultants import joint_dataset as joint_dataset
 from .resultants import one_joint as one_joint
 from .resultants import thrust_line as thrust_line
+from .table import joint_table as joint_table
+from .table import write_joint_table as write_joint_table

@@ -28,6 +28,10 @@ class Quadrature:
             the traction integrated in closed form, for facets along which the opening is linear.
         points: points on a facet; None takes 3, for "nodal" those of the element, for "exact"
             the two ends, which neighbouring facets then do not share.
+
+    Example:
+        >>> af.joints.Quadrature("lobatto").on_facet(1)[0].tolist()
+        [0.0, 0.5, 1.0]
     """
 
     rule: str = "lobatto"

@@ -156,6 +156,12 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
 
     Raises:
         InvalidInput: either is something else.
+
+    Example:
+        >>> block = af.column(breadth=0.6, heights=[2.4])
+        >>> pushed = af.collapse_factor(block, live=af.BodyForce(1.0)).joints
+        >>> af.joints.thrust_line(block, pushed).values.round(6).tolist()
+        [[0.3, 0.0]]
     """
     instance(structure, Structure, "structure", "give that whose joints these are")
     instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")

@@ -17,6 +17,7 @@ from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
 from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.structure import Structure
+from archfem.shown import Shown
 
 logger = logging.getLogger("archfem")
 
@@ -50,8 +51,8 @@ _SENTENCES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Collapse:
+@dataclass(frozen=True, eq=False, repr=False)
+class Collapse(Shown, picture="collapse.draw_found"):
     """What limit analysis found.
 
     Attributes:
@@ -70,6 +71,8 @@ class Collapse:
         soil: where there is a fill, its pressure on each piece of a stone's face, between the least
             and the most that it can be [Pa], with the number of the block, the piece's ends and the
             sense of the pressure along x; else None.
+        live: the actions that grew, or the settlement that was followed.
+        structure: that was asked about; None where it is not known.
     """
 
     factor: float
@@ -80,6 +83,8 @@ class Collapse:
     motion: Array
     solutions: WithoutDilatancy | None = None
     soil: xr.Dataset | None = None
+    live: tuple[BodyForce | PointLoad | Settlement, ...] = ()
+    structure: Structure | None = None
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
@@ -90,6 +95,10 @@ class Collapse:
     def sliding_names(self) -> tuple[str, ...]:
         """Names of the joints that slide, in the order of `sliding`."""
         return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return f"Collapse: {self}"
 
     def __str__(self) -> str:
         """Outcome, factor and failing joints, by number and name, in one line."""
@@ -167,7 +176,19 @@ def collapse_factor(
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
         (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
-    stones, dead = self_weight(structure, friction, strength, fill)
+    asked = (live,) if isinstance(live, Settlement) else tuple(loads(live))
+    weighed = self_weight(structure, friction, strength, fill)
+    return replace(_found(structure, weighed, live, friction), live=asked, structure=structure)
+
+
+def _found(
+    structure: Structure,
+    weighed: tuple[Stones, Programme],
+    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
+    friction: str | None,
+) -> Collapse:
+    """Return what `collapse_factor` found, as yet without its live actions."""
+    stones, dead = weighed
     fall = dead.unbalanced()
     if not balanced(fall, dead):
         nothing = replace(fall, forces=np.nan * fall.forces, unknowns=np.nan * fall.unknowns)
@@ -249,6 +270,10 @@ def stands(
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
+
+    Example:
+        >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
+        False
     """
     _, dead = self_weight(structure, friction, strength, fill)
     return balanced(dead.unbalanced(), dead)

@@ -8,6 +8,7 @@ import numpy as np
 from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
+from archfem.units import in_degrees
 
 DISPERSALS = ("boussinesq", "uniform")
 
@@ -49,6 +50,10 @@ class Fill:
     References:
         Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
         Trans. R. Soc. 147 (1857) 9-27. Flamant, C. R. Acad. Sci. 114 (1892) 1465-1468.
+
+    Example:
+        >>> af.limit.Fill(friction_angle=30.0).mobilisation
+        0.3333333333333333
     """
 
     friction_angle: float
@@ -60,6 +65,9 @@ class Fill:
 
     def __post_init__(self) -> None:
         """Refuse what is no fill, or can only be a wrong unit."""
+        for key in ("friction_angle", "spread"):
+            if isinstance(value := getattr(self, key), str) or key == "spread":
+                object.__setattr__(self, key, in_degrees(value, f"fill, {key}"))
         for key in ("friction_angle", "cohesion", "mobilisation", "active", "spread"):
             real(getattr(self, key), f"fill, {key}", least=0.0)
         if not (self.friction_angle == 0.0 or 1.0 <= self.friction_angle <= 60.0):

@@ -179,6 +179,12 @@ def largest_movement(
     References:
         Ochsendorf, The Structural Engineer 84 (2), 2006. Portioli and Cascini, Eng. Struct. 148
         (2017) 485-496.
+
+    Example:
+        >>> ring = af.circular_arch(radius=1.0, thickness=0.15, embrace=180.0, voussoirs=8)
+        >>> spread = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+        >>> round(af.limit.largest_movement(ring, spread, friction=None).largest, 4)
+        0.2269
     """
     instance(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
     instance(settlement, Settlement, "settlement", "give Settlement('left abutment', (-1, 0, 0))")

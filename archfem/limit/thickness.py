@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill import Fill
@@ -12,7 +13,11 @@ from archfem.masonry.structure import Structure
 THINNEST = 1e-4
 """Thickness at which the search for one that stands begins, relative to the structure's size."""
 
+LIMIT = 1e-9
+"""Relative width of the bracket of the thickness beyond which nothing can be built."""
 
+
+@as_annotated
 def minimum_thickness(
     build: Callable[[float], Structure],
     *,
@@ -40,6 +45,12 @@ def minimum_thickness(
 
     References:
         Milankovitch, Z. Math. Phys. 55 (1907) 1-27. Heyman, Int. J. Mech. Sci. 11 (1969) 363-372.
+
+    Example:
+        >>> def semicircle(t):
+        ...     return af.circular_arch(radius=1.0, thickness=t, embrace=180.0, voussoirs=7)
+        >>> round(af.minimum_thickness(semicircle, friction=None, tolerance=1e-4), 3)
+        0.096
     """
     if not 1e-9 <= tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")
@@ -67,12 +78,33 @@ def _bracket(
         try:
             thick = holds(2.0 * thin)
         except InvalidStructure as error:
-            raise InvalidInput(
-                f"no thickness makes it stand: {thin:.4g} m does not, and {error}"
-            ) from error
+            return thin, _thickest(build, holds, thin, error)
         if thick:
             return thin, 2.0 * thin
         thin *= 2.0
+
+
+def _thickest(
+    build: Callable[[float], Structure],
+    holds: Callable[[float], bool],
+    low: float,
+    refusal: InvalidStructure,
+) -> float:
+    """The greatest thickness that can be built, where twice a low one cannot; it must stand [m]."""
+    high = 2.0 * low
+    while high - low > LIMIT * high:
+        middle = 0.5 * (low + high)
+        try:
+            build(middle)
+            low = middle
+        except InvalidStructure as error:
+            high, refusal = middle, error
+    if holds(low):
+        return low
+    raise InvalidInput(
+        f"no thickness makes it stand: {low:.6g} m does not, and no greater one can be built "
+        f"({refusal}): change the other lengths"
+    ) from refusal
 
 
 def _size(build: Callable[[float], Structure]) -> float:

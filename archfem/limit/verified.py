@@ -95,6 +95,12 @@ def verified_mechanism(
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279: a mechanism needs hinges on alternating
         faces, not only four of them.
+
+    Example:
+        >>> ring = af.circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
+        >>> fall = af.collapse_factor(ring, live=af.BodyForce(1.0))
+        >>> str(af.verified_mechanism(ring, fall.joints))
+        'motion and count agree: by motion local (arch), by count local (arch)'
     """
     instance(structure, Structure, "structure", "give that whose joints these are")
     instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")

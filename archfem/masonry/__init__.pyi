@@ -15,6 +15,8 @@ from .stages import Stage as Stage
 from .stages import usual_stages as usual_stages
 from .structure import Joint as Joint
 from .structure import Structure as Structure
+from .survey.circles import FittedCircle as FittedCircle
+from .survey.circles import fitted_circle as fitted_circle
 from .survey.survey import Layer as Layer
 from .survey.survey import Survey as Survey
 from .survey.survey import read_outlines as read_outlines

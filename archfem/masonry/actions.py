@@ -18,6 +18,11 @@ class BodyForce:
     Attributes:
         horizontal: multiple of g, positive along x [-].
         vertical: multiple of g, positive upward [-]; self-weight is -1.
+
+    Example:
+        >>> block = af.column(breadth=0.6, heights=[2.4])
+        >>> round(af.collapse_factor(block, live=af.BodyForce(1.0)).factor, 6)
+        0.25
     """
 
     horizontal: float

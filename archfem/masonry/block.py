@@ -5,6 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
+from archfem.annotated import check_fields
+from archfem.arguments import unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.masonry.geometry import (
@@ -54,6 +56,8 @@ class Block:
 
     def __post_init__(self) -> None:
         """Refuse outlines that do not bound an area anticlockwise."""
+        unmasked(self.outline, f"outline of block '{self.name}'")
+        check_fields(self)
         if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
             raise InvalidStructure(
                 f"block '{self.name}' has outline {self.outline}: give at least 3 finite points"

@@ -27,6 +27,7 @@ from archfem.masonry.block import Block
 from archfem.masonry.materials import Contact
 from archfem.masonry.softness import yielding_blocks
 from archfem.masonry.structure import TOUCHING, Joint, Structure
+from archfem.units import in_degrees
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -53,7 +54,7 @@ class _Piece:
 
 
 def jointed_fill(
-    structure: Structure, size: float, *, angle: float, cohesion: float = 0.0
+    structure: Structure, size: float, *, angle: float | str, cohesion: float = 0.0
 ) -> Structure:
     """Return a structure whose fill is cut into pieces with dry joints between them.
 
@@ -81,7 +82,7 @@ def jointed_fill(
         InvalidInput: nothing is soft, or a value cannot be meant.
     """
     instance(structure, Structure, "structure", "give one with a fill, e.g. bridge(…)")
-    law = _law(real(angle, "angle of friction [°]"), real(cohesion, "cohesion [Pa]", least=0.0))
+    law = _law(in_degrees(angle, "angle of friction"), real(cohesion, "cohesion [Pa]", least=0.0))
     soft = yielding_blocks(structure)
     _check(structure, soft, real(size, "size of the pieces [m]"))
     blocks: list[Block] = []

@@ -5,7 +5,10 @@ from math import inf
 
 from archfem.arguments import real
 from archfem.errors import InvalidInput
-from archfem.units import GPa, MPa, kN
+from archfem.units import G, GPa, MPa, kN
+
+DENSITIES = (1000.0, 4000.0)
+"""Densities of soils and stones [kg/m³]; nothing that is built with has such a weight in N/m³."""
 
 
 def _require(holds: bool, what: str, remedy: str) -> None:
@@ -49,9 +52,14 @@ class Material:
             "stone has about 0.2",
         )
         _require(
-            0.0 < self.unit_weight <= 250.0 * kN,
-            f"unit_weight {self.unit_weight:.3g} N/m³ {of} is not between 0 and 250 kN/m³",
+            1e-3 <= self.unit_weight <= 250.0 * kN,
+            f"unit_weight {self.unit_weight:.3g} N/m³ {of} is not between 0.001 N/m³ and 250 kN/m³",
             "give a weight, not a density, in N/m³, e.g. 20 * kN",
+        )
+        _require(
+            not DENSITIES[0] <= self.unit_weight <= DENSITIES[1],
+            f"unit_weight {self.unit_weight:.4g} N/m³ {of} is the number of a density in kg/m³",
+            f"give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have {self.unit_weight * G:.4g}",
         )
         _require(
             self.strength is None or self.strength > 0.0,
@@ -87,6 +95,10 @@ class Contact:
         dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].
         tension: tensile strength f_t of the bond, up to c / μ, the apex of Coulomb's limit; 0 has
             no bond [Pa].
+
+    Example:
+        >>> af.Contact(1.48e9, 0.30e9, friction=0.6, cohesion=5e3).slides
+        True
     """
 
     normal_stiffness: float

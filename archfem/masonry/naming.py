@@ -25,7 +25,10 @@ def number_of(kind: str, names: Sequence[str], wanted: str | int) -> int:
     if isinstance(wanted, str):
         if wanted in names:
             return list(names).index(wanted)
-        raise InvalidInput(f"there is no {kind} '{wanted}': {did_you_mean(wanted, names, 0.0)}")
+        near = did_you_mean(wanted, names, 0.0)
+        others = difflib.get_close_matches(wanted, list(names), 4, 0.7)[1:]
+        also = f" Or one of {others}" if others else ""
+        raise InvalidInput(f"there is no {kind} '{wanted}': {near}{also}")
     if not isinstance(wanted, Integral) or not 0 <= wanted < len(names):
         raise InvalidInput(
             f"there is no {kind} {wanted}: give a number from 0 to {len(names) - 1}, or a name "

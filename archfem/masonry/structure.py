@@ -1,18 +1,22 @@
 """What stands and what touches: the joints between blocks, and the structure that both form."""
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem.annotated import check_fields
 from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import Contact
 from archfem.masonry.naming import number_of
+from archfem.masonry.overlaps import check_apart, check_simple
 from archfem.masonry.roles import judged_parts, with_roles
+from archfem.shown import Shown
 from archfem.units import G
 
 TOUCHING = 1e-6
@@ -41,6 +45,10 @@ class Joint:
     name: str
     part: str = ""
     role: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no joint."""
+        check_fields(self)
 
     @property
     def lower(self) -> int:
@@ -75,8 +83,8 @@ class Joint:
         return tangent
 
 
-@dataclass(frozen=True)
-class Structure:
+@dataclass(frozen=True, repr=False)
+class Structure(Shown, picture="structure.draw_structure"):
     """Blocks in contact along dry joints.
 
     Attributes:
@@ -95,15 +103,16 @@ class Structure:
     name: str = "structure"
 
     def __post_init__(self) -> None:
-        """Fill in roles, and refuse what does not hang together."""
+        """Fill in roles, and refuse what does not hang together, or overlaps."""
+        check_fields(self)
         object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
-        if not 0.0 < real(self.width, "width [m]") < 1e4:
+        if not 1e-3 <= real(self.width, "width [m]") < 1e4:
             raise InvalidStructure(
-                f"width {self.width:.3g} m is not between 0 and 10 km: give metres"
+                f"width {self.width:.3g} m is not between 1 mm and 10 km: give metres"
             )
-        if not 0.0 < real(self.gravity, "gravity [m/s²]") < 1e3:
-            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0 and 1000")
+        if not 0.1 <= real(self.gravity, "gravity [m/s²]") < 1e3:
+            raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]
             twice = sorted({name for name in names if names.count(name) > 1})
@@ -113,12 +122,21 @@ class Structure:
             raise InvalidStructure("no block is free to move: leave at least one not fixed")
         _ = self.normals
         self._check_support()
+        self._check_outlines()
 
     @cached_property
     def size(self) -> float:
         """Diagonal of the box around all blocks [m]."""
         points = np.concatenate([block.drawn() for block in self.blocks])
         return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """What tells its geometry from any other, to a billionth of its size."""
+        points = [*(block.points for block in self.blocks), *(joint.ends for joint in self.joints)]
+        places = np.round(np.concatenate(points) / self.size, 9) + 0.0  # of -0.0 too 0.0
+        told = f"{self.size:.9g} {self.width:.9g} {[len(each) for each in points]}"
+        return hashlib.sha256(told.encode() + places.tobytes()).hexdigest()[:16]
 
     @cached_property
     def normals(self) -> Array:
@@ -199,6 +217,14 @@ class Structure:
                 f"blocks {loose} rest on nothing: join each, through others, to a fixed block"
             )
 
+    def _check_outlines(self) -> None:
+        """Bodies neither cross themselves nor reach into one another."""
+        outlines = [block.drawn() for block in self.blocks]
+        names = [block.name for block in self.blocks]
+        for outline, name in zip(outlines, names, strict=True):
+            check_simple(outline, name)
+        check_apart(outlines, names, fixed=[block.fixed for block in self.blocks])
+
     @cached_property
     def free(self) -> tuple[int, ...]:
         """Numbers of the blocks that move."""
@@ -215,6 +241,15 @@ class Structure:
         """Weight of the blocks that move, for the whole width [N]."""
         free = (self.blocks[number] for number in self.free)
         return self.width * sum(block.area * block.material.unit_weight for block in free)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        free, count = len(self.free), len(self.blocks)
+        return (
+            f"Structure '{self.name}': {free} blocks that move, {count - free} fixed, "
+            f"{len(self.joints)} joints; size {self.size:.3g} m, width {self.width:.3g} m, "
+            f"weight {self.weight / 1e3:.4g} kN"
+        )
 
     def density(self, block: Block) -> float:
         """Return the density of a block's material under this structure's gravity [kg/m³].

@@ -16,6 +16,7 @@
     turning_places  how points of its blocks move
     full            the rung with all nodes
     monolithic      the slow reference, assembled at every iteration
+    exchange        states of a model as files of other programs
     fem             meshes, spaces and forms: all that knows FEniCSx and gmsh
 
 It imports from `masonry`, `joints` and the ground. Start reading at `model`, then at `rigid`.

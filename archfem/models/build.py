@@ -1,7 +1,7 @@
 """From a structure to a model on the rung that was asked for."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from archfem.errors import InvalidInput
 from archfem.masonry.softness import soft_blocks, softness
@@ -10,10 +10,12 @@ from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
 from archfem.models.reduced import reduced
 from archfem.models.rigid import rigid
+from archfem.threads import on_one_thread
 
 logger = logging.getLogger("archfem")
 
 
+@on_one_thread
 def build(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of a structure.
 
@@ -26,7 +28,8 @@ def build(structure: Structure, asked: Discretisation) -> Model:
             assembles the UFL forms at each iteration.
 
     Returns:
-        The model; where a rung is too low for a soft block, a warning is logged.
+        The model; where a rung is too low for a soft block, a warning is logged, and is among its
+        `doubts`.
 
     Raises:
         InvalidInput: a rung is asked for blocks that there are not, or "monolithic" for joints that
@@ -36,24 +39,29 @@ def build(structure: Structure, asked: Discretisation) -> Model:
     if asked.displacements == "large":
         from archfem.models.moving import Moving  # compiled: it takes a while to import
 
-        return Moving(_small(structure, asked))
-    return _small(structure, asked)
+        made: Model = Moving(_small(structure, asked))
+    else:
+        made = _small(structure, asked)
+    made.doubts = tuple(_doubts(structure, _rungs(structure, asked.fidelity)))
+    for words in made.doubts:
+        logger.warning("%s", words)
+    return made
 
 
 def _small(structure: Structure, asked: Discretisation) -> Model:
     """Build a model of small displacements."""
     rungs = _rungs(structure, asked.fidelity)
-    _doubt(structure, rungs)
     if asked.fidelity == "monolithic":
         _check_plain(structure)
     if asked.fidelity == "rigid":
         return rigid(structure, asked.through, asked.rule)
-    from archfem.models.fem.mesh import mesh  # FEniCSx is needed from here on only
+    from archfem.models.fem.mesh import mesh, read_mesh  # FEniCSx is needed from here on only
     from archfem.models.fem.space import broken_space
     from archfem.models.full import full
     from archfem.models.monolithic import Monolithic
 
-    space = broken_space(mesh(structure, asked), asked.degree)
+    made = mesh(structure, asked) if asked.file is None else read_mesh(structure, asked.file)
+    space = broken_space(made, asked.degree)
     if asked.fidelity == "monolithic":
         return Monolithic(space, asked.rule)
     model = full(space, asked.rule)
@@ -88,16 +96,13 @@ def _check_plain(structure: Structure) -> None:
         )
 
 
-def _doubt(structure: Structure, rungs: Sequence[str]) -> None:
-    """Say where a rung is too low for a block."""
+def _doubts(structure: Structure, rungs: Sequence[str]) -> Iterator[str]:
+    """Where a rung is too low for a block."""
     for number in soft_blocks(structure):
         if rungs[number] in ("rigid", "faces", "condensed"):
             found = softness(structure, number)
-            logger.warning(
-                "block '%s' is soft: its own modes begin near %.0f Hz, in the seismic band, and it "
-                "is %.2g times as stiff as its joints; '%s' is wrong for it, use 'full'",
-                structure.blocks[number].name,
-                found.inner,
-                found.ratio,
-                rungs[number],
+            yield (
+                f"block '{structure.blocks[number].name}' is soft: its own modes begin near "
+                f"{found.inner:.0f} Hz, in the seismic band, and it is {found.ratio:.2g} times as "
+                f"stiff as its joints; '{rungs[number]}' is wrong for it, use 'full'"
             )

@@ -72,6 +72,24 @@ class Cells:
         Returns:
             (2, n).
         """
+        edge, share, beside = self.foot(block, point)
+        ends = [self.lift[2 * node : 2 * node + 2] for node in edge]
+        foot = (1.0 - share) * ends[0] + share * ends[1]
+        along = self.places[edge[1]] - self.places[edge[0]]
+        turn = sparse.csr_matrix([[-along[1], along[0]]]) @ (ends[1] - ends[0]) / (along @ along)
+        return (foot + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ turn).tocsr()
+
+    def foot(self, block: int, point: Array) -> tuple[NDArray[np.intp], float, Array]:
+        """Return the edge of a block nearest to a point, and where the point is from it.
+
+        Args:
+            block: number of the block.
+            point: on its surface or near it (2,) [m].
+
+        Returns:
+            Numbers of the edge's ends (2,); how far along it the nearest place is, 0 to 1; and from
+            there to the point (2,) [m].
+        """
         edges, owner = self._edges
         edges = edges[owner == block]
         start, step = self.places[edges[:, 0]], np.diff(self.places[edges], axis=1)[:, 0]
@@ -79,8 +97,5 @@ class Cells:
         share = np.clip(share, 0.0, 1.0)
         distance = np.linalg.norm(start + share[:, None] * step - point, axis=1)
         nearest = int(np.argmin(distance))
-        ends = [self.lift[2 * node : 2 * node + 2] for node in edges[nearest]]
-        foot = (1.0 - share[nearest]) * ends[0] + share[nearest] * ends[1]
-        along, beside = step[nearest], point - start[nearest] - share[nearest] * step[nearest]
-        turn = sparse.csr_matrix([[-along[1], along[0]]]) @ (ends[1] - ends[0]) / (along @ along)
-        return (foot + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ turn).tocsr()
+        beside = point - start[nearest] - share[nearest] * step[nearest]
+        return edges[nearest], float(share[nearest]), beside

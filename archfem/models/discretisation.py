@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from archfem.arguments import real, row, whole
 from archfem.errors import InvalidInput
@@ -45,6 +46,8 @@ class Discretisation:
         points: on each facet, 3 where not given.
         displacements: "small", or "large" where blocks may turn and slide as far as they like, on
             all rungs but "monolithic"; those of a fill with nodes stay small.
+        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and
+            `coarse`; not on the rung "rigid", which has no mesh.
     """
 
     fidelity: str | Mapping[str, str] = "full"
@@ -55,6 +58,7 @@ class Discretisation:
     quadrature: str | None = None
     points: int | None = None
     displacements: str = "small"
+    file: str | Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse unknown words, impossible numbers, and what does not go together."""
@@ -73,6 +77,8 @@ class Discretisation:
                 "displacements are large, which the rung 'monolithic' does not know: use 'full', "
                 "which is the same model, or displacements = 'small'"
             )
+        if self.file is not None and self.fidelity == "rigid":
+            raise InvalidInput(f"file = {str(self.file)!r}: the rung 'rigid' has no mesh to read")
         if self.degree not in (1, 2):
             raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")
         if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):

@@ -51,6 +51,7 @@ class Jointed:
         self._pattern = pattern
         self._across = operator.tangents(pattern)
         self.prediction: Prediction | None = None
+        self.doubts: tuple[str, ...] = ()
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
     def with_operator(self, operator: JointOperator) -> "Jointed":

@@ -130,6 +130,7 @@ class Model(Protocol):
         cells: polygons that cover the blocks, and how they move with q.
         supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         prediction: what was predicted when it was chosen; None where it was asked for by name.
+        doubts: why this rung may be wrong for the structure, a sentence each.
     """
 
     structure: Structure
@@ -141,6 +142,7 @@ class Model(Protocol):
     cells: Cells
     supports: Array
     prediction: Prediction | None
+    doubts: tuple[str, ...]
 
     @property
     def operator(self) -> JointOperator | None:

@@ -50,6 +50,7 @@ class Monolithic:
         self.blocks = self._pattern.spread(linear.blocks)
         self._closed = linear.closed()
         self.prediction: Prediction | None = None
+        self.doubts: tuple[str, ...] = ()
 
     def settled(self, settlement: Settlement) -> "Monolithic":
         """Return the same model with a support that has moved, further than before.

@@ -74,6 +74,7 @@ class Moving:
         self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.blocks)
         self.supports = self.at_rest.supports
         self.prediction: Prediction | None = None
+        self.doubts: tuple[str, ...] = ()
         self._points: dict[PointLoad, TurningPoint] = {}
         self._slid = np.zeros_like(answer(self.joints).slid)
 

@@ -7,6 +7,7 @@
     oscillator      a damped oscillator under straight-line accelerations
     spectra         response spectra, and scaling to them
     design_spectra  spectra of codes and of the user
+    newer_codes     spectra of NTC 2018, ASCE 7-22 and EN 1998-1-1:2024
     synthetic       artificial accelerograms from a seed
     matching        a motion matched to a design spectrum by wavelets
     suite           `Suite`: the motions of one study, matched and scaled alike

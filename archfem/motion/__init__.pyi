@@ -5,6 +5,9 @@ from .design_spectra import Tbec2018 as Tbec2018
 from .matching import Match as Match
 from .matching import matched as matched
 from .motion import Motion as Motion
+from .newer_codes import Asce2022 as Asce2022
+from .newer_codes import Eurocode2024 as Eurocode2024
+from .newer_codes import Ntc2018 as Ntc2018
 from .spectra import response_spectrum as response_spectrum
 from .spectra import scaled_to_spectrum as scaled_to_spectrum
 from .suite import Suite as Suite

@@ -5,10 +5,13 @@ from typing import Protocol
 
 import numpy as np
 
-from archfem.arguments import real
+from archfem.annotated import check_fields
+from archfem.arguments import real, said, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion.oscillator import check
+
+LARGEST = 10.0  # spectral acceleration that no code gives [g]: more can only be a wrong unit
 
 
 class DesignSpectrum(Protocol):
@@ -66,6 +69,11 @@ class Tbec2018:
 
     References:
         Turkish Building Earthquake Code (2018), sections 2.3.2 to 2.3.5.
+
+    Example:
+        >>> code = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
+        >>> code.horizontal([0.0, 0.5, 1.0]).round(3).tolist()
+        [0.476, 1.19, 0.625]
     """
 
     ss: float
@@ -75,8 +83,9 @@ class Tbec2018:
     def __post_init__(self) -> None:
         real(self.ss, "map value S_S [g]")
         real(self.s1, "map value S_1 [g]")
-        if not (0.0 < self.ss < np.inf and 0.0 < self.s1 < np.inf):
-            raise InvalidInput(f"map values S_S {self.ss!r} and S_1 {self.s1!r} g: both are > 0")
+        if not (0.0 < self.ss <= LARGEST and 0.0 < self.s1 <= LARGEST):
+            raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
+        check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
         if self.site not in _SHORT_FACTORS:
@@ -101,9 +110,8 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative or not finite.
         """
-        natural = _checked(periods, np.inf)
         start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * _branches(natural, (start, end, long), lowest=0.4)
+        return self.sds * branches(checked_periods(periods, np.inf), (start, end, long), lowest=0.4)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -114,9 +122,9 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative, or beyond 3 s, where the code gives none.
         """
-        natural = _checked(periods, 3.0)
+        natural = checked_periods(periods, 3.0)
         start, end = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0
-        return 0.8 * self.sds * _branches(natural, (start, end, np.inf), lowest=0.4)
+        return 0.8 * self.sds * branches(natural, (start, end, np.inf), lowest=0.4)
 
 
 # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
@@ -136,8 +144,7 @@ _GROUND = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_UPRIGHT = {1: 0.90, 2: 0.45}  # a_vg / a_g
-_UPRIGHT_PERIODS = (0.05, 0.15, 1.0)
+_UPRIGHT, _UPRIGHT_PERIODS = {1: 0.90, 2: 0.45}, (0.05, 0.15, 1.0)  # a_vg / a_g; T_B, T_C, T_D [s]
 
 
 @dataclass(frozen=True)
@@ -159,6 +166,10 @@ class Eurocode8:
 
     References:
         EN 1998-1:2004, clauses 3.2.2.2 and 3.2.2.3.
+
+    Example:
+        >>> af.Eurocode8(ag=0.3, ground="C").horizontal([0.0, 0.2, 2.0]).round(4).tolist()
+        [0.345, 0.8625, 0.2588]
     """
 
     ag: float
@@ -167,8 +178,10 @@ class Eurocode8:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if not real(self.ag, "design ground acceleration [g]") > 0.0:
-            raise InvalidInput(f"design ground acceleration {self.ag!r} g: expected more than 0")
+        if not 0.0 < real(self.ag, "design ground acceleration [g]") <= LARGEST:
+            told = f"expected more than 0, up to {LARGEST:g}"
+            raise InvalidInput(f"design ground acceleration {self.ag!r} g: {told}")
+        check_fields(self)
         if self.type not in _GROUND or self.ground not in _GROUND[1]:
             raise InvalidInput(
                 f"Eurocode 8 type {self.type!r} on ground {self.ground!r}: expected type 1 or 2 on "
@@ -187,8 +200,8 @@ class Eurocode8:
         """
         soil, *corners = _GROUND[self.type][self.ground]
         top = 2.5 * self._reduction
-        natural = _checked(periods, 4.0)
-        return self.ag * soil * top * _branches(natural, tuple(corners), lowest=1.0 / top)
+        natural = checked_periods(periods, 4.0)
+        return self.ag * soil * top * branches(natural, tuple(corners), lowest=1.0 / top)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -200,7 +213,7 @@ class Eurocode8:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
         top = 3.0 * self._reduction
-        shape = _branches(_checked(periods, 4.0), _UPRIGHT_PERIODS, lowest=1.0 / top)
+        shape = branches(checked_periods(periods, 4.0), _UPRIGHT_PERIODS, lowest=1.0 / top)
         return self.ag * _UPRIGHT[self.type] * top * shape
 
     @property
@@ -226,6 +239,7 @@ class TableSpectrum:
     vertical_values: Array | None = None
 
     def __post_init__(self) -> None:
+        unmasked(self.periods, "periods of a spectrum table")
         periods = np.asarray(self.periods, dtype=float)
         object.__setattr__(self, "periods", periods)
         grows = periods.ndim == 1 and len(periods) > 1 and bool(np.all(np.diff(periods) > 0.0))
@@ -234,11 +248,14 @@ class TableSpectrum:
         for name in ("values", "vertical_values"):
             if getattr(self, name) is None and name == "vertical_values":
                 continue
+            unmasked(getattr(self, name), f"{name} of a spectrum table")
             row = np.asarray(getattr(self, name), dtype=float)
             if row.shape != periods.shape or not np.all((row > 0.0) & np.isfinite(row)):
                 raise InvalidInput(
                     f"{name} of a spectrum table: expected {len(periods)} positive values in g"
                 )
+            if row.max() > LARGEST:
+                raise InvalidInput(f"{name} reach {row.max():.3g} g, more than {LARGEST:g} g")
             object.__setattr__(self, name, row)
 
     def horizontal(self, periods: float | Array) -> Array:
@@ -266,19 +283,26 @@ class TableSpectrum:
         return self._between(periods, self.vertical_values)
 
     def _between(self, periods: float | Array, row: Array) -> Array:
-        natural = _checked(periods, self.periods[-1])
+        natural = checked_periods(periods, self.periods[-1])
         if np.any(natural < self.periods[0]):
             raise InvalidInput(f"period below the table's first, {self.periods[0]:g} s")
         return np.interp(natural, self.periods, row)
 
 
-def _checked(periods: float | Array, longest: float) -> Array:
+def checked_periods(periods: float | Array, longest: float) -> Array:
     """Return periods as an array, refused where a spectrum is not defined.
+
+    Args:
+        periods: of any shape [s].
+        longest: for which the spectrum is defined [s].
 
     Raises:
         InvalidInput: a period is negative, not finite, or beyond the longest.
     """
-    natural = np.asarray(periods, dtype=float)
+    try:
+        natural = np.asarray(periods, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"periods {said(periods)} s are no numbers") from error
     check(natural, 0.05)
     if np.any(natural > longest):
         raise InvalidInput(
@@ -287,8 +311,14 @@ def _checked(periods: float | Array, longest: float) -> Array:
     return natural
 
 
-def _branches(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
-    """Return the usual shape: from lowest to 1, level, falling with 1/T and then with 1/T²."""
+def branches(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
+    """Return the usual shape: from lowest to 1, level, falling with 1/T and then with 1/T².
+
+    Args:
+        periods: of any shape [s].
+        corners: where it is level, begins to fall, and falls with 1/T² [s].
+        lowest: value at zero.
+    """
     rise, level, fall = corners
     safe = np.maximum(periods, rise)
     return np.where(

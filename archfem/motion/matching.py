@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.motion import oscillator, signals
@@ -25,6 +26,10 @@ _PEAK = 0.25  # weight of the misfit of the peak acceleration: 10 % count as 2.5
 _REACH = 4.5  # widths after which a wavelet has faded to 2e-9
 
 
+BAND = 0.05, 2.0
+"""Shortest and longest period that is matched where nothing else is asked for [s]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Match:
     """A motion matched to a spectrum, and what that did to it.
@@ -34,19 +39,22 @@ class Match:
         misfit: root mean square of spectrum/target - 1 over the band, by component [-].
         before: measures of the motion as it came, by component.
         after: measures of the matched motion, by component.
+        band: shortest and longest period that was matched [s].
     """
 
     motion: Motion
     misfit: dict[str, float]
     before: dict[str, Measures]
     after: dict[str, Measures]
+    band: tuple[float, float] = BAND
 
 
+@as_annotated
 def matched(
     motion: Motion,
     spectrum: DesignSpectrum,
     *,
-    band: tuple[float, float] = (0.05, 2.0),
+    band: tuple[float, float] = BAND,
     damping: float = 0.05,
     tolerance: float = 0.05,
 ) -> Match:
@@ -113,7 +121,7 @@ def misfit(
     spectrum: DesignSpectrum,
     *,
     component: str = "horizontal",
-    band: tuple[float, float] = (0.05, 2.0),
+    band: tuple[float, float] = BAND,
     damping: float = 0.05,
 ) -> float:
     """Return the root mean square of spectrum/target - 1 over a band, evenly in log period [-].
@@ -167,6 +175,7 @@ def _compared(
         },
         {name: measures(before, name) for name in names},
         {name: measures(after, name) for name in names},
+        band,
     )
 
 

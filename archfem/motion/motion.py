@@ -2,30 +2,31 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.annotated import methods_as_annotated
+from archfem.arguments import instance, is_number, said
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import signals
 from archfem.motion.records.read import read_components
 from archfem.motion.synthetic import accelerogram
+from archfem.shown import Shown
 from archfem.units import STANDARD_GRAVITY
 
-COMPONENTS = ("horizontal", "vertical", "transverse")
+COMPONENTS = "horizontal", "vertical", "transverse"
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+@methods_as_annotated
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Shown, picture="motions.draw_motion"):
     """The acceleration of the ground in up to three directions, which begin together.
 
-    Each component keeps its own length and is zero before and after. What changes a motion returns
-    a new one and does the same to every component.
+    Components keep their own lengths, zero before and after; what changes one returns a new motion.
 
     Args:
         horizontal: accelerations along the arch (n,) [m/s²].
@@ -45,13 +46,17 @@ class Motion:
     transverse: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.dt, Real) and 0.0 < self.dt < np.inf):
-            raise InvalidInput(f"dt {self.dt!r} s: the time between samples is a positive number")
+        if not (is_number(self.dt) and self.dt >= 1e-6):
+            raise InvalidInput(f"dt {said(self.dt)} s is no positive number from 1e-6 on")
         instance(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
                 object.__setattr__(self, component, signals.checked(samples, component))
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        return f"Motion '{self.name}': {self.duration:.4g} s, peak {self.pga:.3g} m/s²"
 
     @classmethod
     def read(
@@ -177,14 +182,11 @@ class Motion:
         """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
 
         Args:
-            times: times (n,) [s]; straight between samples, zero outside the record.
+            times: of any shape (n in all) [s]; straight between samples, zero outside the record.
         """
-        moments = np.atleast_1d(np.asarray(times, dtype=float))
-        both = np.zeros((len(moments), 2))
-        for axis, name in enumerate(COMPONENTS[:2]):
-            if name in self.components:
-                both[:, axis] = signals.between(self.component(name), moments / self.dt)
-        return both
+        moments, up = np.asarray(times, dtype=float).ravel() / self.dt, self.vertical
+        rows = self.horizontal, np.zeros(1) if up is None else up
+        return np.column_stack([signals.between(row, moments) for row in rows])
 
     def scaled(self, factor: float) -> "Motion":
         """Return the motion with all components multiplied by a factor.
@@ -207,9 +209,9 @@ class Motion:
         Raises:
             InvalidInput: the horizontal is at rest, or pga is not positive.
         """
-        if self.pga == 0.0 or not pga > 0.0:
-            raise InvalidInput(f"scaling a peak of {self.pga:g} to {pga:g} m/s²: both must be > 0")
-        return self.scaled(pga / self.pga)
+        if self.pga > 0.0 and pga > 0.0:
+            return self.scaled(pga / self.pga)
+        raise InvalidInput(f"scaling a peak of {self.pga:g} to {pga:g} m/s²: both must be > 0")
 
     def cut(self, start: float, end: float | None = None) -> "Motion":
         """Return the samples from start to end; a component that ended before keeps one zero.
@@ -302,8 +304,8 @@ class Motion:
         if other is None:
             return replace(self, vertical=None)
         self._check_step(other)
-        upright = other.horizontal if other.vertical is None else other.vertical
-        return replace(self, vertical=upright)
+        up = other.horizontal if other.vertical is None else other.vertical
+        return replace(self, vertical=up)
 
     def with_transverse(self, other: "Motion") -> "Motion":
         """Return the motion with the horizontal of another one as its transverse.
@@ -319,11 +321,9 @@ class Motion:
 
     def _check_step(self, other: "Motion") -> None:
         if not np.isclose(other.dt, self.dt, rtol=1e-6):
-            raise InvalidInput(
-                f"{other.name!r} has a step of {other.dt:g} s and {self.name!r} of {self.dt:g} s: "
-                "bring one to the other's with resampled"
-            )
+            steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
+            raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
     def _each(self, change: Callable[[Array], Array]) -> "Motion":
-        changed: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
-        return replace(self, **changed)
+        rows: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
+        return replace(self, **rows)

@@ -4,12 +4,16 @@ import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import integrate
 
+from archfem.arguments import pieces, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
 
 LARGEST_PEAK = 5.0 * STANDARD_GRAVITY
 """No record reaches this acceleration [m/s²]: beyond it the unit must be wrong."""
+
+MOST_SAMPLES = 10_000_000
+"""Samples of a motion, beyond which there is no room for them: a day at 100 Hz."""
 
 
 def checked(samples: Array | None, component: str) -> Array:
@@ -22,9 +26,10 @@ def checked(samples: Array | None, component: str) -> Array:
     Raises:
         InvalidInput: it is not one row of finite numbers, or exceeds 5 g.
     """
+    unmasked(samples, f"{component} acceleration")
     try:
         row = np.array(samples, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
     if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
         raise InvalidInput(
@@ -168,6 +173,8 @@ def resampled(samples: Array, dt: float, new_dt: float) -> Array:
     """
     if not 0.0 < new_dt < np.inf:
         raise InvalidInput(f"dt {new_dt!r} s: the time between samples is a positive number")
+    pieces((len(samples) - 1) * dt, new_dt, "samples of a motion", MOST_SAMPLES)
+    new_dt = float(new_dt)
     count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
     new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
     rises = np.diff(samples, prepend=samples[0] + 1.0, append=samples[-1] + 1.0) > 0.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.arguments import instance, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import oscillator
@@ -37,8 +37,14 @@ def response_spectrum(
     References:
         Nigam, Jennings, Calculation of response spectra from strong-motion earthquake records,
         BSSA 59 (1969). Chopra, Dynamics of structures, section 6.6.
+
+    Example:
+        >>> motion = af.Motion.synthetic(duration=4.0, pga=3.0, seed=1)
+        >>> round(float(af.response_spectrum(motion, 0.0)), 6)
+        3.0
     """
     instance(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    unmasked(periods, "periods [s]")
     try:
         natural = np.asarray(periods, dtype=float)
     except (TypeError, ValueError) as error:

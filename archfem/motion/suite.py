@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from archfem.annotated import check_fields
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
@@ -35,6 +36,7 @@ class Suite:
     matches: tuple[Match, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "pairs", tuple(self.pairs))
         if not self.pairs:
             raise InvalidInput(f"suite {self.name!r} has no motion")

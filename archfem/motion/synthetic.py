@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.arguments import real, whole
+from archfem.arguments import pieces, real, whole
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
-from archfem.motion.signals import baseline_corrected
+from archfem.motion.signals import MOST_SAMPLES, baseline_corrected
 
 # Firm ground; the vertical is richer in high frequencies (Clough, Penzien, section 28-5).
 _GROUND = {"horizontal": (15.0, 0.6), "vertical": (25.0, 0.6)}  # rad/s, damping ratio
@@ -35,6 +35,7 @@ def accelerogram(
             f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
             f"{ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
         )
+    pieces(duration, dt, "samples of a synthetic motion", MOST_SAMPLES)
     random = np.random.default_rng(whole(seed, "seed of a synthetic motion", least=0))
     count = round(duration / dt) + 1
     level = pga * enveloped_noise(count, dt, random=random)

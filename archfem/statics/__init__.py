@@ -1,15 +1,20 @@
 """A model at rest and about rest: dead load, pushover, modes, stress, free bodies.
 
-    newton       one equilibrium solve through PETSc SNES
+    newton       one equilibrium solve
+    attempts     what it is asked, and what comes of it
+    snes         Newton's method by PETSc SNES
+    superlu      the same by SciPy, where PETSc is not installed
     loading      loads that grow together
     lasting      equilibria that joints which dilate or break do not upset
     relaxation   a structure creeps to rest where Newton's method fails
     search       the next equilibrium, from the last one
     equilibrium  dead load and other loads that stay
+    plausible    whether friction can hold what a dead load asks of it
     path         paths of equilibrium under a load that grows
     support_path the same under the dead load, over a support that moves
     pushover     a load grows until hardly anything resists
     eigen        the lowest vibrations of sparse matrices, by SLEPc
+    dense_eigen  those of small ones by LAPACK, where SLEPc is not installed
     modes        vibrations about a state
     stress       principal stresses in the blocks
     strength     use of the blocks' strength

@@ -13,9 +13,7 @@ from scipy import sparse
 from archfem._petsc import PETSc, SLEPc
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
-
-ROUNDING = 1e-13
-"""Of the largest ω² of a coordinate by itself: what rounding makes of a zero stays well below."""
+from archfem.statics.dense_eigen import mechanism, nothing
 
 ACCURACY = 1e-12
 """Residual of a pair, relative to its inverted eigenvalue, at which SLEPc is content."""
@@ -68,9 +66,9 @@ def lowest(
     Raises:
         DidNotConverge: K is singular or negative, or SLEPc did not find all pairs.
     """
-    zero = ROUNDING * float(np.max(stiffness.diagonal() / mass.diagonal()))
+    zero = nothing(stiffness, mass)
     if zero <= 0.0:
-        raise DidNotConverge(_mechanism(0.0, zero))
+        raise DidNotConverge(mechanism(0.0, zero))
     solver = _solver(_matrix(stiffness), _matrix(mass), count, -zero)
     solver.setTolerances(accuracy, iterations)
     solver.solve()
@@ -84,7 +82,7 @@ def lowest(
     order = np.argsort(squares)[:count]
     squares, shapes = squares[order], shapes[:, order]
     if _negative(solver) or squares[0] <= zero:
-        raise DidNotConverge(_mechanism(float(squares[0]), zero))
+        raise DidNotConverge(mechanism(float(squares[0]), zero))
     edge = float(squares[-1]) * (1.0 - APART)
     below, there = int(np.sum(squares < edge)), check(stiffness, mass, edge)
     if there != below:
@@ -93,14 +91,6 @@ def lowest(
             f"are {there}: ask for a few more or fewer"
         )
     return squares, shapes / np.sqrt(np.sum(shapes * (mass @ shapes), axis=0))
-
-
-def _mechanism(square: float, zero: float) -> str:
-    """What to say where nothing holds something."""
-    return (
-        f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding makes "
-        f"up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
-    )
 
 
 def _matrix(matrix: sparse.csr_matrix) -> PETSc.Mat:

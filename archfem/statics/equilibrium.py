@@ -10,6 +10,7 @@ import xarray as xr
 from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import judged
 from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce
 from archfem.masonry.stages import Stage, placed
@@ -18,15 +19,17 @@ from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
 from archfem.models.unfinished import Unfinished
+from archfem.shown import Shown
 from archfem.statics.newton import Newton, Solver
 from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
+from archfem.threads import on_one_thread
 
 SMALLEST_STEP = 1.0 / 64.0
 """Of a load or a settlement, to which steps are halved before giving up."""
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Shown, picture="dead.draw_dead_load"):
     """A structure at rest.
 
     Attributes:
@@ -55,6 +58,11 @@ class Equilibrium:
                 f"the state has {self.model.size} coordinates and {len(self.model.memory)} joint "
                 f"points, the model {model.size} and {len(model.memory)}: give the same model's"
             )
+        if model.structure.fingerprint != self.model.structure.fingerprint:
+            raise InvalidInput(
+                f"the state is of another structure, '{self.model.structure.name}', whose blocks "
+                f"are elsewhere than those of '{model.structure.name}': give the same model's"
+            )
         built = self.model.built if isinstance(self.model, Jointed) else None
         if built is not None and isinstance(model, Jointed):
             model = model.begun(built)
@@ -67,6 +75,15 @@ class Equilibrium:
         faces = gauges.faces(gauges.read(self.q))
         resultants, moved = self.model.resultants(self.q), isinstance(self.model, Moving)
         return joint_dataset(self.model.structure, resultants, faces=faces, moved=moved)
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        own, model = judged(self.joints), self.model
+        return (
+            f"Equilibrium of '{model.structure.name}' ({model.fidelity}, {model.size} coordinates)"
+            f": |e| ≤ {float(abs(own['eccentricity']).max()):.3f}, "
+            f"V/N ≤ {float(own['friction'].max()):.3f}, N ≥ {float(own['N'].min()) / 1e3:.3g} kN"
+        )
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return what one joint carries.
@@ -89,6 +106,7 @@ def self_weight(model: Model) -> Array:
     return model.load(BodyForce(0.0, -1.0))
 
 
+@on_one_thread
 def dead_load(
     model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
 ) -> Equilibrium:
@@ -117,6 +135,11 @@ def dead_load(
         InvalidInput: the model is none, or the stages do not build it.
         DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
             equilibrium found on the way, under part of the weight.
+
+    Example:
+        >>> model = af.build(af.column(breadth=0.6, heights=[1.2, 1.2]), fidelity="rigid")
+        >>> af.dead_load(model).joints["N"].values.round(3).tolist()
+        [28800.0, 14400.0]
     """
     check_model(model)
     if stages is None:

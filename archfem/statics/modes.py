@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from numbers import Integral
 
 import numpy as np
@@ -12,15 +13,19 @@ from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model, check_model
+from archfem.packages import needed
+from archfem.shown import Shown
+from archfem.statics import dense_eigen
 from archfem.statics.equilibrium import Equilibrium
 from archfem.tables import aligned
+from archfem.threads import on_one_thread
 
 SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(Shown, picture="modes.draw_modes"):
     """The lowest modes of a model.
 
     Attributes:
@@ -34,6 +39,14 @@ class Modes:
     frequencies: Array
     shapes: Array
     masses: Array
+
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        share, low, high = self.mass_ratios.sum(axis=0), *self.frequencies[[0, -1]]
+        return (
+            f"Modes of '{self.model.structure.name}': {len(self.frequencies)} from {low:.2f} to "
+            f"{high:.2f} Hz, with {share[0]:.0%} of the mass along x and {share[1]:.0%} along y"
+        )
 
     @property
     def periods(self) -> Array:
@@ -66,6 +79,7 @@ class Modes:
         return aligned(head, rows)
 
 
+@on_one_thread
 def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
     """Find the lowest modes of small vibrations about a state, K φ = ω² M φ.
 
@@ -87,9 +101,13 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
         InvalidInput: there are not so many modes, or the state is another model's.
         DidNotConverge: the structure is a mechanism there and does not vibrate, or modes were not
             found; `last` is the state.
-    """
-    from archfem.statics.eigen import lowest  # SLEPc is needed from here on only
+        NotInstalled: SLEPc is not there, and the model too large to do without.
 
+    Example:
+        >>> model = af.build(af.column(breadth=0.6, heights=[2.4]), fidelity="rigid")
+        >>> af.modes(model, 3).frequencies.round(2).tolist()
+        [10.56, 79.23, 87.53]
+    """
     check_model(model)
     if about is not None:
         instance(about, Equilibrium, "about", "give dead_load(model), or None")
@@ -99,13 +117,24 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )
     try:
-        squares, shapes = lowest(_tangent(model, about), model.mass, count)
+        squares, shapes = _lowest(_tangent(model, about), model.mass, count)
     except DidNotConverge as error:
         state = "with all joints closed" if about is None else "about the given state"
         raise DidNotConverge(f"no modes {state}: {error}", last=about) from error
     masses = np.sum(model.body * splu(model.mass.tocsc()).solve(model.body), axis=0)
     sense = _sense(shapes, shapes.T @ model.body, masses)
     return Modes(model, np.sqrt(squares) / (2.0 * np.pi), shapes * sense, masses)
+
+
+def _lowest(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
+) -> tuple[Array, Array]:
+    """The lowest ω² and their shapes: by SLEPc, or where that is not installed by LAPACK."""
+    if find_spec("slepc4py") is None:
+        return dense_eigen.lowest(stiffness, mass, count)
+    with needed("SLEPc"):
+        from archfem.statics import eigen
+    return eigen.lowest(stiffness, mass, count)
 
 
 def _tangent(model: Model, about: Equilibrium | None) -> sparse.csr_matrix:

@@ -10,13 +10,15 @@ from archfem.arguments import instance
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria, flagged
-from archfem.joints.resultants import joint_dataset
+from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
+from archfem.shown import Shown
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
+from archfem.threads import on_one_thread
 
 Path = LoadPath | SupportPath
 
@@ -60,8 +62,8 @@ class Stop:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class Pushover:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pushover(Shown, picture="pushover.draw_pushover"):
     """What a pushover found.
 
     Attributes:
@@ -91,7 +93,28 @@ class Pushover:
         """Factor that was reached at last; under a load that is also the largest."""
         return float(self.curve["factor"][-1])
 
+    def _words(self) -> str:
+        """What it is, in a line or two."""
+        steps, known = self.curve.sizes["step"] - 1, np.isfinite(self.limit)
+        beyond = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}" if known else ""
+        return (
+            f"Pushover: factor {self.factor:.4g} after {steps} steps{beyond}, "
+            f"{len(self.hinges)} hinges; {self.outcome}"
+        )
 
+    def joint(self, joint: str | int) -> xr.Dataset:
+        """Return what one joint carries over the steps.
+
+        Args:
+            joint: its name or number.
+
+        Raises:
+            InvalidInput: there is no such joint.
+        """
+        return one_joint(self.joints, joint)
+
+
+@on_one_thread
 def pushover(
     model: Model,
     load: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],

@@ -7,6 +7,8 @@ from .finders import run_of as run_of
 from .findings import Finding as Finding
 from .findings import study_table as study_table
 from .fragility import Fragility as Fragility
+from .fragility import Spread as Spread
+from .fragility import spread as spread
 from .fragility import stripe_fragility as stripe_fragility
 from .ida import Ida as Ida
 from .memory import ground_motion as ground_motion

@@ -4,6 +4,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,10 +61,10 @@ class Asked:
 
     @property
     def text(self) -> str:
-        """What tells this from anything else that is asked: the function's source, and options."""
+        """What tells this from anything else that is asked: the function's module, and options."""
         name = f"{self.find.__module__}:{getattr(self.find, '__qualname__', repr(self.find))}"
         try:
-            source = inspect.getsource(self.find)
+            source = _source(self.find)
         except (OSError, TypeError):
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"
@@ -81,6 +82,31 @@ class Asked:
         if not isinstance(found, Mapping):
             raise InvalidInput(f"find gave a {type(found).__name__}: it is to give a flat table")
         return {str(key): _value(key, value) for key, value in found.items()}
+
+
+def refuse_code(given: Any) -> None:
+    """Refuse what a file says is to be found if that is code of its own.
+
+    Args:
+        given: as for `Asked.of`.
+
+    Raises:
+        InvalidInput: it names a function of a module.
+    """
+    name = given.get("name") if isinstance(given, Mapping) else given
+    if isinstance(name, str) and ":" in name:
+        raise InvalidInput(
+            f"find = '{name}' is code, which no file runs by itself: if you trust it, say so, "
+            "archfem study --own-code, or Study.read(…, own_code=True)"
+        )
+
+
+def _source(find: Find) -> str:
+    """Source of the module that a function is of; of the function alone where it has no file."""
+    file = inspect.getsourcefile(find)
+    if file is None or not Path(file).is_file():
+        return inspect.getsource(find)
+    return Path(file).read_text(encoding="utf-8")
 
 
 def _by_name(name: str) -> Find:

@@ -7,9 +7,10 @@ from typing import Any
 from distributed import Client, KilledWorker, as_completed
 from distributed.comm import CommClosedError
 
+from archfem.cases.inputs import package_version
 from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.asking import Asked
-from archfem.studies.points import Point, package_version
+from archfem.studies.points import Point
 from archfem.studies.worker import Row, answers, row
 
 PATIENCE = 10.0

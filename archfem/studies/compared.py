@@ -68,7 +68,8 @@ def write_comparison(
         draft.write_text(f"{comparison.title}\n\n{text}\n", encoding="utf-8")
     if comparison.scales is not None:
         factors = {name: each.factors for name, each in findings.items()}
-        files.append(save(draw_study(factors, comparison.reduction), folder / "study.png"))
+        page = draw_study(factors, comparison.reduction, comparison.title)
+        files.append(save(page, folder / "study.png"))
     return files
 
 

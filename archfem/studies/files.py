@@ -1,10 +1,9 @@
 """A study's file as tables."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
-from archfem.errors import InvalidInput
+from archfem.cases.toml import tables_in
 
 
 def study_tables(path: Path) -> dict[str, Any]:
@@ -16,9 +15,4 @@ def study_tables(path: Path) -> dict[str, Any]:
     Raises:
         InvalidInput: there is none, or it is not TOML.
     """
-    if not path.is_file():
-        raise InvalidInput(f"there is no study {path}")
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} is not TOML: {error}") from error
+    return tables_in(path, "study")

@@ -7,6 +7,7 @@ import numpy as np
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest, shaken
+from archfem.cases.told import told_of
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.scales import mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
@@ -91,7 +92,8 @@ def of_history(run: History) -> Found:
         `friction`, |V| / N [-]; `rotation` [rad], `opening` [m] and `slip` [m] of a joint; the
         largest and the residual `displacement` [m] of a block; by each definition of a mechanism
         the time of the first [s], infinite where there is none, and its class; how the run
-        `ended`; and what is left, `fall`, where displacements may be large.
+        `ended`; what is left, `fall`, where displacements may be large; the largest drift of its
+        energy at any step, of what was exchanged, `energy_drift` [-], and how many `doubts` it has.
     """
     joints = judged(run.joints)
     found: Found = {
@@ -104,7 +106,9 @@ def of_history(run: History) -> Found:
     for definition, met in first_mechanisms(run).items():
         found[definition] = np.inf if met is None or met.time is None else met.time
         found[f"{definition}, class"] = "" if met is None else str(met.kind)
-    return found | {"ended": str(run.ended), "fall": "" if run.fall is None else run.fall.kind}
+    found |= {"ended": str(run.ended), "fall": "" if run.fall is None else run.fall.kind}
+    drift = float(run.dataset.attrs["energy_drift"])
+    return found | {"energy_drift": drift, "doubts": float(len(run.doubts))}
 
 
 def scales(
@@ -142,16 +146,17 @@ def of_scales(rest: Rest, motion: Motion, **options: Any) -> Found:
         KeyboardInterrupt: on Ctrl-C.
     """
     options["between"] = tuple(options.get("between", (0.05, 5.0)))
-    found = mechanism_scales(
-        rest.dead.model,
-        motion,
-        start=rest.dead,
-        damping=rest.damping[0],
-        dt=rest.case.analysis.get("dt"),
-        criteria=rest.case.criteria,
-        method=method_for(rest, motion),
-        **options,
-    )
+    with told_of(rest.case.title, motion.name):
+        found = mechanism_scales(
+            rest.dead.model,
+            motion,
+            start=rest.dead,
+            damping=rest.damping[0],
+            dt=rest.case.analysis.get("dt"),
+            criteria=rest.case.criteria,
+            method=method_for(rest, motion),
+            **options,
+        )
     if found.interrupted:
         raise KeyboardInterrupt
     brackets = {definition: found[definition] for definition in DEFINITIONS}

@@ -9,6 +9,7 @@ References:
     471-489. Dempster, Laird and Rubin, J. R. Stat. Soc. B 39 (1977) 1-38, for censored samples.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from math import hypot
 from typing import Any
@@ -94,6 +95,47 @@ class Fragility:
         more = real(dispersion, "dispersion", least=0.0)
         resampled = np.column_stack([self.resampled[:, 0], np.hypot(self.resampled[:, 1], more)])
         return replace(self, dispersion=hypot(self.dispersion, more), resampled=resampled)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What makes capacities differ: one motion from another, and what is not known of a structure.
+
+    Attributes:
+        median: geometric mean of the medians of the variants, in their unit.
+        record: dispersion from record to record, root mean square over the variants [-].
+        epistemic: standard deviation of the logarithms of the medians [-].
+    """
+
+    median: float
+    record: float
+    epistemic: float
+
+    @property
+    def total(self) -> float:
+        """Dispersion of both, which are independent [-]."""
+        return hypot(self.record, self.epistemic)
+
+
+def spread(curves: Iterable[Fragility]) -> Spread:
+    """Return how far variants of a structure differ beside the motions: stiffness, friction, ….
+
+    Args:
+        curves: of one limit state, of each variant under the same motions; variants are samples of
+            what is not known, each as likely as another.
+
+    Returns:
+        Both dispersions; `Fragility.widened` by the epistemic one gives the curve of both.
+
+    Raises:
+        InvalidInput: there are fewer than two variants.
+    """
+    each = list(curves)
+    if len(each) < 2:
+        raise InvalidInput(f"{len(each)} curve: the spread of variants needs two or more")
+    medians = np.log([curve.median for curve in each])
+    record = np.sqrt(np.mean([curve.dispersion**2 for curve in each]))
+    return Spread(float(np.exp(medians.mean())), float(record), float(medians.std(ddof=1)))
 
 
 def fragility(

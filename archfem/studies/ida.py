@@ -12,6 +12,7 @@ from archfem.arrays import Array
 from archfem.cases.case import Case
 from archfem.cases.settings import chosen
 from archfem.errors import InvalidInput
+from archfem.motion.motion import Motion
 from archfem.studies.asking import Asked
 from archfem.studies.fragility import Fragility, fragility
 from archfem.studies.hunt import BETWEEN, DEMANDS, LIMITS, PRECISION, searched
@@ -162,8 +163,9 @@ def ida(
 
     Args:
         case: of the structure; with `model.displacements = "large"` collapse is a limit state too.
-        motions: records, files that the case's folder leads to, or tables as under [motion], by
-            name or in a row; by default the pairs of the case's suite, as scaled and reduced.
+        motions: each a `Motion`, a record's file that the case's folder leads to, or a table as
+            under [motion], by name or in a row; by default the pairs of the case's suite, as scaled
+            and reduced.
         limits: of `LIMITS`; by default all that the structure has joints for.
         precision: relative width of the last brackets [-].
         between: least and largest scale tried [-]; no ground motion may exceed 5 g.
@@ -205,12 +207,17 @@ def _points(
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
         changes: list[tuple[tuple[str, Any], ...]] = [((PAIR, name),) for name in names]
         return names, tuple(Point(case.settings, case.folder, each) for each in changes)
-    named = motions if isinstance(motions, Mapping) else {_name(each): each for each in motions}
+    named = motions if isinstance(motions, Mapping) else _named(motions)
     if not named or len(named) < len(motions):
         raise InvalidInput(f"{len(motions)} motions under {len(named)} names: give each its own")
     base = {key: value for key, value in case.settings.items() if key not in ("suite", "motion")}
     points = tuple(Point(base, case.folder, (("motion", _table(each)),)) for each in named.values())
     return list(named), points
+
+
+def _named(motions: Sequence[Any]) -> dict[str, Any]:
+    """Motions by what each is called."""
+    return {_name(each, place): each for place, each in enumerate(motions, start=1)}
 
 
 def _table(motion: Any) -> dict[str, Any]:
@@ -219,13 +226,27 @@ def _table(motion: Any) -> dict[str, Any]:
         return {"file": str(motion)}
     if isinstance(motion, Mapping):
         return dict(motion)
+    if isinstance(motion, Motion):
+        upright = motion.vertical
+        vertical = {} if upright is None else {"vertical": _samples(upright, motion.dt)}
+        return _samples(motion.horizontal, motion.dt) | vertical
     raise InvalidInput(
-        f"a motion is a {type(motion).__name__}: give a record's file, or a table as under [motion]"
+        f"a motion is a {type(motion).__name__}: give a Motion, a record's file, or a table as "
+        "under [motion]"
     )
 
 
-def _name(motion: Any) -> str:
+def _samples(accelerations: Array, dt: float) -> dict[str, Any]:
+    """One component as a table of its samples."""
+    return {"samples": accelerations.tolist(), "dt": float(dt)}
+
+
+def _name(motion: Any, place: int) -> str:
     """What to call a motion that was given without a name."""
+    if isinstance(motion, Motion):
+        return motion.name or f"motion {place}"
     table = _table(motion)
+    if "file" in table:
+        return Path(table["file"]).stem
     seed = table.get("synthetic", {}).get("seed")
-    return Path(table["file"]).stem if "file" in table else f"seed {seed}"
+    return f"motion {place}" if seed is None else f"seed {seed}"

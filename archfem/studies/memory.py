@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from archfem.cases.case import Case
-from archfem.cases.inputs import input_files
+from archfem.cases.inputs import content_digest, input_files
 from archfem.cases.run import Rest, at_rest, damping_of
 from archfem.dynamics.schemes import Conserving, Scheme, Viscous
 from archfem.dynamics.stepping.choice import stepper_for
@@ -19,7 +19,6 @@ from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
-from archfem.studies.points import content_digest
 from archfem.studies.warm import warm
 
 Made = TypeVar("Made")

@@ -1,17 +1,14 @@
 """One point of a study: a case file and what differs from it."""
 
 import hashlib
-import json
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from archfem.cases.case import Case
-from archfem.cases.inputs import input_files
+from archfem.cases.inputs import inputs_digest
 from archfem.cases.settings import put, refuse_unknown
 from archfem.errors import InvalidInput
 
@@ -65,35 +62,8 @@ class Point:
         Args:
             asked: what is to be found, as text.
         """
-        settings = self.settings
-        files = [(path.name, content_digest(path)) for path in input_files(settings, self.folder)]
-        told = [package_version(), asked, settings, files]
-        text = json.dumps(told, sort_keys=True, default=str)
+        text = f"{asked}\n{inputs_digest(self.settings, self.folder)}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def package_version() -> str:
-    """Return the version of archfem that runs."""
-    return str(import_module("archfem").__version__)
-
-
-def content_digest(path: Path) -> str:
-    """Return what tells the content of a file; a word where it cannot be read.
-
-    Args:
-        path: the file.
-    """
-    try:
-        now = path.stat()
-    except OSError:
-        return "missing"
-    return _digest(path, now.st_mtime_ns, now.st_size)
-
-
-@lru_cache(maxsize=4096)
-def _digest(path: Path, changed: int, size: int) -> str:
-    """Digest of a file's content, read once as long as its time and size are the same."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _leave_one(settings: dict[str, Any], pair: str) -> None:

@@ -119,6 +119,11 @@ def joint_stiffness(
 
     Raises:
         InvalidInput: the condition is not known, or a value cannot be meant.
+
+    Example:
+        >>> low, usual, high = af.joint_stiffness(30e9, 0.5, "weathered").normal
+        >>> low < usual < high
+        True
     """
     (least, most), weathering = CONDITIONS[chosen(condition, CONDITIONS, "condition")]
     for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):

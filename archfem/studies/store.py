@@ -1,6 +1,5 @@
 """Rows of finished points in files, one each: nothing is lost, and nothing is found twice."""
 
-import errno
 import fcntl
 import json
 import os
@@ -10,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from archfem.errors import InvalidInput, StudyStopped
-from archfem.files import in_one_stroke
+from archfem.files import FULL, in_one_stroke
 from archfem.studies.worker import Row
 
 POINTS, PLAN, LOCK = "points", "study.json", ".lock"
 """Folder of the rows; what the study is; file that tells that a driver is at work."""
-
-FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Store:

@@ -13,13 +13,14 @@ from threadpoolctl import threadpool_limits
 
 from archfem.arguments import whole
 from archfem.cases.case import Case
+from archfem.cases.inputs import package_version
 from archfem.cases.settings import checked, refuse_unknown
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.studies.asking import Asked
+from archfem.studies.asking import Asked, refuse_code
 from archfem.studies.comparison import Comparison
 from archfem.studies.files import study_tables
 from archfem.studies.over import Axis, axes_over, changes_along, ends
-from archfem.studies.points import Point, package_version
+from archfem.studies.points import Point
 from archfem.studies.processes import on_processes, serially
 from archfem.studies.progress import Progress, status
 from archfem.studies.store import Store
@@ -95,7 +96,9 @@ class Study:
         return study
 
     @classmethod
-    def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Study":
+    def read(
+        cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False
+    ) -> "Study":
         """Read a study: a TOML file with a case and what it goes over, or with cases side by side.
 
         Args:
@@ -103,6 +106,8 @@ class Study:
                 of "section.key=value". Or with a table [cases."name"] for each of some cases, as
                 for `Comparison.read`.
             changes: made to every case.
+            own_code: whether `find` may name a function of a module, which is code that runs;
+                without it only our own are taken, since a file may come from anywhere.
 
         Returns:
             The study.
@@ -122,11 +127,14 @@ class Study:
                 f'{path} says nothing of {missing[0]}: write case = "file.toml", and over, keys of '
                 "the case with lists of values or distributions"
             )
+        find = given.get("find", "history")
+        if not own_code:
+            refuse_code(find)
         case = Case.read(path.parent / given["case"], [*given.get("set", []), *changes])
         return cls.of(
             case,
             given["over"],
-            given.get("find", "history"),
+            find,
             samples=given.get("samples"),
             title=given.get("title", path.stem),
         )
@@ -189,9 +197,16 @@ class Study:
             for number, row in found:
                 rows[digests[number]] = row
                 if store is not None:
-                    store.keep(digests[number], row)
+                    self._keep(store, number, digests[number], row)
                 progress.add(failed=bool(row["error"]))
         return [rows[digest] for digest in digests]
+
+    def _keep(self, store: Store, number: int, digest: str, row: Row) -> None:
+        """Keep the row of a point, unless a file was changed since the study was begun."""
+        if self.points[number].digest(self.asked.text) == digest:
+            store.keep(digest, row)
+        else:
+            logger.warning("point %d: a file it reads was changed meanwhile: not kept", number)
 
     def _answers(
         self,

@@ -9,9 +9,13 @@ import numpy as np
 import xarray as xr
 
 from archfem.files import in_one_stroke
+from archfem.netcdf import read_dataset, write_dataset
 from archfem.studies.over import Axis
 from archfem.studies.store import told_when_full
 from archfem.studies.worker import Row
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""How cells begin that a spreadsheet computes."""
 
 NETCDF, CSV, PARQUET = "results.nc", "results.csv", "results.parquet"
 
@@ -69,14 +73,18 @@ def write_table(found: xr.Dataset, folder: Path) -> list[Path]:
     flat = found.drop_dims(ALONG, errors="ignore")
     frame = flat.to_dataframe(dim_order=list(flat.dims) or None).reset_index()
     with told_when_full(folder):
-        with in_one_stroke(files[0]) as draft:
-            found.to_netcdf(draft, engine="netcdf4")
+        write_dataset(found, files[0])
         with in_one_stroke(files[1]) as draft:
-            frame.to_csv(draft, index=False)
+            frame.map(_harmless).rename(columns=_harmless).to_csv(draft, index=False)
         with suppress(ImportError), in_one_stroke(folder / PARQUET) as draft:
             frame.to_parquet(draft, index=False)
             files.append(folder / PARQUET)
     return files
+
+
+def _harmless(value: Any) -> Any:
+    """A value that no spreadsheet takes for a formula: words that look like one are quoted."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def read_table(path: str | Path) -> xr.Dataset:
@@ -84,9 +92,11 @@ def read_table(path: str | Path) -> xr.Dataset:
 
     Args:
         path: the NetCDF file.
+
+    Raises:
+        InvalidInput: there is none, or it is damaged.
     """
-    with xr.open_dataset(path, engine="netcdf4") as kept:
-        return kept.load()
+    return read_dataset(path, "table")
 
 
 def _column(values: Sequence[Any]) -> Any:

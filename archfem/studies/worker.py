@@ -10,9 +10,10 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from archfem.cases.inputs import package_version
 from archfem.errors import ArchfemError
 from archfem.studies.asking import Asked
-from archfem.studies.points import Point, package_version
+from archfem.studies.points import Point
 
 Row = dict[str, Any]
 """What came of a point: `found`, a flat table; `error`, empty where there is none; `ours`, whether

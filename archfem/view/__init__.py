@@ -2,9 +2,11 @@
 
     style      one look for all pictures
     marks      what a picture shows of the joints at one instant
+    loads      live loads as arrows
     states     what a state's joints carry
     moved      where ends of joints and loose blocks are at some time of a run
     structure  a structure at an instant; several side by side
+    dead       the dead load with its numbers
     displaced  a structure where its blocks have gone
     names      which joint is which
     joints     joints over time
@@ -20,7 +22,8 @@
     studies    factors at first mechanism, case by case
     incremental  curves of incremental dynamic analysis; fragility
     sensitivity  tornado and convergence
-    films      films and stills: all that knows pyvista and imageio
+    films      films, stills and a viewer: all that knows imageio, its encoder and pyvista
+    pages      the player of a run, and documents, for a browser
 
 It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
 """

@@ -1,6 +1,7 @@
 from .accuracy import draw_accuracy as draw_accuracy
 from .collapse import draw_capacity as draw_capacity
 from .collapse import draw_collapse as draw_collapse
+from .dead import draw_dead_load as draw_dead_load
 from .displaced import draw_displaced as draw_displaced
 from .envelopes import draw_eccentricity as draw_eccentricity
 from .envelopes import draw_envelope as draw_envelope
@@ -8,6 +9,8 @@ from .falls import draw_fall as draw_fall
 from .films.modes import film_modes as film_modes
 from .films.scenes import film as film
 from .films.scenes import picture as picture
+from .films.viewer import Viewer as Viewer
+from .films.viewer import viewer as viewer
 from .freebody import draw_free_body as draw_free_body
 from .incremental import draw_fragility as draw_fragility
 from .incremental import draw_ida as draw_ida
@@ -18,6 +21,8 @@ from .motions import draw_motion as draw_motion
 from .motions import draw_spectra as draw_spectra
 from .motions import draw_suite as draw_suite
 from .names import draw_names as draw_names
+from .pages.player import Player as Player
+from .pages.player import player as player
 from .pushover import draw_pushover as draw_pushover
 from .sensitivity import draw_convergence as draw_convergence
 from .sensitivity import draw_tornado as draw_tornado

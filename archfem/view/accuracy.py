@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem.dynamics.tradeoff import Accuracy, Trial
-from archfem.view.style import EDGE, FAINT, LINES, SMALL, dress
+from archfem.view.style import EDGE, FAINT, LINES, SMALL, Page, dress
 from archfem.view.style import HINGE as RED
 
 MARKERS = {"rigid": "o", "faces": "s", "condensed": "D", "full": "^"}
@@ -24,7 +24,7 @@ def draw_accuracy(found: Accuracy) -> Figure:
     Returns:
         The page.
     """
-    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
+    figure = Page(figsize=(7.2, 5.0), layout="constrained")
     axes = figure.add_subplot()
     dress(axes, "time to step through the motion [s]", "error in the largest |e| of a joint [-]")
     axes.set_xscale("log")

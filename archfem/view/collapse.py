@@ -10,10 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from archfem.arrays import Array
+from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
+from archfem.view.loads import draw_loads
 from archfem.view.marks import displaced, swung
 from archfem.view.structure import draw_structure
 from archfem.view.style import (
@@ -23,11 +25,12 @@ from archfem.view.style import (
     INK,
     LIGHT_TO_DARK,
     MOVED,
-    NORMAL,
     SLIP,
     SMALL,
     THRUST,
+    Page,
     dress,
+    entitle,
     legend,
 )
 
@@ -56,9 +59,29 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
         _mark_hinges(axes, structure, found, motion)
         _mark_sliding(axes, structure, found)
     _draw_thrust(axes, structure, found.joints)
-    axes.set_title(_caption(found), fontsize=NORMAL, color=INK)
+    draw_loads(axes, structure, found.live, of=_multiple(found))
+    entitle(axes, f"{structure.name}: {_caption(found)}")
     legend(axes)
     return figure
+
+
+def draw_found(found: Collapse) -> Figure:
+    """Draw what was found for the structure that it knows, as by `draw_collapse`.
+
+    Args:
+        found: what limit analysis found.
+
+    Returns:
+        The page.
+
+    Raises:
+        InvalidInput: it does not know its structure.
+    """
+    if found.structure is None:
+        raise InvalidInput(
+            "this result does not know its structure: use draw_collapse(structure, …)"
+        )
+    return draw_collapse(found.structure, found)
 
 
 def draw_capacity(
@@ -78,7 +101,7 @@ def draw_capacity(
     Returns:
         The page, with a bar of colours beside the map.
     """
-    figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
+    figure = Page(figsize=(COLUMN, 4.4), layout="constrained")
     axes = figure.add_subplot()
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
     values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=NEVER)
@@ -144,7 +167,12 @@ def _caption(found: Collapse) -> str:
     sentence = found.outcome.sentence
     if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
         sentence += f" at a factor of {found.factor:.4g}"
-    return sentence[0].upper() + sentence[1:]
+    return sentence
+
+
+def _multiple(found: Collapse) -> str:
+    """What the live load is multiplied by, in words."""
+    return f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
 
 
 def _mark_known(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:

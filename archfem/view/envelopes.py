@@ -20,10 +20,11 @@ from archfem.view.style import (
     HINGE,
     INK,
     LINES,
-    NORMAL,
     SMALL,
     WIDE,
+    Page,
     dress,
+    entitle,
     legend,
 )
 
@@ -186,7 +187,7 @@ def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axe
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
         panel.xaxis.set_major_formatter(_named([short_name(each, part) for each in names[part]]))
         if len(parts) > 1:
-            panel.set_title(part, fontsize=NORMAL, color=INK)
+            entitle(panel, part)
             panel.set_xlim(-0.7, sizes[part] - 0.3)
     return shown
 
@@ -209,7 +210,7 @@ def _page(sizes: Mapping[str, int]) -> dict[str, Axes]:
             rows.append({})
         rows[-1][part] = max(size, ROOM)
     inches = (COLUMN, 3.4) if len(sizes) == 1 else (WIDE, 0.6 + 2.8 * len(rows))
-    page, found = Figure(figsize=inches, layout="constrained"), {}
+    page, found = Page(figsize=inches, layout="constrained"), {}
     longest = max(sum(row.values()) for row in rows)
     first: Axes | None = None
     whole = page.add_gridspec(len(rows), 1)

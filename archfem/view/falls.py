@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.view.moved import Falls
-from archfem.view.style import EDGE, GHOST, INK, NORMAL, STONE, SUPPORT, canvas, dress
+from archfem.view.style import EDGE, GHOST, INK, NORMAL, STONE, SUPPORT, Page, canvas, dress
 
 SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 """Of the way down, by the mean of all blocks, at which they are drawn."""
@@ -33,7 +33,7 @@ def draw_fall(run: History) -> Figure:
             "the run does not know its structure; read it with History.read(path, structure)"
         )
     wide, high = canvas(falls.structure).get_size_inches()
-    figure = Figure(figsize=(1.5 * wide, 1.35 * high), layout="constrained")
+    figure = Page(figsize=(1.5 * wide, 1.35 * high), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
     for axes, time in zip(panels, _instants(falls), strict=True):
         _panel(axes, falls, time)

@@ -13,7 +13,19 @@ from archfem.masonry.structure import Structure
 from archfem.models.cells import Cells
 from archfem.statics.freebody import FreeBody, forces_on
 from archfem.units import kN
-from archfem.view.style import EDGE, FAINT, GHOST, INK, LINES, NORMAL, SMALL, STONE, dress
+from archfem.view.style import (
+    EDGE,
+    FAINT,
+    GHOST,
+    INK,
+    LINES,
+    NORMAL,
+    SMALL,
+    STONE,
+    Page,
+    dress,
+    entitle,
+)
 
 MOST = 12
 """Joints of a block whose forces can still be told apart."""
@@ -57,7 +69,7 @@ def draw_free_body(
             f"block '{body.block.name}' has {len(body.joints)} joints: forces of at most {MOST} "
             "can be told apart; choose a stone"
         )
-    page = Figure(figsize=(WIDTH, PANEL + LINE * len(body.names)), layout="constrained")
+    page = Page(figsize=(WIDTH, PANEL + LINE * len(body.names)), layout="constrained")
     left, right = page.subplots(1, 2)
     colours = [LINES[k % len(LINES)] for k in range(len(body.joints))] + [FAINT]
     _block(left, structure, body, colours)
@@ -110,7 +122,7 @@ def _block(axes: Axes, structure: Structure, body: FreeBody, colours: list[str])
     axes.plot(*body.points[-1:].T, "+", ms=8.0, color=INK, zorder=6)
     seen = np.concatenate([outline, tails, heads])
     _frame(axes, seen)
-    axes.set_title(body.block.name, fontsize=NORMAL, color=INK)
+    entitle(axes, body.block.name)
 
 
 def _polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:

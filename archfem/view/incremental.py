@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from archfem.arrays import Array
-from archfem.view.style import COLUMN, EDGE, FAINT, GHOST, LINES, SMALL, dress
+from archfem.view.style import COLUMN, EDGE, FAINT, GHOST, LINES, SMALL, Page, dress
 
 SHARES = ("16 %", "50 %", "84 %")
 
@@ -35,7 +35,7 @@ def draw_ida(
     Returns:
         The page: curves to the left, limit states to the right, on one axis of intensity.
     """
-    figure = Figure(figsize=(1.35 * COLUMN, 0.75 * COLUMN), layout="constrained")
+    figure = Page(figsize=(1.35 * COLUMN, 0.75 * COLUMN), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
     dress(left, demand, measure)
     dress(right)
@@ -95,7 +95,7 @@ def draw_fragility(
     Returns:
         The page.
     """
-    figure = Figure(figsize=(COLUMN, 0.7 * COLUMN), layout="constrained")
+    figure = Page(figsize=(COLUMN, 0.7 * COLUMN), layout="constrained")
     axes = figure.add_subplot()
     dress(axes, measure, "probability of the limit state [-]")
     for (name, (middle, low, high)), colour in zip(curves.items(), LINES, strict=False):

@@ -8,22 +8,30 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
+from archfem.arrays import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, sliding_limits
+from archfem.joints.criteria import Criteria, judged, sliding_limits
+from archfem.joints.duration import step_lengths
+from archfem.masonry.structure import Structure
 from archfem.view.envelopes import draw_faces
-from archfem.view.style import COLUMN, INK, LINES, NORMAL, SLIP, SMALL, WIDE, dress
+from archfem.view.style import COLUMN, HINGE, INK, LINES, SLIP, SMALL, WIDE, Page, dress, entitle
 
 LETTERS = 20
 """That fit beside a panel."""
 
-LOOSE = 1.5
-"""Mobilised friction at which its axis ends, relative to the coefficient: a joint about to open
-has any value."""
+LOOSE, BEYOND = 1.5, 3.0
+"""Mobilised friction at which its axis ends at least and at most, relative to the coefficient: a
+joint about to open has any value, and what lies beyond is told."""
+
+TWIN = 1e-6
+"""Distance of joints from each other's mirror image that makes them twins, relative to the size of
+the structure."""
 
 
-def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
+def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figure:
     """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
 
     Friction has the sense of the shear force. Lines are interrupted while a joint is open; limits
@@ -31,7 +39,7 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
 
     Args:
         run: what happened.
-        joints: their names, or their numbers.
+        joints: their names, or their numbers; by default the two that tell most.
 
     Returns:
         The page: the ground's motion, and a row for each joint.
@@ -39,10 +47,11 @@ def draw_joints(run: History, joints: Sequence[str | int]) -> Figure:
     Raises:
         InvalidInput: there is no such joint.
     """
+    joints = telling_joints(run) if joints is None else joints
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
     chosen, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
-    figure = Figure(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
+    figure = Page(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     _ground(ground, run)
@@ -80,7 +89,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = Figure(figsize=(0.8 * WIDE, 4.2), layout="constrained")
+    figure = Page(figsize=(0.8 * WIDE, 4.2), layout="constrained")
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
@@ -88,7 +97,7 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
         _friction(column[0], own, criteria)
         dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
         _eccentricity(column[1], own, criteria)
-        column[0].set_title(f"{label}: {own['name'].values!s}", fontsize=NORMAL, color=INK)
+        entitle(column[0], f"{label}: {own['name'].values!s}")
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()
@@ -121,13 +130,53 @@ def _friction(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
     limit = float(criteria.coefficients(joint["friction_limit"].values))
     if np.isfinite(limit):  # else it never slides
         _friction_limits(axes, joint, criteria, limit)
-    axes.plot(joint["time"], np.sign(joint["V"]) * joint["friction"], color=LINES[0], lw=0.6)
+    ratio = np.sign(joint["V"].values) * joint["friction"].values
+    axes.plot(joint["time"], ratio, color=LINES[0], lw=0.6)
+    most, top = float(np.nanmax(np.abs(ratio), initial=0.0)), axes.get_ylim()[1]
+    if np.isfinite(limit) and most > top:
+        beyond = np.abs(np.nan_to_num(ratio)) > top
+        edge = 0.97 * top * np.sign(ratio[beyond])
+        axes.scatter(joint["time"].values[beyond], edge, marker="d", s=6, color=HINGE, zorder=4)
+        _note(axes, f"◆ beyond, up to {most:.3g}", (0.0, 0.0), HINGE)
+
+
+def _twins(structure: Structure | None, numbers: Array, first: int) -> NDArray[np.bool_]:
+    """Whether joints of some numbers are mirror images of one of them (n,)."""
+    if structure is None:
+        return np.zeros(len(numbers), dtype=bool)
+    middles, ends = structure.middles[numbers], structure.ends[..., 0]
+    image = np.array([ends.min() + ends.max() - middles[first, 0], middles[first, 1]])
+    found: NDArray[np.bool_] = np.linalg.norm(middles - image, axis=1) < TWIN * structure.size
+    return found
+
+
+def telling_joints(run: History) -> list[int]:
+    """Return two joints that tell most of a run: one by where its thrust is, one by its friction.
+
+    The first has the largest |e|, or opens; the second slides for the longest time, or else comes
+    nearest to it. It is not the mirror image of the first, which does much the same, where the
+    run knows its structure.
+
+    Args:
+        run: what happened.
+    """
+    own = judged(run.joints)
+    numbers = own["joint"].values
+    tilt = abs(own["eccentricity"]).max("time").fillna(0.5).values
+    first = int(np.argmax(tilt))
+    use = (own["friction"] / own["friction_limit"]).max("time").fillna(0.0).values
+    slid = (own["slide"].transpose("time", "joint").values * step_lengths(run.time)[:, None]).sum(0)
+    order = np.lexsort([-tilt, -np.where(np.isfinite(use), use, 0.0), -np.round(slid, 9)])
+    twin = _twins(run.structure, numbers, first)
+    others = [k for k in order if k != first and not twin[k]] or [k for k in order if k != first]
+    return [int(numbers[k]) for k in (first, *others[:1])]
 
 
 def _friction_limits(axes: Axes, joint: xr.Dataset, criteria: Criteria, limit: float) -> None:
     """Draw the ratios at which a joint slides: μ, and more by cohesion."""
     limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
-    top = LOOSE * float(limits[0])
+    most = float(np.nanmax(joint["friction"].values, initial=0.0))
+    top = float(np.clip(1.08 * most, LOOSE * limits[0], BEYOND * limits[0]))
     for side in (1.0, -1.0):
         axes.plot(joint["time"], side * limits, color=SLIP, lw=0.9, ls="--")
         axes.fill_between(joint["time"], side * limits, side * top, color=SLIP, alpha=0.12, lw=0)
@@ -135,4 +184,12 @@ def _friction_limits(axes: Axes, joint: xr.Dataset, criteria: Criteria, limit: f
     axes.annotate(
         f"μ = {limit:g}", (1.0, limit), (-3, 1), xycoords=("axes fraction", "data"),
         textcoords="offset points", fontsize=SMALL, ha="right", va="bottom", color=SLIP,
+    )  # fmt: skip
+
+
+def _note(axes: Axes, words: str, place: tuple[float, float], colour: str) -> None:
+    """Write into a corner."""
+    axes.annotate(
+        words, place, (3, 2), xycoords="axes fraction", textcoords="offset points",
+        fontsize=SMALL - 1.0, color=colour, ha="left", va="bottom",
     )  # fmt: skip

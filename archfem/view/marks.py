@@ -1,6 +1,8 @@
 """What a picture shows of the joints at one instant: thrust line, hinges, slips and gaps."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -8,7 +10,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem.arrays import Array
-from archfem.joints.resultants import thrust_line
 from archfem.limit.blocks import RigidBlocks
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
@@ -30,6 +31,12 @@ LENGTH, APART = 0.55, 0.14
 
 SHORTEST = 0.03
 """Depth that arrows are made for at least, relative to the size of the structure."""
+
+SNUG = 0.9 / (2.0 * APART + 0.5 * LENGTH)
+"""The same at most, relative to the distance to the next joint: arrows of both have room."""
+
+TOLD = ("eccentricity", "V", "hinge", "slide", "open")
+"""What is known of joints that are marked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,73 @@ NO_MARKS = Marks(*(np.zeros((0, *rest)) for rest in ((2,), (2, 2), (2,), (7, 2),
 """Of joints of which nothing is to be drawn."""
 
 
+class Marker:
+    """Finds what to draw at the joints of a structure, instant after instant.
+
+    Args:
+        structure: whose joints they are.
+        shown: which joints have marks: those that are judged (n_joints,).
+    """
+
+    def __init__(self, structure: Structure, shown: NDArray[np.bool_]) -> None:
+        self._structure, self._shown = structure, shown
+        self._pairs = linked(structure, shown)
+        self._line = structure.tangents * structure.depths[:, None]
+
+    def at(self, joints: xr.Dataset | Mapping[str, Array], shift: Array | None = None) -> Marks:
+        """Return the marks of an instant, moved by `shift`.
+
+        Args:
+            joints: eccentricity, V, hinge, slide and open, each (n_joints,).
+            shift: displacements, as drawn, of both ends of each joint, intrados first
+                (n_joints, 2, 2) [m]; by default none.
+        """
+        structure, shown = self._structure, self._shown
+        tilt, shear, hinge, slide, apart = (np.asarray(joints[key]) for key in TOLD)
+        shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
+        ends, share = structure.ends + shift, 0.5 + tilt[:, None]
+        carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
+        line = structure.middles + tilt[:, None] * self._line
+        side = np.where(shown, hinge, 0)
+        failed = np.flatnonzero(side)
+        slips = [self._slip(int(k), ends[k], shear[k]) for k in np.flatnonzero(shown & slide)]
+        thrust = np.where(shown[:, None], carried + line, np.nan)
+        links = thrust[self._pairs]
+        return Marks(
+            thrust=thrust,
+            links=links[np.isfinite(links).all(axis=(1, 2))],
+            hinges=ends[failed, (side[failed] > 0).astype(int)],
+            slips=np.array(slips).reshape(-1, *ARROW.shape),
+            gaps=ends[shown & apart],
+        )
+
+    @cached_property
+    def _room(self) -> Array:
+        """Distance of each joint to the next that is shown (n_joints,) [m]."""
+        middles = self._structure.middles
+        apart = np.linalg.norm(middles[:, None] - middles[self._shown], axis=2)
+        found: Array = np.where(apart > 0.0, apart, np.inf).min(axis=1, initial=np.inf)
+        return found
+
+    def _slip(self, number: int, ends: Array, shear: float) -> Array:
+        """Two arrows that say how a joint slips, whose ends are there (2, 7, 2) [m]."""
+        structure = self._structure
+        joint, normal, middle = structure.joints[number], structure.normals[number], ends.mean(0)
+        along, length = ends[1] - ends[0], float(np.linalg.norm(ends[1] - ends[0]))
+        if length > 0.0:
+            (x, y), (c, s) = normal, along / length
+            turn = np.array([c, s]) @ joint.tangent, s * joint.tangent[0] - c * joint.tangent[1]
+            normal = np.array([turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y])
+        else:
+            c, s = joint.tangent
+        sense = np.sign(shear) * np.array([c, s])
+        depth = min(max(joint.depth, SHORTEST * structure.size), SNUG * self._room[number])
+        outline = ARROW * LENGTH * depth
+        arrow = outline[:, :1] * sense + outline[:, 1:] * normal
+        away = APART * depth * normal
+        return np.array([middle + away + arrow, middle - away - arrow])
+
+
 def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None = None) -> Marks:
     """Find what to draw at the joints of rings and piers, or at all where there are neither.
 
@@ -70,52 +144,22 @@ def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None
     Returns:
         The marks, moved by `shift`.
     """
-    shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
-    ends = structure.ends + shift
-    share = 0.5 + joints["eccentricity"].values[:, None]
-    carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-    shown = joints["judged"].values
-    side = np.where(shown, joints["hinge"].values, 0)
-    failed = np.flatnonzero(side)
-    slipping = np.flatnonzero(shown & joints["slide"].values)
-    arrows = [_slip(structure, k, ends[k], joints["V"].values[k]) for k in slipping]
-    thrust = np.where(shown[:, None], carried + thrust_line(structure, joints).values, np.nan)
-    links = thrust[_neighbours(structure, shown)]
-    return Marks(
-        thrust=thrust,
-        links=links[np.isfinite(links).all(axis=(1, 2))],
-        hinges=ends[failed, (side[failed] > 0).astype(int)],
-        slips=np.array(arrows).reshape(-1, *ARROW.shape),
-        gaps=ends[shown & joints["open"].values],
-    )
+    return Marker(structure, joints["judged"].values).at(joints, shift)
 
 
-def _neighbours(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Pairs of joints with a block between them that has no other shown joint (n_links, 2)."""
+def linked(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return pairs of joints with a block between them that has no other shown joint (n_links, 2).
+
+    Args:
+        structure: whose joints they are.
+        shown: whether each joint is (n_joints,).
+    """
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
             touching[block].append(int(number))
     pairs = [numbers for numbers in touching if len(numbers) == 2]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
-
-
-def _slip(structure: Structure, number: int, ends: Array, shear: float) -> Array:
-    """Two arrows that say how a joint slips, whose ends are there (2, 7, 2) [m]."""
-    joint, normal, middle = structure.joints[number], structure.normals[number], ends.mean(axis=0)
-    along, length = ends[1] - ends[0], float(np.linalg.norm(ends[1] - ends[0]))
-    if length > 0.0:
-        (x, y), (c, s) = normal, along / length
-        turn = np.array([c, s]) @ joint.tangent, s * joint.tangent[0] - c * joint.tangent[1]
-        normal = np.array([turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y])
-    else:
-        c, s = joint.tangent
-    sense = np.sign(shear) * np.array([c, s])
-    depth = max(joint.depth, SHORTEST * structure.size)
-    outline = ARROW * LENGTH * depth
-    arrow = outline[:, :1] * sense + outline[:, 1:] * normal
-    away = APART * depth * normal
-    return np.array([middle + away + arrow, middle - away - arrow])
 
 
 def joint_ends(model: Model) -> sparse.csr_matrix:
@@ -200,3 +244,15 @@ def displaced(structure: Structure, motion: Array) -> list[Array]:
         if np.abs(by).max() > STILL * structure.size:
             outlines.append(block.drawn() + by)
     return outlines
+
+
+def round_magnification(displacement: float) -> float:
+    """Return one of 1, 2, 5, 10, … that brings a displacement nearest to `SWING`.
+
+    Args:
+        displacement: the largest, relative to the size of the structure [-].
+    """
+    if displacement * 1.5 >= SWING or displacement == 0.0:
+        return 1.0
+    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])

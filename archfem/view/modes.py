@@ -25,13 +25,15 @@ from archfem.view.style import (
     STONE,
     SUPPORT,
     WIDE,
+    Page,
 )
 
 REACH = 0.04
 """Largest displacement in a picture, relative to the size of the structure."""
 
-HIGHEST, HEADED = 3.0, 0.3
-"""Largest height of a panel; height of its title and of the gap below it [inch]."""
+HIGHEST, HEADED, FOOT = 3.0, 0.45, 0.25
+"""Largest height of a panel; height of its title and of the gap below it, and of what is said below
+all [inch]."""
 
 
 def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
@@ -72,7 +74,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     columns, rows = min(2, len(chosen)), -(-len(chosen) // 2)
     across = (COLUMN if wide < LONG * tall else WIDE) / 2.0
     up = min(across * tall / wide, HIGHEST) + HEADED
-    figure = Figure(figsize=(across * columns, up * rows), layout="constrained")
+    figure = Page(figsize=(across * columns, up * rows + FOOT), layout="constrained")
     places = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in places:
         axes.set_axis_off()
@@ -80,6 +82,9 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     for axes, number in zip(places, chosen, strict=False):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         panels.append(Panel(axes, modes, number))
+    drawn = REACH * modes.model.structure.size
+    words = f"largest displacement drawn as {drawn:.2g} m: shapes have no size of their own"
+    figure.supxlabel(words, fontsize=SMALL, color=EDGE)
     return figure, panels
 
 
@@ -143,4 +148,4 @@ def _loops(cells: Cells) -> list[list[int]]:
 
 def _title(modes: Modes, number: int) -> str:
     frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
-    return f"mode {number}: {frequency:.2f} Hz, {x:.0f} % of the mass along x, {y:.0f} % along y"
+    return f"mode {number}: {frequency:.2f} Hz\nmass along x {x:.0f} %, along y {y:.0f} %"

@@ -13,7 +13,7 @@ from archfem.motion.motion import COMPONENTS, Motion
 from archfem.motion.spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.style import COLUMN, HINGE, INK, LINES, NORMAL, SMALL, dress
+from archfem.view.style import COLUMN, HINGE, INK, LINES, NORMAL, SMALL, Page, dress
 
 PERIODS = np.geomspace(0.02, 3.0, 150)
 """Periods at which spectra are drawn [s]."""
@@ -29,7 +29,7 @@ def draw_motion(motion: Motion) -> Figure:
         The page, with a column for each component.
     """
     names = motion.components
-    figure = Figure(figsize=(COLUMN * (0.4 + 0.6 * len(names)), 5.5), layout="constrained")
+    figure = Page(figsize=(COLUMN * (0.4 + 0.6 * len(names)), 5.5), layout="constrained")
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (
@@ -42,7 +42,7 @@ def draw_motion(motion: Motion) -> Figure:
             dress(axis, "time [s]" if axis is column[-1] else "", label)
         if len(names) > 1:  # one alone may be of any direction
             column[0].set_title(name, fontsize=NORMAL)
-    figure.suptitle(motion.name, fontsize=NORMAL)
+    figure.suptitle(motion.name, fontsize=NORMAL, wrap=True)
     return figure
 
 
@@ -103,9 +103,19 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
             aim = target.vertical if name == "vertical" else target.horizontal
             axis.plot(*_defined(aim), HINGE, ls="--", lw=1.8, label="target")
         _label(axis, name)
-    figure.suptitle(suite.name, fontsize=NORMAL)
+        _mark_band(axis, suite)
+    figure.suptitle(suite.name, fontsize=NORMAL, wrap=True)
     _legend(figure, axes)
     return figure
+
+
+def _mark_band(axis: Axes, suite: Suite) -> None:
+    """Shade the periods over which all pairs were matched, if they were."""
+    bands = [match.band for match in suite.matches]
+    if bands:
+        low, high = max(low for low, _ in bands), min(high for _, high in bands)
+        words = f"matched, {low:g} to {high:g} s"
+        axis.axvspan(low, high, color=HINGE, alpha=0.06, lw=0.0, zorder=0, label=words)
 
 
 def _defined(aim: Callable[[Array], Array]) -> Array:
@@ -134,7 +144,7 @@ def _legend(figure: Figure, axes: Sequence[Axes]) -> None:
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure(figsize=(0.75 * COLUMN * max(count, 1.3), 4.2), layout="constrained")
+    figure = Page(figsize=(0.75 * COLUMN * max(count, 1.3), 4.2), layout="constrained")
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 

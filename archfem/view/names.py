@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from archfem.arrays import Array
 from archfem.masonry.structure import Joint, Structure
 from archfem.view.structure import draw_blocks
-from archfem.view.style import INK, NORMAL, SLIP, SMALL, canvas, dress
+from archfem.view.style import INK, SLIP, SMALL, canvas, entitle, scale_of, stand
 
 TINY = 4.5
 """Smallest size of type that can be read on paper [points]."""
@@ -27,6 +27,9 @@ STEEP = 91.0
 
 ROOM = 0.1, 0.15
 """Beside and below the blocks, for names, relative to the size of the structure."""
+
+NAME = 0.4
+"""Room beside the blocks at least [inch]."""
 
 APART = 0.5
 """Space between the name of a joint and its end, relative to the size of its type."""
@@ -57,27 +60,21 @@ def draw_names(structure: Structure) -> Figure:
     """
     page = canvas(structure)
     axes = page.add_subplot()
-    dress(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    stand(axes, structure)
     draw_blocks(axes, structure)
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
-    axes.margins(*ROOM)
+    inch = 1.0 / scale_of(structure)
+    wide = float(np.ptp(np.concatenate([block.drawn()[:, 0] for block in structure.blocks])))
+    axes.margins(max(ROOM[0], NAME * inch / wide), ROOM[1])
     axes.autoscale_view()
-    inch = _inch(page, structure)
     for joint in shown:
         axes.plot(*joint.ends.T, color=SLIP, lw=1.0, zorder=4)
     for part in dict.fromkeys(joint.part for joint in shown):
         _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
     title = f"{structure.name}: names of joints, such as '{example}'"
-    axes.set_title(title, fontsize=NORMAL, color=INK)
+    entitle(axes, title)
     return page
-
-
-def _inch(page: Figure, structure: Structure) -> float:
-    """Length that an inch of the page stands for, about [m]."""
-    points = np.concatenate([block.drawn() for block in structure.blocks])
-    return float(np.ptp(points[:, 0]) / (page.get_size_inches()[0] - 0.8))
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:

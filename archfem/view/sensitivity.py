@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from archfem.arrays import Array
-from archfem.view.style import COLUMN, EDGE, FAINT, LINES, SMALL, dress
+from archfem.view.style import COLUMN, EDGE, FAINT, LINES, SMALL, Page, dress
 
 
 def draw_tornado(
@@ -23,7 +23,7 @@ def draw_tornado(
         The page, what matters most at the top.
     """
     order = sorted(ranges, key=lambda name: float(np.ptp([*ranges[name], usual])))
-    figure = Figure(figsize=(COLUMN, 0.9 + 0.42 * len(order)), layout="constrained")
+    figure = Page(figsize=(COLUMN, 0.9 + 0.42 * len(order)), layout="constrained")
     axes = figure.add_subplot()
     dress(axes, quantity)
     for row, name in enumerate(order):
@@ -52,7 +52,7 @@ def draw_convergence(
         The page, a panel for each.
     """
     wide = 0.25 * COLUMN + 0.55 * COLUMN * len(paths)
-    figure = Figure(figsize=(wide, 0.55 * COLUMN), layout="constrained")
+    figure = Page(figsize=(wide, 0.55 * COLUMN), layout="constrained")
     panels = figure.subplots(1, len(paths), sharey=True, squeeze=False)[0]
     for axes, (name, (sizes, values, limit, error)) in zip(panels, paths.items(), strict=True):
         dress(axes, f"{name}: size over the finest [-]", quantity if axes is panels[0] else "")

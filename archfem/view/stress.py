@@ -25,7 +25,17 @@ from archfem.units import MPa, kPa
 from archfem.view.marks import joint_marks
 from archfem.view.states import drawn
 from archfem.view.structure import draw_blocks, draw_thrust
-from archfem.view.style import BEYOND, EDGE, INK, MOVED, NORMAL, SMALL, STONE, canvas, dress
+from archfem.view.style import (
+    BEYOND,
+    EDGE,
+    INK,
+    MOVED,
+    SMALL,
+    STONE,
+    canvas,
+    entitle,
+    stand,
+)
 
 SHADES = LinearSegmentedColormap.from_list(
     "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
@@ -82,8 +92,7 @@ def draw_stress(
     own = axes is None
     axes = canvas(structure).add_subplot() if axes is None else axes
     page = cast(Figure, axes.figure)
-    dress(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    stand(axes, structure)
     draw_blocks(axes, structure)
     _shade(axes, cells, -principal_values(*corners.T)[1], chosen)
     outlines = [block.drawn() for block in structure.blocks]
@@ -93,7 +102,7 @@ def draw_stress(
     _crosses(axes, cells, cell_stress(model, q), chosen)
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))
-    axes.set_title(f"{structure.name}: principal compression", fontsize=NORMAL, color=INK)
+    entitle(axes, f"{structure.name}: principal compression")
     axes.autoscale_view()
     if own:
         page.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)

@@ -19,17 +19,17 @@ from archfem.view.marks import Marks, joint_marks
 from archfem.view.style import (
     EDGE,
     HINGE,
-    INK,
-    NORMAL,
     SLIP,
     SMALL,
     SOIL,
     STONE,
     SUPPORT,
     THRUST,
+    Page,
     canvas,
-    dress,
+    entitle,
     legend,
+    stand,
 )
 
 STACKED = 0.78
@@ -62,14 +62,13 @@ def draw_structure(
         InvalidInput: `joints` has several instants, or those of another structure.
     """
     axes = canvas(structure).add_subplot() if axes is None else axes
-    dress(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    stand(axes, structure)
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
         draw_marks(axes, joint_marks(structure, flagged(joints, criteria)))
         legend(axes)
-    axes.set_title(title_of(structure, joints), fontsize=NORMAL, color=INK)
+    entitle(axes, title_of(structure, joints))
     axes.autoscale_view()
     return cast(Figure, axes.figure)
 
@@ -84,14 +83,14 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
         The page, with a panel for each structure.
     """
     wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
-    figure = Figure(figsize=(wide, STACKED * high * len(states)), layout="constrained")
+    figure = Page(figsize=(wide, STACKED * high * len(states)), layout="constrained")
     panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
         if joints is not None and "time" in joints.coords:
             label = f"{label}, t = {float(joints['time']):.3f} s"
-        axes.set_title(label, fontsize=NORMAL, color=INK)
+        entitle(axes, label)
         axes.label_outer()
         handles, words = axes.get_legend_handles_labels()
         marks |= dict(zip(words, handles, strict=True))

@@ -32,7 +32,7 @@ def main() -> None:
     parser.add_argument("--study", help="a study's file in place of the ring's histories")
     given = parser.parse_args()
     if given.study:
-        study = af.Study.read(given.study)
+        study = af.Study.read(given.study, own_code=True)
     else:
         case = af.Case.read(RING, [f"model.fidelity={given.fidelity}", "output.animation=false"])
         scales = [0.2 + 0.6 * k / given.points for k in range(given.points)]

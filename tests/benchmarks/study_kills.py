@@ -38,7 +38,7 @@ SAME = ("results.nc", "results.csv")
 
 def driver(folder: Path, out: Path) -> "subprocess.Popen[bytes]":
     """The study's command, begun."""
-    command = [sys.executable, "-m", "archfem", "study", str(folder / "study.toml")]
+    command = [sys.executable, "-m", "archfem", "study", "--own-code", str(folder / "study.toml")]
     with (folder / "log.txt").open("a") as log:
         return subprocess.Popen(
             [*command, "--out", str(out), "--workers", "2"], stdout=log, stderr=log

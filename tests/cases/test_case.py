@@ -49,7 +49,7 @@ def test_changes_from_the_command_line():
         ("structure.shape=['column']", r"structure.shape = \['column'\] is not known"),
         ("materials.stne={young=1e9}", "materials.stne: .*missing .*'poisson'"),
         ("contacts.x={normal_stifness=1e9}", "'contacts.x.normal_stifness': did you mean"),
-        ("analysis.dt=-1", "analysis.dt = -1 s is not between 0 and 0.1 s"),
+        ("analysis.dt=-1", "analysis.dt = -1 s is not between 1e-06 and 0.1 s"),
         ("analysis.dt='5 s'", "analysis.dt = 5 s is not between"),
         ("output.free_body='vousoir 3'", "no block 'vousoir 3': .*'voussoir 3'"),
         ("model.cells=4", r"model.cells = 4 is not a list"),

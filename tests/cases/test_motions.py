@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.motions import ground_suite, suite_settings
+from archfem.cases.motions import ground_motion, ground_suite, motion_settings, suite_settings
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
 
@@ -57,6 +57,14 @@ def test_targets_are_those_of_the_codes(small, target, expected):
     )
 
 
+def test_samples_may_stand_in_the_case():
+    upright = {"samples": ["0.1 g", 0.0, -1.0], "dt": "10 ms"}
+    given = {"samples": [0.5, 1.0], "dt": 0.01, "vertical": upright, "scale": 2.0}
+    motion = ground_motion(motion_settings(given))
+    assert motion.horizontal.tolist() == [1.0, 2.0]
+    assert motion.vertical.tolist() == [0.2 * 9.80665, 0.0, -2.0]
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -66,6 +74,8 @@ def test_targets_are_those_of_the_codes(small, target, expected):
         ("suite.pairs.third={}", "suite.pairs.third needs either a file, or synthetic"),
         ("suite.pairs.third={synthetic={sed=1}}", "unknown key 'suite.pairs.third.synthetic.sed'"),
         ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
+        ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
+        ("suite.pairs.third={samples=[0.0, 1.0], synthetic={}}", "it has .'samples', 'synthetic'."),
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
         ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
         ("suite.matched=true", "suite.matched = true needs a target"),
@@ -94,3 +104,30 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
     assert motion.pga == pytest.approx(0.980665)
     with pytest.raises(af.InvalidInput, match=r'suite\.pairs\.one\.resample = "0\.01 s"'):
         ground_suite(suite_settings({"pairs": {"one": given}}), tmp_path)
+
+
+def test_a_vertical_that_is_made_has_the_peak_that_is_asked_for():
+    """It used to be the vertical of a motion whose horizontal had that peak: two thirds of it."""
+    level = {"seed": 1, "pga": 1.0, "duration": 2.0}
+    upright = {"synthetic": {"seed": 2, "pga": 2.0, "duration": 2.0}}
+    asked = motion_settings({"synthetic": level, "vertical": upright})
+    made = ground_motion(asked)
+    assert abs(made.vertical).max() == pytest.approx(2.0, rel=1e-12)
+    assert made.pga == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(af.InvalidInput, match="vertical_ratio: a vertical has none"):
+        motion_settings(
+            {"synthetic": level, "vertical": {"synthetic": {"seed": 2, "vertical_ratio": 0.5}}}
+        )
+
+
+@pytest.mark.parametrize(
+    ("target", "period", "value"),
+    [
+        ('{code="NTC-2018", ag=0.25, f0=2.5, tc_star="0.35 s", site="A"}', 0.2, 0.625),
+        ('{code="ASCE-7-22", sds=1.2, sd1=0.6, tl="8 s"}', 1.0, 0.6),
+        ('{code="EC8-2024", s_alpha=0.5, s_beta=0.15, f_alpha=1.2, f_beta=1.6}', 0.2, 0.6),
+    ],
+)
+def test_codes_by_name(small, target, period, value):
+    spectrum = af.Case.read(small, [f"suite.target={target}"]).target
+    assert spectrum.horizontal(period) == pytest.approx(value)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.cases import inputs
 from archfem.cases import run as analysis
+from archfem.cases.kept import finished
 
 
 def names(results):
@@ -83,7 +85,7 @@ def test_a_step_that_fails_ends_its_run_only(small, tmp_path):
     assert second.error is None
     alone = case.alone("first")
     assert af.History.read(first.path).ended is af.dynamics.Ending.FAILED
-    assert analysis.finished(first.path, alone, alone.ground_suite().motions[0]) is None
+    assert finished(first.path, alone, alone.ground_suite().motions[0]) is None
 
     def never_begun(*_):
         raise af.DidNotConverge("no equilibrium")
@@ -100,5 +102,32 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
     (motion,) = case.ground_suite().motions
     shaken = analysis.shaken(case, motion, analysis.at_rest(case))
     path = shaken.save(tmp_path / "history.nc")
-    assert analysis.finished(path, case, motion).outcome == shaken.outcome
-    assert analysis.finished(path, case, motion.scaled(1.01)) is None
+    assert finished(path, case, motion).outcome == shaken.outcome
+    assert finished(path, case, motion.scaled(1.01)) is None
+    at2(tmp_path / "level.AT2", [0.0, 0.06, -0.06, 0.0], 0.01)
+    assert finished(path, case, motion) is None  # before it asks what the ground does
+
+
+@pytest.mark.parametrize("what", ["drawing", "program"])
+def test_nothing_is_kept_of_another_drawing_or_by_another_program(what, tmp_path, monkeypatch):
+    """A drawing that is stretched leaves the case's own words and the ground as they are."""
+    stretched, drawing = 1.3, tmp_path / "column.geojson"
+    column = af.column(breadth=1.0, heights=[1.0, 1.0])
+    af.masonry.write_outlines(column, drawing)
+    tables = {
+        "structure": {"shape": "outlines", "file": drawing.name},
+        "model": {"fidelity": "rigid"},
+        "suite": {"pairs": {"one": {"synthetic": {"duration": 0.5, "pga": 0.5}}}},
+        "analysis": {"dt": 0.005},
+    }
+    kept = []
+    for changed in (False, False, True):
+        if changed and what == "drawing":
+            af.masonry.write_outlines(
+                af.column(breadth=stretched, heights=[stretched, stretched]), drawing
+            )
+        elif changed:
+            monkeypatch.setattr(inputs, "_modules_digest", lambda: "another")
+        *_, run = analysis.carried_out(af.Case.of(tables, tmp_path), tmp_path / "out")
+        kept.append(run.kept)
+    assert kept == [False, True, False]

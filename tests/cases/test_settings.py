@@ -3,7 +3,7 @@
 import pytest
 
 import archfem as af
-from archfem.cases.settings import change, chosen, merged, remove
+from archfem.cases.settings import change, chosen, keys_of, merged, remove
 
 
 def test_quantities():
@@ -35,6 +35,13 @@ def test_an_angle_is_no_pure_number(text, tangent):
     [
         ("2 kg", "not in a unit like m"),
         ("two", "not a quantity"),
+        ("9**9**9**9 m", "has a power no unit has"),
+        ("(9**9)**(9**9) m", "has a power no unit has"),
+        ("9 ^ 9 ^ 9 m", "has a power no unit has"),
+        ("((((((9**9)**9)**9)**9)**9)**9) m", "has a power no unit has"),
+        ("9" * 5000 + " m", "it has 5002 letters"),
+        ("9⁹⁹⁹⁹⁹⁹⁹⁹⁹⁹ m", "has a power no unit has"),
+        ("__import__('os').getpid() m", "not a quantity"),
         ("2 furlonks", "not a quantity"),
         ("(", "not a quantity"),
         (float("nan"), "not finite"),
@@ -63,3 +70,35 @@ def test_tables_go_over_those_of_another_case():
     change(below, "a.z='5 m'")
     change(below, "c.d=word")
     assert below == {"a": {"y": 2, "z": "5 m"}, "b": 3, "c": {"d": "word"}}
+
+
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        ("analysis.dt", ["analysis", "dt"]),
+        ("contacts.stone to stone.friction", ["contacts", "stone to stone", "friction"]),
+        ('contacts."stone to stone".friction', ["contacts", "stone to stone", "friction"]),
+        ("suite.pairs.'M 6.4'.scale", ["suite", "pairs", "M 6.4", "scale"]),
+        ('a . "b=c"', ["a", "b=c"]),
+    ],
+)
+def test_names_with_spaces_and_dots_are_quoted_as_in_toml(path, names):
+    assert keys_of(path) == names
+    settings = {}
+    change(settings, f"{path} = what's new")
+    for name in names:
+        settings = settings[name]
+    assert settings == "what's new"
+
+
+@pytest.mark.parametrize("path", ["a..b", ".a", 'a."b', 'a.""', ""])
+def test_what_names_no_key(path):
+    with pytest.raises(af.InvalidInput, match="names no key"):
+        keys_of(path)
+
+
+def test_a_part_is_taken_out_of_the_base():
+    settings = {"structure": {"arches": {"main arch": {"span": 4}, "M 2.0": {"span": 2}}}}
+    remove(settings, 'structure.arches."M 2.0"')
+    remove(settings, "structure.arches.main arch")
+    assert settings == {"structure": {"arches": {}}}

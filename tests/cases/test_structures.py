@@ -1,10 +1,12 @@
 """Structures as case files describe them."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import archfem as af
+from archfem.cases.structures import planned
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 BRIDGES = [
@@ -53,3 +55,26 @@ def test_a_table_of_parts_says_what_holds_for_all_of_them():
         for part in ("north pier", "south pier")
     }
     assert lowest["north pier"] - lowest["south pier"] == pytest.approx(-0.4)
+
+
+@pytest.mark.parametrize(
+    ("told", "blocks"),
+    [
+        ('shape="pointed_arch", span=4.0, rise="3 m", thickness=0.5, voussoirs=11', 13),
+        ('shape="elliptical_arch", span=4.0, rise=1.2, thickness=0.6, voussoirs=11', 13),
+        ('shape="flat_arch", span=2.0, thickness=0.5, voussoirs=7, skewback="20 deg"', 9),
+        ('shape="arch_along", intrados=[[0,0],[1,"1 m"],[2,0]], thickness=0.4, voussoirs=5', 7),
+        (
+            'shape="buttressed_arch", span=4.0, rise=1.2, thickness=0.5, voussoirs=11, '
+            "breadth=1.5, height=2.0, course=0.5",
+            21,
+        ),
+        (
+            'shape="arcade", spans=[4.0, 5.0], embraces=[170.0], thicknesses=[0.6], voussoirs=[9], '
+            "heights=[2.0, 3.0, 2.5], breadths=[1.6], course=1.0",
+            28,
+        ),
+    ],
+)
+def test_shapes_by_name(told, blocks):
+    assert len(planned(tomllib.loads(f"structure = {{ {told} }}")).blocks) == blocks

@@ -5,7 +5,7 @@ import re
 import pytest
 
 import archfem as af
-from archfem.cases.summary import collapse_words, joint_table, pair_table, run_words
+from archfem.cases.summary import collapse_words, found_words, joint_table, pair_table, run_words
 from archfem.limit.episodes import episode
 
 
@@ -19,7 +19,11 @@ def run(ring):
 
 def test_the_verdict_comes_first(run, ring):
     text = run_words(ring, run, run.joints.isel(time=0))
-    assert text.startswith(f"{run.verdict}\n\njoint ")
+    found = found_words(run)
+    assert text.startswith(f"{run.verdict}\n\n{found}\n\njoint ")
+    assert f"outcome: reached the end of the motion; {len(run.time) - 1} steps" in found
+    assert "of the largest exchanged at most" in found
+    assert f"doubts: {len(run.doubts)}" in found
 
 
 def test_pair_table_tells_all_three(run, tmp_path):

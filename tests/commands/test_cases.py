@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.commands.cases import tell
+from archfem.commands.cases import DOUBTFUL, tell
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
@@ -114,6 +114,7 @@ def told(small, shake):
 def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     def broken_off(case, motion, *given):
         history = af.cases.shaken(case, motion, *given)
+        history.dataset.attrs["doubts"] = "energy drifts"
         if motion.name == "second":
             history.dataset.attrs["ended"] = "interrupted"
         return history
@@ -121,7 +122,11 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     with pytest.raises(KeyboardInterrupt):
         told(small, broken_off)
     assert "run the same command again" in capsys.readouterr().err
-    assert run(small) == 0
+    assert run(small) == DOUBTFUL  # what is kept keeps its doubts
+    summary = (small.parent / "out" / "first" / "summary.txt").read_text()
+    assert summary.startswith("in doubt: energy drifts\n")
+    table = (small.parent / "out" / "suite.txt").read_text()
+    assert "in doubt, as their summaries say: first\n" in table
     said = capsys.readouterr().out
     assert "first: finished before" in said
     assert "second: finished before" not in said

@@ -14,7 +14,7 @@ def test_an_output_that_is_no_folder_is_an_error_of_one_line(tmp_path, capsys):
     (tmp_path / "out").write_text("a file")
     given = ["run", str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / "out")]
     assert main(given) == 1
-    assert "File exists" in capsys.readouterr().err
+    assert "out is a file, and results go into a folder: name another" in capsys.readouterr().err
 
 
 def test_check_command(capsys):
@@ -53,3 +53,33 @@ def test_words_that_are_no_command_end_with_two(capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["rum", "ring.toml"])
     assert "invalid choice: 'rum'" in capsys.readouterr().err
+
+
+def test_a_quoted_name_may_be_changed(capsys):
+    given = ["--set", 'contacts."stone to stone".friction=0.1', "--set", "model.fidelity=rigid"]
+    assert main(["check", str(RING), *given]) == 1
+    assert "no equilibrium" in capsys.readouterr().err  # on so slippery joints
+
+
+def test_a_missing_record_is_told_before_anything_is_computed(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(
+        f'base = "{RING}"\nwithout = ["motion"]\n[motion]\nfile = "missing.at2"\n'
+    )
+    for command in (["check"], ["run", "--out", str(tmp_path / "out")]):
+        assert main([command[0], str(tmp_path / "case.toml"), *command[1:]]) == 1
+        out, error = capsys.readouterr()
+        assert "there is no record" in error
+        assert "dead load" not in out
+
+
+def test_a_refused_record_leaves_the_others(tmp_path, capsys):
+    (tmp_path / "bad.txt").write_text("words")
+    rows = "".join(f"{0.01 * (k % 5 - 2):.4f}\n" for k in range(200))
+    (tmp_path / "good.txt").write_text("# units g, dt 0.01\n" + rows)
+    files = [str(tmp_path / name) for name in ("bad.txt", "good.txt")]
+    assert main(["motion", *files, "--out", str(tmp_path)]) == 1
+    out, error = capsys.readouterr()
+    assert "no line of numbers" in error
+    assert "1 of 2 files were refused" in error
+    assert "good" in out
+    assert {"bad.txt", "good.txt"} < {path.name for path in tmp_path.iterdir()}  # and its pictures

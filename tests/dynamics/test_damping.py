@@ -136,3 +136,27 @@ def test_too_few_effective_modes():
 def test_stiffness_damping_that_cannot_be_meant(given, words):
     with pytest.raises(af.InvalidInput, match=words):
         af.StiffnessDamping(*given)
+
+
+@pytest.mark.parametrize(("breadth", "number"), [(0.14, 2), (0.145, 1)])
+def test_the_first_effective_mode_has_five_percent(breadth, number):
+    """Of a slender block beside a wide one: the lowest mode is its own, with 4.9 or 5.1 %."""
+    contact = af.Contact(1e9, 0.5e9)
+
+    def box(left, right, low, high, name):
+        outline = ((left, high), (left, low), (right, low), (right, high))
+        return af.Block(outline, af.STONE, name, low < 0, (0, 1, 2, 3), "pier", role="pier")
+
+    blocks = (
+        box(-2.0, 4.0, -1.0, 0.0, "base"),
+        box(0.0, 2.0, 0.0, 1.0, "wide"),
+        box(-1.0, breadth - 1.0, 0.0, 1.0, "slender"),
+    )
+    beds = (
+        af.Joint((0, 1), (0.0, 0.0), (2.0, 0.0), contact, "wide", "pier", "pier"),
+        af.Joint((0, 2), (-1.0, 0.0), (breadth - 1.0, 0.0), contact, "slender", "pier", "pier"),
+    )
+    model = af.build(af.Structure(blocks, beds), fidelity="rigid")
+    found = first_effective(model, af.dead_load(model))
+    assert found.number == number
+    assert found.modes.mass_ratios[0, 0] == pytest.approx(0.05, abs=0.0012)

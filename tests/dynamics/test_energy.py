@@ -20,10 +20,17 @@ WAYS = [
 def test_balance_counts_what_comes_and_goes():
     balance = Balance(0.0, -10.0)
     rows = np.array([[1.0, -9.0, 2.5, 0.5], [3.0, -9.0, 2.0, 0.0]])
-    assert balance.add(rows) == pytest.approx([0.0, 0.0])
+    assert balance.add(rows)[0] == pytest.approx([0.0, 0.0])
     assert balance.largest == pytest.approx(4.5)
-    assert balance.add(np.array([[8.0, -9.0, 0.0, 0.0]])) == pytest.approx([5.0])
-    assert balance.gain == pytest.approx(4.5)
+    drift, fractions = balance.add(np.array([[8.0, -9.0, 0.0, 0.0], [3.0, -9.0, 0.0, 0.0]]))
+    assert drift == pytest.approx([5.0, 0.0])
+    assert fractions == pytest.approx([5.0 / 9.0, 0.0])  # of what was exchanged until then
+
+
+def test_what_is_as_good_as_nothing_is_not_judged():
+    """Of 10 J under self-weight a hundredth of a joule is exchanged at least."""
+    _, fractions = Balance(0.0, -10.0).add(np.array([[1e-4, -10.0, 0.0, 0.0]]))
+    assert fractions == pytest.approx([0.01])
 
 
 @pytest.mark.parametrize(

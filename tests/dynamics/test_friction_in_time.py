@@ -52,14 +52,18 @@ def slid(friction, stiffness, motion, dt):
     return float(states[-1].memory.mean())
 
 
-def test_newmarks_block_slides_as_far_as_it_should():
+def test_newmarks_block_slides_as_far_as_it_should(verified):
     """To 1e-6 of 0.19 m, in steps of 0.25 ms at k = 3e11 Pa/m.
 
     In the step in which it stops the path is not straight: an error of a dt² / 8, here 3e-8 m. The
     elastic slip leaves 7e-7 (below), with the other sign.
     """
     expected, _ = slide(pulse().horizontal, 0.05, 0.3 * GRAVITY)
-    assert slid(0.3, 3e11, pulse(), 2.5e-4) == pytest.approx(expected, rel=1e-6)
+    way = slid(0.3, 3e11, pulse(), 2.5e-4)
+    assert way == pytest.approx(expected, rel=1e-6)
+    verified(
+        "Newmark's sliding block, way [m]", abs(expected), "Newmark (1965), integrated", abs(way)
+    )
 
 
 @pytest.mark.parametrize("method", ["contact", "compliance"])

@@ -105,7 +105,7 @@ def test_a_failed_write_leaves_the_old_file(run, tmp_path):
     path = run.save(tmp_path / "run.nc")
     before = path.read_bytes()
     unknown = History(run.dataset.assign_attrs(thing=object()))
-    with pytest.raises(TypeError, match="Invalid value for attr 'thing'"):
+    with pytest.raises(TypeError, match=r"attribute b?'thing'"):
         unknown.save(path)
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir()] == ["run.nc"]

@@ -27,7 +27,7 @@ def test_a_block_that_turns_about_the_end_of_a_joint(ring, rule):
     operator = rigid_joints(ring, 4, af.joints.Quadrature(rule))
     matrix, offset = face_matrix(operator)
     joint, angle = ring.joints[5], 1e-3
-    sense = np.sign(np.cross(ring.normals[5], joint.tangent))
+    sense = np.sign(np.linalg.det([ring.normals[5], joint.tangent]))
     for end, side in ((joint.extrados, 1.0), (joint.intrados, -1.0)):
         q = turned(ring, joint.higher, side * sense * angle, end)
         faces = (matrix @ q + offset).reshape(3, -1)

@@ -43,3 +43,16 @@ def test_lobatto_has_points_at_the_ends_and_gauss_has_not():
 def test_refusals(arguments, says):
     with pytest.raises(af.errors.InvalidInput, match=says):
         Quadrature(*arguments)
+
+
+@pytest.mark.parametrize("rule", ["exact", "nodal", "lobatto", "gauss"])
+def test_shear_stiffness_of_a_bed_is_that_of_its_area(rule):
+    """A block that slips by u is held by k_s A u; on exact facets a half at each of their ends."""
+    contact = af.Contact(2e9, 3e8, 0.6)
+    column = af.column(breadth=0.8, heights=[1.0], width=2.5, contact=contact)
+    operator = af.build(column, fidelity="rigid", cells=(2, 1), quadrature=rule).operator
+    shear = operator.elastic(np.array([1e-4, 0.0, 0.0]))
+    assert abs(shear.sum()) == pytest.approx(3e8 * 0.8 * 2.5 * 1e-4, rel=1e-12)
+    if rule == "exact":
+        assert np.abs(shear) == pytest.approx(np.full(4, 3e8 * 0.2 * 2.5 * 1e-4), rel=1e-12)
+        assert np.sort(operator.points.arm) == pytest.approx([-0.4, 0.0, 0.0, 0.4])

@@ -78,7 +78,7 @@ def unbalance(structure, joints, factor, live):
             sign = 1.0 if number == joint.higher else -1.0
             n, v, m = (float(joints[key][k]) for key in "NVM")
             push = sign * (n * structure.normals[k] - v * joint.tangent)
-            across = np.cross(joint.tangent, structure.normals[k])
+            across = np.linalg.det([joint.tangent, structure.normals[k]])
             arm = joint.middle - block.centroid
             force = force + push
             moment += arm[0] * push[1] - arm[1] * push[0] + sign * m * across
@@ -89,13 +89,16 @@ def unbalance(structure, joints, factor, live):
 @pytest.mark.parametrize("live", LOADS, ids=str)
 @pytest.mark.parametrize("friction", [None, "coulomb"])
 @pytest.mark.parametrize("build", [ring, piers], ids=["ring", "piers"])
-def test_static_and_kinematic_factors_are_equal(build, friction, live):
+def test_static_and_kinematic_factors_are_equal(build, friction, live, verified):
     structure = build()
     found = collapse_factor(structure, live=live, friction=friction)
     motion = found.motion
     dead, work = body_power(structure, motion, 0.0, -1.0), live_power(structure, motion, live)
     assert work > 0.0 > dead
     assert found.factor == pytest.approx(-dead / work, rel=EXACT)
+    case = "static against kinematic factor, rings and rings on piers under five loads"
+    off = abs(found.factor * work / dead + 1.0)
+    verified(case, "equal", "power of the mechanism found", "equal", difference=off)
     assert unbalance(structure, found.joints, found.factor, live) < 1e-6 * structure.weight
 
 
@@ -124,7 +127,7 @@ def test_factor_of_an_inclined_load_by_hand():
     for joint, pivot in hinges[1:]:
         stones = structure.blocks[first + 1 : joint + 1]
         middle = np.arctan2(*np.array(structure.joints[joint].middle))
-        pushed = np.cross(at - pivot, force) if loaded < middle else 0.0
+        pushed = np.linalg.det([at - pivot, force]) if loaded < middle else 0.0
         rows.append([-(foot - pivot)[1], (foot - pivot)[0], pushed])
         known.append(sum(20e3 * stone.area * (stone.centroid - pivot)[0] for stone in stones))
     assert found.factor == pytest.approx(np.linalg.solve(rows, known)[2], rel=EXACT)
@@ -164,7 +167,7 @@ def test_mirrored_load_gives_the_mirrored_mechanism():
     [
         {"radius": 29.5, "thickness": 5.5},
         {"width": 7.0},
-        {"material": replace(af.STONE, unit_weight=2e3)},
+        {"material": replace(af.STONE, unit_weight=2e5)},
         {"gravity": 1.62},
     ],
     ids=["size", "width", "weight", "gravity"],

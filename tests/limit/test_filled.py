@@ -235,7 +235,7 @@ def test_static_and_kinematic_factors_are_equal(live):
 
 def test_a_fill_without_weight_strength_or_spread_is_not_there():
     nothing = replace(SOIL, unit_weight=1e-3)
-    fill = af.limit.Fill(friction_angle=0.0, mobilisation=1.0, spread=0.1)
+    fill = af.limit.Fill(friction_angle=0.0, mobilisation=1.0, spread="0.1 degree")
     for live in (QUARTER, SIDEWAYS):
         bare = af.collapse_factor(arch_bridge(cover=None), live=live).factor
         found = af.collapse_factor(arch_bridge(0.02, nothing), live=live, fill=fill)

@@ -13,6 +13,11 @@ def ring(**changes):
     return af.circular_arch(**(given | changes))
 
 
+def on_piers(thickness, breadth):
+    lengths = {"radius": 2.0, "voussoirs": 9, "courses": [0.5]}
+    return af.arch_on_piers(thickness=thickness, pier_breadth=breadth, **lengths)
+
+
 def rough(friction):
     return replace(af.masonry.STONE_TO_STONE, friction=friction)
 
@@ -41,8 +46,24 @@ def test_least_thickness_is_a_bracket():
             "stands at any thickness",
         ),
         (lambda: minimum_thickness(lambda t: ring(thickness=-t)), "builds? makes no structure"),
+        (
+            lambda: minimum_thickness(lambda t: on_piers(t, breadth=0.1)),
+            r"0\.1 m does not, and no greater one can be built \(pier_breadth 0\.1 m is",
+        ),
     ],
 )
 def test_families_without_a_least_thickness_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
+    """Doubling passes over it."""
+    free = minimum_thickness(lambda t: ring(thickness=t), tolerance=1e-4)
+
+    def bounded(thickness):
+        if thickness > 1.01 * free:
+            raise af.InvalidStructure("thicker than there is room for")
+        return ring(thickness=thickness)
+
+    assert minimum_thickness(bounded, tolerance=1e-4) == pytest.approx(free, rel=2e-4)

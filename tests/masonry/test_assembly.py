@@ -53,7 +53,7 @@ def test_springings_on_piers_belong_to_the_ring():
 
 
 @pytest.mark.parametrize("turn", [0.0, 25.0, -25.0])
-@pytest.mark.parametrize("embrace", [5.0, 60.0, 159.0, 250.0])
+@pytest.mark.parametrize("embrace", ["5 degree", 60.0, 159.0, 250.0])
 def test_the_outer_end_is_found_for_shallow_and_skew_rings(turn, embrace):
     ring = af.circular_arch(radius=3.0, thickness=0.4, embrace=embrace, voussoirs=7, chords=1)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))

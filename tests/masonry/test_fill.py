@@ -114,12 +114,14 @@ def test_an_oedometer_is_as_compliant_as_a_bar(rows):
         pytest.param(40.0, 4, marks=pytest.mark.slow),
     ],
 )
-def test_active_force_is_that_of_the_best_wedge(angle, rows):
+def test_active_force_is_that_of_the_best_wedge(angle, rows, verified):
     """The wedge on the joints at 60° presses with cot 60° tan(60° - φ); Rankine's where φ = 30°."""
     found = pressed(smooth_box(angle, rows), 0.004)
     assert found == pytest.approx(tan(radians(60.0 - angle)) / sqrt(3.0), rel=WEDGE)
     rankine = tan(radians(45.0 - angle / 2.0)) ** 2
     assert found == pytest.approx(rankine, rel={20.0: 0.012, 30.0: WEDGE, 40.0: 0.034}[angle])
+    case = f"fill in pieces, {rows} rows, active force, φ = {angle:g}°: K_a"
+    verified(case, rankine, "Rankine (1857)", found)
 
 
 @pytest.mark.parametrize(
@@ -131,12 +133,14 @@ def test_active_force_is_that_of_the_best_wedge(angle, rows):
         pytest.param(40.0, 2, marks=pytest.mark.slow),
     ],
 )
-def test_passive_force_is_that_of_the_best_wedge(angle, rows):
+def test_passive_force_is_that_of_the_best_wedge(angle, rows, verified):
     """The wedge on the joints at 30° resists with cot 30° tan(30° + φ)."""
     found = pressed(smooth_box(angle, rows, passive=True), -0.08)
     assert found == pytest.approx(tan(radians(30.0 + angle)) * sqrt(3.0), rel=WEDGE)
     rankine = tan(radians(45.0 + angle / 2.0)) ** 2
     assert found == pytest.approx(rankine, rel={20.0: 0.013, 30.0: WEDGE, 40.0: 0.035}[angle])
+    case = f"fill in pieces, {rows} rows, passive force, φ = {angle:g}°: K_p"
+    verified(case, rankine, "Rankine (1857)", found)
 
 
 @pytest.mark.parametrize("passive", [False, True], ids=["active", "passive"])

@@ -3,6 +3,7 @@
 import pytest
 
 import archfem as af
+from archfem.masonry.materials import BACKFILL, CONTACTS
 
 
 @pytest.mark.parametrize(
@@ -30,3 +31,16 @@ def test_tension_goes_up_to_the_apex_of_coulombs_limit():
     assert af.Contact(1e9, 1e9, 0.5, cohesion=1e3, tension=2e3).tension == 2e3
     assert af.Contact(1e9, 1e9, None, tension=5e4).tension == 5e4
     assert af.Contact(1e9, 1e9, 0.0, tension=5e4).dilatancy == 0.0
+
+
+def test_presets_are_those_of_table_2():
+    """Demirel and Aldemir (2021), Table 2, copied a second time: k_n, k_s [MPa/mm], E [MPa]."""
+    table = {"stone to stone": (1.48, 0.30), "soil to stone": (0.30, 0.24)}
+    for name, (normal, shear) in table.items():
+        contact = CONTACTS[name]
+        assert contact.normal_stiffness == pytest.approx(1e9 * normal)
+        assert contact.shear_stiffness == pytest.approx(1e9 * shear)
+        assert contact.friction == 0.60
+    stone, backfill = af.STONE, BACKFILL
+    assert (backfill.young, backfill.poisson, backfill.unit_weight) == (6.25e6, 0.2, 18e3)
+    assert backfill.young < 1e-3 * stone.young

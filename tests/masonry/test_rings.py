@@ -46,3 +46,21 @@ def test_impossible_rings_are_refused(change, says):
     given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.circular_arch(**{**given, **change})
+
+
+def test_an_angle_that_looks_like_radians_is_asked_about():
+    given = {"radius": 2.95, "thickness": 0.55, "voussoirs": 17}
+    with pytest.raises(af.InvalidInput, match=r"looks like radians: give 159 for 2\.775 rad, or"):
+        af.circular_arch(embrace=2.775, **given)
+    with pytest.raises(af.InvalidInput, match=r"'north': embrace = 2\.775"):
+        af.shapes.Arch(name="north", span=4.0, thickness=0.4, embrace=2.775, voussoirs=9)
+    with pytest.raises(af.InvalidInput, match="has no unit"):
+        af.circular_arch(embrace="2.775", **given)
+    whole = af.circular_arch(embrace=159.0, **given)
+    for same in ("159 degree", "159°", f"{np.radians(159.0)!r} rad"):
+        ring = af.circular_arch(embrace=same, **given)
+        assert ring.ends == pytest.approx(whole.ends, abs=1e-12)
+    slight = af.circular_arch(embrace="2.775 degree", **given)  # insisted on
+    assert np.ptp(slight.ends[:, 0, 0]) == pytest.approx(
+        2.0 * 2.675 * np.sin(np.radians(2.775 / 2))
+    )

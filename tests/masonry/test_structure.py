@@ -63,3 +63,36 @@ def test_blocks_and_joints_by_name_or_number(stack):
     assert stack.joint_number(stack.joints[1].name) == stack.joint_number(1) == 1
     with pytest.raises(af.errors.InvalidInput, match="no block 'blok 2': did you mean 'block 2'"):
         stack.block_number("blok 2")
+
+
+def test_blocks_that_overlap_or_cross_themselves_are_refused():
+    """On any rung: a rigid one has no mesh that would tell."""
+    column = af.column(breadth=1.0, heights=[1.0, 1.0])
+    reaching = [(-0.5, 2.0), (-0.5, 0.6), (0.0, 0.6), (0.0, 1.0), (0.5, 1.0), (0.5, 2.0)]
+    crossing = [(-0.5, 2.0), (-0.5, 1.0), (0.5, 1.0), (0.3, 2.2), (0.9, 2.2), (-0.1, 1.6)]
+    for outline, says in (
+        (reaching, r"'block 1' and 'block 2' overlap by 2e\+03 cm²"),
+        (crossing, "outline of 'block 2' crosses or touches itself"),
+    ):
+        top = replace(column.blocks[2], outline=tuple(outline), corners=None)
+        with pytest.raises(af.errors.InvalidStructure, match=says):
+            replace(
+                column,
+                blocks=(*column.blocks[:2], top),
+                joints=(
+                    column.joints[0],
+                    replace(column.joints[1], intrados=(0.0, 1.0)),
+                ),
+            )
+
+
+def test_a_ring_may_be_nearly_closed():
+    """Its abutments then have little room, and may overlap: both are fixed."""
+    assert af.circular_arch(radius=1.0, thickness=0.4, embrace=350.0, voussoirs=9).blocks[0].fixed
+
+
+def test_a_material_or_contact_by_name_is_refused():
+    with pytest.raises(af.InvalidInput, match="material = 'stone' is a str: give Material"):
+        af.column(breadth=1.0, heights=[1.0], material="stone")
+    with pytest.raises(af.InvalidInput, match="contact = 'stone to stone' is a str: give Contact"):
+        af.column(breadth=1.0, heights=[1.0], contact="stone to stone")

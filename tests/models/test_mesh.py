@@ -99,6 +99,40 @@ def test_nothing_beside_or_behind_a_mesh_is_run(stack, tmp_path):
     assert not mark.exists()
 
 
+HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "ending"),
+    [
+        (HEAD + "{call}", "msh"),
+        (HEAD + "{call}", "geo"),
+        ("$MeshFormat;\n{call}", "msh"),
+        ("$MeshFormat\n2.2 0 8\n{call}$EndMeshFormat\n", "msh"),
+        (HEAD + "$Comments\n{call}$EndComments\n", "msh"),
+        (HEAD + "$InterpolationScheme\n{call}$EndInterpolationScheme\n", "msh"),
+        (HEAD + "$View\n{call}$EndView\n$ONELAB\n{call}$EndONELAB\n", "opt"),
+        ('Include "{other}";\n', "msh"),
+        ('Merge "{other}";\n', "step"),
+        ("{call}", "brep"),
+    ],
+)
+def test_no_file_whatever_it_is_called_runs_anything(stack, tmp_path, text, ending):
+    """Scripts of gmsh behind a header, in sections that it knows, and in files named elsewhere."""
+    mark, other = tmp_path / "ran", tmp_path / "other.geo"
+    call = f'SystemCall "touch {mark}";\n'
+    other.write_text(call)
+    path = tmp_path / f"hostile.{ending}"
+    path.write_text(text.format(call=call, other=other))
+    with pytest.raises(af.errors.MeshError):
+        read_mesh(stack, path)
+    link = tmp_path / "link.msh"
+    link.symlink_to(path)
+    with pytest.raises(af.errors.MeshError):
+        read_mesh(stack, link)
+    assert not mark.exists()
+
+
 def test_a_face_of_several_chords_gets_a_cell_for_each():
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=90.0, voussoirs=3, chords=4)
     assert len(mesh(ring, af.models.Discretisation(cells=(2, 2))).blocks) == 3 * 8 + 2 * 2
@@ -320,8 +354,5 @@ def test_sides_that_cannot_agree():
 def test_an_outline_that_crosses_itself():
     ground = box("ground", 0.0, 1.0, -0.3, 0.0, fixed=True)
     bow = block("bow", (0.0, 0.0), (1.0, 0.0), (0.4, 2.0), (0.6, 2.0), corners=None)
-    with pytest.raises(af.errors.MeshError, match="cannot mesh block 'bow'"):
-        mesh(
-            af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE),
-            af.models.Discretisation(cells=(2, 2)),
-        )
+    with pytest.raises(af.InvalidStructure, match="'bow' crosses or touches itself"):
+        af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE)

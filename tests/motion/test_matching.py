@@ -23,7 +23,7 @@ def match(shaking):
 
 
 @pytest.mark.parametrize("component", ["horizontal", "vertical"])
-def test_matched_motion_follows_the_target(match, component):
+def test_matched_motion_follows_the_target(match, component, verified):
     # Evenly in period here, in log period where it is matched.
     periods = np.linspace(0.05, 2.0, 120)
     target = getattr(CASE_STUDY, component)(periods) * af.units.STANDARD_GRAVITY
@@ -34,6 +34,8 @@ def test_matched_motion_follows_the_target(match, component):
     # The rounds stop within 10 % of the target's peak, or at the best they found.
     assert peak == pytest.approx(float(getattr(CASE_STUDY, component)(0.0)), rel=0.15)
     assert match.misfit[component] == misfit(match.motion, CASE_STUDY, component=component)
+    case = f"motion matched to TBEC-2018, {component}, 0.05 to 2 s: rms misfit"
+    verified(case, "below 0.05", "the target", f"{match.misfit[component]:.3f}", difference=None)
 
 
 @pytest.mark.parametrize("component", ["horizontal", "vertical"])

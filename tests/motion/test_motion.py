@@ -66,7 +66,7 @@ def test_at_is_straight_between_samples_and_zero_outside():
 
 def test_the_last_instant_summed_up_in_steps_is_inside():
     motion = af.Motion(sine(frequency=0.3), 0.01)
-    late = sum([0.01] * 400)
+    late = float(np.cumsum(np.full(400, 0.01))[-1])
     assert late != motion.duration
     assert motion.at(late)[0, 0] == pytest.approx(motion.horizontal[-1], rel=1e-6)
     assert af.Motion([2.0], 0.01).at(0.0)[0, 0] == 2.0
@@ -154,6 +154,8 @@ def test_vertical_comes_from_another_motion(shaking):
     level = af.Motion(sine(), 0.01)
     assert level.with_vertical(af.Motion(sine()[:50], 0.01)).vertical == pytest.approx(sine()[:50])
     assert level.with_vertical(level).with_vertical(None).components == ("horizontal",)
+    whole = af.Motion(sine(), 0.01, 0.5 * sine())
+    assert level.with_vertical(whole).vertical == pytest.approx(0.5 * sine())
     with pytest.raises(af.errors.InvalidInput, match=r"step of 0\.005 s"):
         level.with_vertical(shaking)
 

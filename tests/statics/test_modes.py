@@ -99,16 +99,19 @@ def test_column_against_a_chain_of_springs(fidelity):
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
-def test_effective_masses_add_up_to_all_that_moves(fidelity):
+def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     shape = af.column(breadth=1.0, heights=[1.0, 0.5, 0.7])
     model = af.build(shape, fidelity=fidelity, cells=(2, 2))
     found = modes(model, model.size)
     assert found.effective_masses.sum(axis=0) == pytest.approx(of_blocks(shape), rel=1e-10)
     assert found.masses == pytest.approx(of_blocks(shape), rel=1e-10)
+    total = found.effective_masses.sum(axis=0)
+    case = "effective masses of all modes, each rung [kg]"
+    verified(case, of_blocks(shape), "mass that can move", total[0])
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
-def test_as_dense_lapack_about_dead_load(ring, fidelity):
+def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):
     model = af.build(ring, fidelity=fidelity, cells=(2, 2))
     dead = af.dead_load(model)
     found = modes(model, 12, about=dead)
@@ -116,6 +119,9 @@ def test_as_dense_lapack_about_dead_load(ring, fidelity):
     assert stiffness == pytest.approx(stiffness.T, abs=1e-12 * stiffness.max())
     squares, shapes = eigh(stiffness, mass, subset_by_index=[0, 11])
     assert found.frequencies == pytest.approx(hertz(squares), rel=SAME)
+    off = np.abs(found.frequencies / hertz(squares) - 1.0).max()
+    case = "twelve modes of the ring about the dead load, each rung"
+    verified(case, "equal", "dense LAPACK", "equal", difference=off)
     assert found.shapes.T @ mass @ found.shapes == pytest.approx(np.eye(12), abs=1e-8)
     assert np.abs(np.diag(shapes.T @ mass @ found.shapes)) == pytest.approx(1.0, abs=1e-7)
 

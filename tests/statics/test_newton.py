@@ -42,3 +42,14 @@ def test_methods_for_symmetric_tangents_are_refused_where_joints_slide(ring, opt
     model = af.build(glued(ring), fidelity="rigid")
     found = af.dead_load(model, Newton(petsc=options))
     assert found.q == pytest.approx(af.dead_load(model).q, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("error", [af.InvalidInput("no such joint"), KeyboardInterrupt()])
+def test_an_error_within_a_solve_is_not_swallowed(error):
+    def residual(q):
+        if q[0] != 0.0:
+            raise error
+        return q + 1.0
+
+    with pytest.raises(type(error)):
+        Solver(1).solve(residual, lambda q: sparse.csr_matrix([[1.0]]), np.zeros(1), 1.0)

@@ -70,11 +70,13 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
         pytest.param("full", "sideways", marks=pytest.mark.slow),
     ],
 )
-def test_every_rung_reaches_the_limit_of_its_polygon(rung, load):
+def test_every_rung_reaches_the_limit_of_its_polygon(rung, load, verified):
     limit = limit_of(LOADS[load])
     found = pushover(af.build(RING, fidelity=rung, cells=(4, 2), quadrature="lobatto"), LOADS[load])
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.factor <= limit * (1.0 + 1e-5)
+    case = f"pushover of rung {rung}, {load}: limit"
+    verified(case, limit, "limit analysis of its polygon", found.factor)
 
 
 @pytest.mark.parametrize("rung", ["rigid", "faces"])

@@ -58,7 +58,7 @@ def cluster(folder, workers=2, preload=None):
 
 
 def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, client):
-    study = af.Study.read(study_file)
+    study = af.Study.read(study_file, own_code=True)
     found = study.run(tmp_path / "out", client=client)
     assert found.identical(study.run(tmp_path / "serial", workers=1))
     names = ("results.nc", "results.csv")
@@ -73,7 +73,7 @@ def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
     with pytest.raises(
         af.InvalidInput, match=r"a worker runs archfem .*, this is 9\.9\.9: install"
     ):
-        af.Study.read(study_file).run(client=client)
+        af.Study.read(study_file, own_code=True).run(client=client)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "no address"])
@@ -82,22 +82,22 @@ def test_a_dead_scheduler_is_named(study_file, monkeypatch, address):
     with pytest.raises(
         af.InvalidInput, match=r"no scheduler .*answers at .*start 'dask scheduler'"
     ):
-        af.Study.read(study_file).run(client=address)
+        af.Study.read(study_file, own_code=True).run(client=address)
 
 
 def test_without_dask_the_extra_is_named(study_file, monkeypatch):
     monkeypatch.delitem(sys.modules, "archfem.studies.cluster", raising=False)
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(af.InvalidInput, match=r"pip install 'archfem\[cluster\]'"):
-        af.Study.read(study_file).run(client="tcp://127.0.0.1:1")
+        af.Study.read(study_file, own_code=True).run(client="tcp://127.0.0.1:1")
 
 
 @pytest.mark.slow
 def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
     with cluster(tmp_path) as (address, _):
-        command = ["study", str(study_file), "--out", str(tmp_path / "out")]
+        command = ["study", "--own-code", str(study_file), "--out", str(tmp_path / "out")]
         assert af.commands.main([*command, "--scheduler", address]) == 0
-    af.Study.read(study_file).run(tmp_path / "serial", workers=1)
+    af.Study.read(study_file, own_code=True).run(tmp_path / "serial", workers=1)
     names = ("results.nc", "results.csv")
     assert all(
         (tmp_path / "out" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
@@ -135,4 +135,4 @@ def test_a_process_of_another_version_is_named(study_file, tmp_path):
         cluster(tmp_path, 1, preload) as (address, _),
         pytest.raises(af.InvalidInput, match=r"a worker runs archfem 0\.1\.0"),
     ):
-        af.Study.read(study_file).run(client=address)
+        af.Study.read(study_file, own_code=True).run(client=address)

@@ -5,7 +5,7 @@ import pytest
 from scipy import optimize, stats
 
 import archfem as af
-from archfem.studies.fragility import fragility, stripe_fragility
+from archfem.studies.fragility import fragility, spread, stripe_fragility
 
 MEDIAN, DISPERSION = 2.5, 0.4
 
@@ -92,6 +92,18 @@ def test_what_is_not_known_of_the_structure_widens_the_curve():
     wider = found.widened(0.3)
     assert wider.dispersion == pytest.approx(np.hypot(found.dispersion, 0.3))
     assert wider.median == found.median
+
+
+def test_variants_and_motions_share_the_variance_of_all_together():
+    scales = [0.5, 0.8, 1.0, 1.7]
+    found = spread(fragility(scale * drawn(30)) for scale in scales)
+    pooled = fragility(np.concatenate([scale * drawn(30) for scale in scales]))
+    between = found.epistemic**2 * 3 / 4  # of these four alone, not of what they are samples of
+    assert pooled.dispersion**2 == pytest.approx(found.record**2 + between, rel=1e-6)
+    assert pooled.median == pytest.approx(found.median, rel=1e-6)
+    assert found.total == np.hypot(found.record, found.epistemic)
+    with pytest.raises(af.InvalidInput, match="two or more"):
+        spread([pooled])
 
 
 @pytest.mark.parametrize(

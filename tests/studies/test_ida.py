@@ -110,6 +110,19 @@ def test_pairs_of_a_suite_are_the_motions_where_none_are_given(small_ida):
     assert halved.table["pga"].values == pytest.approx(0.5 * found.table["pga"].values)
 
 
+def test_a_motion_is_what_its_table_says(small_ida):
+    case, _, _ = small_ida
+    motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
+    few = {"precision": 0.5, "between": (2.0, 2.0), "limits": ["first hinge"], "workers": 1}
+    given = ida(case, [motion], **few).table
+    same = ida(case, made(2)[1:], **few).table
+    assert given["motion"].values.tolist() == [motion.name]
+    for name in ("pga", "pgv", "arias", "first hinge", "rotation"):
+        assert (given[name].values == same[name].values).all()
+    unnamed = af.Motion(motion.horizontal, motion.dt)
+    assert ida(case, [unnamed], **few).table["motion"].values.tolist() == ["motion 1"]
+
+
 def test_analyses_that_cannot_be_meant(small_ring):
     with pytest.raises(af.InvalidInput, match="no motions were given"):
         ida(small_ring)

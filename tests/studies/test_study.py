@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+from contextlib import ExitStack
 
 import numpy as np
 import pandas as pd
@@ -11,8 +12,16 @@ import xarray as xr
 from scipy import stats
 
 import archfem as af
+from archfem.cases import inputs
 from archfem.studies.over import axes_over
 from archfem.studies.store import Store
+
+
+@pytest.fixture
+def undo():
+    """What is to be done after the test."""
+    with ExitStack() as stack:
+        yield stack
 
 
 def test_a_study_finds_of_each_point_what_its_case_does_alone(small_ring, tmp_path):
@@ -31,7 +40,7 @@ def test_a_study_finds_of_each_point_what_its_case_does_alone(small_ring, tmp_pa
 
 
 def test_two_processes_and_one_give_the_same_bits(study_file, tmp_path):
-    study = af.Study.read(study_file)
+    study = af.Study.read(study_file, own_code=True)
     one, two = (study.run(tmp_path / f"out{n}", workers=n) for n in (1, 2))
     xr.testing.assert_identical(one, two)
     names = ("results.nc", "results.csv")
@@ -54,10 +63,10 @@ def test_keys_with_spaces_are_coordinates_too(small_ring, tmp_path):
 
 
 def test_plain_xarray_and_pandas_read_the_table(study_file, tmp_path):
-    found = af.Study.read(study_file).run(tmp_path / "out", workers=1)
+    found = af.Study.read(study_file, own_code=True).run(tmp_path / "out", workers=1)
     with xr.open_dataset(tmp_path / "out" / "results.nc") as kept:
         assert kept["twice"].equals(found["twice"])
-        assert kept.attrs["archfem"] == af.__version__
+        assert kept.attrs["archfem"].startswith(f"{af.__version__}+")
     frame = pd.read_csv(tmp_path / "out" / "results.csv")
     assert len(frame) == 6
     assert frame["twice"].tolist()[:4] == [1.0, 1.0, 1.2, 1.2]
@@ -65,7 +74,7 @@ def test_plain_xarray_and_pandas_read_the_table(study_file, tmp_path):
 
 
 def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatch):
-    study = af.Study.read(study_file)
+    study = af.Study.read(study_file, own_code=True)
     folder = tmp_path / "out"
     first = study.run(folder, workers=1)
     asked = []
@@ -85,23 +94,41 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
     assert set(first.data_vars) == {"twice", "voussoirs", "rows", "error"}
 
 
-@pytest.mark.parametrize("what", ["case", "record", "option", "version"])
-def test_a_changed_case_is_told_apart(what, study_file, tmp_path, at2, monkeypatch, caplog):
+@pytest.mark.parametrize(
+    "what", ["case", "record", "rewritten", "option", "helper", "version", "program"]
+)
+def test_a_changed_case_is_told_apart(
+    what, study_file, tmp_path, finders, at2, monkeypatch, caplog, undo
+):
     at2(tmp_path / "a.at2", [0.1, 0.2, -0.1], 0.01)
     case = tmp_path / "ring.toml"
     case.write_text(case.read_text().replace("synthetic = {", 'file = "a.at2" # {'))
     folder = tmp_path / "out"
-    before = af.Study.read(study_file)
+    before = af.Study.read(study_file, own_code=True)
     before.run(folder, workers=1)
     if what == "case":
         case.write_text(case.read_text().replace("radius = 3.0", "radius = 3.1"))
     elif what == "record":
         at2(tmp_path / "a.at2", [0.1, 0.2, -0.3], 0.01)
+    elif what == "rewritten":  # of the same size and time, as by a program that keeps times
+        record = tmp_path / "a.at2"
+        then = record.stat()
+        at2(record, [0.1, 0.3, -0.1], 0.01)
+        os.utime(record, ns=(then.st_atime_ns, then.st_mtime_ns))
+        assert record.stat().st_size == then.st_size
+        assert record.stat().st_mtime_ns == then.st_mtime_ns
+    elif what == "helper":  # beside the function that is asked, in its module
+        module = finders / "finders_of_tests.py"
+        source = module.read_text()
+        module.write_text(source.replace("0.9", "0.8"))
+        undo.callback(module.write_text, source)
+    elif what == "program":
+        monkeypatch.setattr(inputs, "_modules_digest", lambda: "another")
     elif what == "option":
         study_file.write_text(study_file.read_text().replace("tests:lengths", "tests:slowly"))
     else:
         monkeypatch.setattr(af, "__version__", "0.1.0")
-    after = af.Study.read(study_file)
+    after = af.Study.read(study_file, own_code=True)
     digests = [[point.digest(study.asked.text) for point in study.points]
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
@@ -128,8 +155,10 @@ def test_a_second_driver_is_refused(study_file, tmp_path):
         Store(folder).locked(),
         pytest.raises(af.InvalidInput, match=rf"another driver .*process {os.getpid()}"),
     ):
-        af.Study.read(study_file).run(folder, workers=1)
-    assert not af.Study.read(study_file).run(folder, workers=1)["twice"].isnull().all()
+        af.Study.read(study_file, own_code=True).run(folder, workers=1)
+    assert (
+        not af.Study.read(study_file, own_code=True).run(folder, workers=1)["twice"].isnull().all()
+    )
 
 
 def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, monkeypatch):
@@ -145,18 +174,20 @@ def test_a_full_disk_is_named_and_what_was_finished_stays(study_file, tmp_path, 
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(af.errors.StudyStopped, match=r"disk of .*out is full"):
-            af.Study.read(study_file).run(folder, workers=1)
+            af.Study.read(study_file, own_code=True).run(folder, workers=1)
     kept = list(folder.glob("points/*/*.json"))
     assert 1 <= len(kept) < 6
     assert all(json.loads(path.read_text())["ours"] for path in kept)
     assert not list(folder.rglob(".*.part*"))
-    found = af.Study.read(study_file).run(folder, workers=1)
-    assert found.identical(af.Study.read(study_file).run(tmp_path / "other", workers=1))
+    found = af.Study.read(study_file, own_code=True).run(folder, workers=1)
+    assert found.identical(
+        af.Study.read(study_file, own_code=True).run(tmp_path / "other", workers=1)
+    )
 
 
 def test_status_tells_how_far_a_study_is(study_file, tmp_path, capsys):
     folder = tmp_path / "out"
-    command = ["study", str(study_file), "--out", str(folder), "--workers", "1"]
+    command = ["study", "--own-code", str(study_file), "--out", str(folder), "--workers", "1"]
     assert af.commands.main(command) == 0
     said = capsys.readouterr().out
     assert "2 ended in RuntimeError: too thick" in said
@@ -250,7 +281,10 @@ RANDOM = "over.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
         ),
         (f"{GOOD}over.suite.pair = ['a']", "has no \\[suite\\]"),
         (f"{GOOD.replace('dead load', 'ded load')}over.title = ['a']", "did you mean 'dead load'"),
-        (f"{GOOD.replace('dead load', 'no_module:f')}over.title = ['a']", "No module named"),
+        (
+            f"{GOOD.replace('dead load', 'no_module:f')}over.title = ['a']",
+            "is code, which no file runs by itself",
+        ),
         (
             f"{GOOD.replace(chr(34) + 'dead load' + chr(34), '{ name = chr, x = 1 }')}"
             "over.title = ['a']",
@@ -286,3 +320,26 @@ def test_a_job_for_slurm_names_study_folder_and_workers(study_file, tmp_path):
     assert os.system(f"bash -n {path}") == 0
     with pytest.raises(af.InvalidInput, match="there is no study"):
         af.studies.slurm_job("none.toml", tmp_path, path, workers=1)
+
+
+def test_a_file_runs_no_code_unless_one_says_so(study_file, tmp_path, capsys):
+    """A module beside the file would run as it is imported."""
+    mark = tmp_path / "ran"
+    (tmp_path / "beside.py").write_text(f"import pathlib\npathlib.Path({str(mark)!r}).touch()\n")
+    for find in ('"beside:found"', '{ name = "beside:found" }'):
+        text = study_file.read_text().replace('"finders_of_tests:lengths"', find)
+        study_file.with_name("hostile.toml").write_text(text)
+        with pytest.raises(af.InvalidInput, match="is code, which no file runs by itself"):
+            af.Study.read(study_file.with_name("hostile.toml"))
+        command = ["study", str(study_file.with_name("hostile.toml")), "--out", str(tmp_path / "o")]
+        assert af.commands.main(command) == 1
+        assert "--own-code" in capsys.readouterr().err
+    assert not mark.exists()
+
+
+def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
+    over = {"title": ["=1+1", "@SUM(A1)", "plain"], "motion.scale": [-1.0]}
+    af.Study.of(small_ring, over, "dead load").run(tmp_path, workers=1)
+    frame = pd.read_csv(tmp_path / "results.csv")
+    assert frame["title"].tolist() == ["'=1+1", "'@SUM(A1)", "plain"]
+    assert frame["motion.scale"].tolist() == [-1.0, -1.0, -1.0]

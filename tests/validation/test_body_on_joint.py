@@ -23,10 +23,13 @@ def block(breadth=0.6, height=2.4, contact=JOINT, material=STONE):
     return af.column(breadth=breadth, heights=[height], contact=contact, material=material)
 
 
-def test_three_frequencies():
+def test_three_frequencies(verified):
     model = af.build(block(), fidelity="rigid")
     squares = eigh(model.tangent(np.zeros(3)).toarray(), model.mass.toarray(), eigvals_only=True)
     assert np.sqrt(squares) / (2.0 * np.pi) == pytest.approx([8.884, 72.644, 91.118], rel=1e-4)
+    case = "block 0.6 × 2.4 m on a joint, frequencies [Hz]"
+    known = [8.884, 72.644, 91.118]
+    verified(case, known, "rigid body on springs, closed form", np.sqrt(squares) / (2.0 * np.pi))
 
 
 def test_frequencies_of_an_elastic_block_approach_the_rigid_ones():
@@ -43,7 +46,7 @@ def test_frequencies_of_an_elastic_block_approach_the_rigid_ones():
 
 
 @pytest.mark.parametrize("e", [0.05, 0.15, 1.0 / 6.0, 0.25, 0.35, 0.45])
-def test_section_law(e):
+def test_section_law(e, verified):
     """Rotation of a joint under N and M = e N h, up to h/6 and beyond.
 
     64 facets with 3 Lobatto points: the edge of contact falls inside a facet, where the rule
@@ -61,6 +64,8 @@ def test_section_law(e):
         rotation = 2.0 * normal / (stiffness * width * compressed**2)
     assert float(found.joints["eccentricity"][0]) == pytest.approx(e, rel=1e-9)
     assert -found.q[2] == pytest.approx(rotation, rel=1e-3)
+    case = f"block 0.6 × 2.4 m, turn under N at e = {e:.3g} [rad]"
+    verified(case, rotation, "no-tension section, closed form", -found.q[2])
 
 
 def test_moment_approaches_its_limit_only_as_rotation_grows():
@@ -114,7 +119,7 @@ def test_a_joint_that_never_slides_is_judged_by_the_criteria(factor, slides):
 
 
 @pytest.mark.slow
-def test_rocking_period():
+def test_rocking_period(verified):
     """Quarter period of free rocking from θ₀ = 0.1 α: sqrt(2 I₀ θ₀ / (W b)), 0.737 s in all."""
     stiff = af.Contact(1e12, 1e12, 0.6)
     model = af.build(block(contact=stiff), fidelity="rigid", cells=(1, 1), quadrature="nodal")
@@ -136,3 +141,5 @@ def test_rocking_period():
     period = 4.0 * np.sqrt(2.0 * (4.0 / 3.0) * mass * radius**2 * theta / (mass * GRAVITY * 0.3))
     assert period == pytest.approx(0.737, abs=5e-4)
     assert 4.0 * landed == pytest.approx(period, rel=2e-3)
+    case = "block 0.6 × 2.4 m, rocking period from 0.1 α, linear kinematics [s]"
+    verified(case, period, "4 √(2 I θ / W b)", 4.0 * landed)

@@ -35,10 +35,14 @@ def ring(embrace, ratio, voussoirs=180):
         (180.0, 0.20, 0.284),
     ],
 )
-def test_ring_of_many_voussoirs(embrace, ratio, factor):
+def test_ring_of_many_voussoirs(embrace, ratio, factor, verified):
     found = af.collapse_factor(ring(embrace, ratio), live=af.BodyForce(1.0), friction=None)
     assert found.factor == pytest.approx(factor, abs=HALF_A_DIGIT)
     assert [side for _, side in found.hinges] == ["intrados", "extrados"] * 2
+    case = f"ring of {embrace:g}°, t/R = {ratio:g}, 180 stones: horizontal acceleration [g]"
+    verified(
+        case, factor, "linear programme of the static theorem, apart from archfem", found.factor
+    )
 
 
 def test_the_thickest_of_them_would_slide_first():
@@ -54,12 +58,14 @@ def test_thin_semicircle_does_not_stand_at_all():
     assert af.collapse_factor(thin, live=af.BodyForce(1.0)).outcome == "infeasible"
 
 
-def test_oppenheim_arch():
+def test_oppenheim_arch(verified):
     structure = af.circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
     found = af.collapse_factor(structure, live=af.BodyForce(1.0))
     assert found.factor == pytest.approx(0.37, abs=0.005)
-    verified = af.verified_mechanism(structure, found.joints)
-    assert (verified.kind, len(verified.moved.joints)) == ("local", 4)
+    moves = af.verified_mechanism(structure, found.joints)
+    assert (moves.kind, len(moves.moved.joints)) == ("local", 4)
+    case = "arch of seven stones, 157.5°: horizontal acceleration [g]"
+    verified(case, 0.37, "Oppenheim (1992)", found.factor)
 
 
 @pytest.mark.slow

@@ -61,21 +61,26 @@ def least():
 @pytest.mark.parametrize(
     ("voussoirs", "ratio"), [(7, 0.0962), (11, 0.1049), (17, 0.1056), (27, 0.1068), (50, 0.1075)]
 )
-def test_semicircle_of_few_voussoirs(voussoirs, ratio):
+def test_semicircle_of_few_voussoirs(voussoirs, ratio, verified):
     found = af.minimum_thickness(lambda t: ring(t, voussoirs), friction=None)
     assert found == pytest.approx(ratio, abs=PRINTED)
     assert af.stands(ring(1.02 * found, voussoirs))
     assert not af.stands(ring(0.98 * found, voussoirs))
+    case = f"semicircle of {voussoirs} voussoirs, least t/R"
+    verified(case, ratio, "thrust lines by hand and by programme, Cocchetti et al. (2011)", found)
 
 
 @pytest.mark.slow
-def test_semicircle_with_a_joint_where_it_hinges(least):
+def test_semicircle_with_a_joint_where_it_hinges(least, verified):
     assert least == pytest.approx(0.10748, abs=1e-5)
     spread = af.collapse_factor(
         ring(least, 66), live=af.Settlement(0, (-1.0, 0.0, 0.0)), friction=None
     )
     angles = [90.0 - 180.0 / 66 * joint for joint, _ in spread.hinges]
     assert angles == pytest.approx([54.5, 0.0, -54.5], abs=0.1)
+    source = "Milankovitch (1907)"
+    verified("semicircle, least t/R, a joint where it hinges", 0.10748, source, least)
+    verified("semicircle, angle of hinges at the haunches [degree]", 54.48, source, angles[0])
     assert [side for _, side in spread.hinges] == ["intrados", "extrados", "intrados"]
 
 
@@ -89,7 +94,7 @@ def test_thrust_at_the_least_thickness_by_statics(least):
     assert float(joints["friction"][0]) == pytest.approx(expected, rel=1e-4)  # least: 1e-6
 
 
-def test_friction_that_a_semicircle_needs(least):
+def test_friction_that_a_semicircle_needs(least, verified):
     """It is H / V at the springing: 0.3953; 0.3958 with all weight on the centre line."""
     thickness = 1.00001 * least
     low, high = 0.3, 0.6
@@ -101,6 +106,12 @@ def test_friction_that_a_semicircle_needs(least):
     assert high == pytest.approx(0.3958, rel=2e-3)
     centre_line = 1.0 - (2.0 / np.pi) / (1.0 + 0.107426 / 2.0)
     assert centre_line == pytest.approx(0.3958, abs=5e-5)
+    verified(
+        "semicircle, friction that it needs",
+        0.3953,
+        "thrust over weight at the springing, by statics",
+        high,
+    )
 
 
 def test_below_that_friction_more_thickness_is_needed():
@@ -110,7 +121,7 @@ def test_below_that_friction_more_thickness_is_needed():
 
 
 @pytest.mark.slow
-def test_embrace_of_120_degrees():
+def test_embrace_of_120_degrees(verified):
     """Of 76 stones, joints 25 from the crown lie at 39.47°, as near to 39.5° as matters."""
     found = af.minimum_thickness(lambda t: ring(t, 76, embrace=120.0), friction=None)
     assert found == pytest.approx(0.02285, abs=1e-5)
@@ -118,6 +129,12 @@ def test_embrace_of_120_degrees():
         ring(found, 76, embrace=120.0), live=af.Settlement(0, (-1.0, 0.0, 0.0)), friction=None
     )
     assert 60.0 - 120.0 / 76 * spread.hinges[0][0] == pytest.approx(39.5, abs=0.05)
+    verified(
+        "arch of 120°, least t/R",
+        0.02285,
+        "Milankovitch's problem, thrust line in closed form",
+        found,
+    )
 
 
 @pytest.mark.parametrize(("voussoirs", "ratio"), [(7, 0.0957), (17, 0.10546)])

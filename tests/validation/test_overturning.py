@@ -92,7 +92,7 @@ def boundary(falls, duration, low, high):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("duration", "joints"), [(0.2, 1.070), (1.5, 0.3827)])
-def test_pulses_fell_an_arch_by_joints_as_by_stones(duration, joints):
+def test_pulses_fell_an_arch_by_joints_as_by_stones(duration, joints, verified):
     """To 0.5 %; four links about fixed hinges, an upper bound, take 1.129 and 0.387 g."""
     found, stones = (
         boundary(falls, duration, 0.98 * joints, 1.03 * joints)
@@ -100,3 +100,5 @@ def test_pulses_fell_an_arch_by_joints_as_by_stones(duration, joints):
     )
     assert found == pytest.approx(joints, rel=2e-3)
     assert found == pytest.approx(stones, rel=NEAR)
+    case = f"Oppenheim's arch, least pulse of {duration:g} s under which it falls [g]"
+    verified(case, stones, "rigid stones that hit each other (`Falling`)", found)

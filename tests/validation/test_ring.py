@@ -53,12 +53,16 @@ def test_converges_under_refinement(lawful, rule):
     assert errors[2] < 0.5 * errors[0]
 
 
-def test_dead_load_values(lawful):
+def test_dead_load_values(lawful, verified):
     ring, converged = lawful
     found = af.dead_load(af.build(ring, cells=(16, 16))).joints
     assert float(found["eccentricity"][8]) == pytest.approx(converged, abs=1e-4)
     assert float(found["eccentricity"][0]) == pytest.approx(0.124, abs=5e-4)
     assert float(found["N"][8]) == pytest.approx(21.65e3, rel=1e-3)
+    law = "never slide" if converged == CONVERGED["glued"] else "slide"
+    case = f"crown eccentricity of the validation ring, joints that {law}"
+    crown = float(found["eccentricity"][8])
+    verified(case, converged, "limit of four rules under refinement", crown)
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "full"])

@@ -61,7 +61,7 @@ def test_limit_near_the_crown_by_hinges_at_springings_crown_and_haunches():
     np.testing.assert_allclose(e, e[::-1], atol=1e-6)
 
 
-def test_limit_near_the_crown_by_hand():
+def test_limit_near_the_crown_by_hand(verified):
     """Moments about the hinges at haunch and springing of what lies between them and the crown.
 
     At the crown hinge act the thrust H, the load P beside it and half the weight of the keystone.
@@ -80,6 +80,8 @@ def test_limit_near_the_crown_by_hand():
         rows.append([crown[1] - pivot[1], KEYSTONE - pivot[0]])
     _, load = np.linalg.solve(rows, known)
     assert 1e3 * found.factor == pytest.approx(load, rel=1e-6)  # KEYSTONE is 1e-9 off the edge
+    case = "validation ring, two loads at the keystone's edges [kN]"
+    verified(case, 1e-3 * load, "moments about the hinges by hand", found.factor)
 
 
 def test_friction_lowers_the_limit_near_the_crown():

@@ -1,12 +1,14 @@
 """The stepper for large structures: its factor, its small problem, and the histories it gives."""
 
 import time
+from dataclasses import replace
 
 import numba
 import numpy as np
 import pytest
 from glued import glued
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 import archfem as af
 from archfem.dynamics.stepping.banded import Banded
@@ -197,6 +199,93 @@ def test_factor_solves(side):
     backward(factor, half, room, branch)
     kept = branch[plan.group_of]
     assert half[kept] == pytest.approx(found[kept], abs=1e-13)
+
+
+def with_crumbs(rng):
+    """A symmetric matrix but for some entries that are mere rounding, each without its mirror."""
+    size = int(rng.integers(5, 60))
+    sides = rng.integers(size, size=(2, 2 * size))
+    matrix = np.zeros((size, size))
+    matrix[sides[0], sides[1]] = rng.uniform(size=2 * size)
+    matrix += matrix.T + 10.0 * size * np.eye(size)
+    crumbs = rng.integers(size, size=(2, 6))
+    matrix[tuple(crumbs)] += np.where(matrix[tuple(crumbs)] == 0.0, 1e-16, 0.0)
+    return matrix
+
+
+def test_factor_bears_entries_that_rounding_has_left_on_one_side():
+    """Of 300 matrices, three such entries used to lie outside the plan of the factor."""
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        matrix = with_crumbs(rng)
+        plan = Elimination.of(sparse.csr_matrix(matrix))
+        ordered = sparse.csr_matrix(matrix)[plan.order][:, plan.order]
+        factor, right = factorised(ordered, plan), rng.standard_normal(len(matrix))
+        found, room = right[plan.order], np.empty(len(right))
+        forward(factor, found, room)
+        backward(factor, found, room, np.ones(len(factor.parent), dtype=bool))
+        assert found == pytest.approx(np.linalg.solve(matrix, right)[plan.order], abs=1e-13)
+
+
+def test_an_entry_outside_the_plan_is_refused():
+    """It would be put anywhere."""
+    plan = Elimination.of(sparse.identity(8, format="csr"))
+    matrix = sparse.identity(8, format="lil")
+    matrix[7, 0] = matrix[0, 7] = 0.1
+    with pytest.raises(ValueError, match="the plan has not"):
+        factorised(matrix.tocsr(), plan)
+
+
+def shuffled_structure(rng):
+    """A ring, a column, or a ring on piers, of stones some of which are soft as soil."""
+    kind, contact = rng.integers(3), af.Contact(10.0 ** rng.uniform(8.5, 11.0), 3e8, 0.6)
+    radius = rng.uniform(1.0, 4.0)
+    if kind == 0:
+        made = af.column(breadth=radius, heights=list(rng.uniform(0.3, 2.0, 4)), contact=contact)
+    elif kind == 1:
+        made = af.circular_arch(
+            radius=radius,
+            thickness=0.2 * radius,
+            embrace=rng.uniform(100.0, 180.0),
+            voussoirs=int(rng.integers(4, 12)),
+            contact=contact,
+        )
+    else:
+        made = af.arch_on_piers(
+            radius=radius,
+            thickness=0.2 * radius,
+            voussoirs=int(rng.integers(4, 9)),
+            pier_breadth=rng.uniform(0.4, 0.8) * radius,
+            courses=[0.4 * radius] * int(rng.integers(1, 4)),
+            contact=contact,
+        )
+    soft = replace(af.STONE, young=10.0 ** rng.uniform(6.0, 9.0), name="soft")
+    stones = tuple(
+        replace(block, material=soft) if rng.random() < 0.4 else block for block in made.blocks
+    )
+    return replace(made, blocks=stones)
+
+
+@pytest.mark.parametrize(
+    ("first", "count"), [(0, 40), pytest.param(40, 2000, marks=pytest.mark.slow)]
+)
+def test_each_solve_of_a_random_structure_is_that_of_superlu(first, count):
+    """In another order, by another factor: 1e-8, with 1e12 between stiff and soft at most."""
+    for seed in range(first, first + count):
+        rng = np.random.default_rng(seed)
+        rung = "rigid" if rng.random() < 0.85 else "faces"
+        model = af.build(shuffled_structure(rng), fidelity=rung, cells=(2, 2))
+        equation = af.dynamics.Equation(model, STRONG, af.StiffnessDamping(0.05, 8.0))
+        strategy = Sparse.of(equation)
+        system = strategy.system(0.005)
+        inertia, rate = system.linear.numbers.inertia, system.linear.numbers.rate
+        whole = model.closed() + inertia * model.mass + rate * equation.rest
+        right, room = rng.standard_normal(model.size), np.empty(model.size)
+        found = right.copy()
+        forward(system.factor, found, room)
+        backward(system.factor, found, room, np.ones(len(system.factor.parent), dtype=bool))
+        wanted = splu(whole.tocsc()[strategy.order][:, strategy.order]).solve(right)
+        assert np.abs(found - wanted).max() <= 1e-8 * np.abs(wanted).max(), seed
 
 
 def test_factor_keeps_sparse():

@@ -76,7 +76,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
     tied = sparse.kron(tie, sparse.identity(2)).tocsr()
     broken = Forms(space, af.joints.Quadrature()).stiffness()
 
-    whole = _fenicsx.space(grid.grid, "CG", degree, 2)
+    whole = _fenicsx.space(grid.grid, "Lagrange", degree, 2)
     u, v = ufl.TrialFunction(whole), ufl.TestFunction(whole)
     form = ufl.inner(
         plane_stress(u, af.STONE.young, af.STONE.poisson), ufl.sym(ufl.grad(v))
@@ -93,7 +93,7 @@ def test_broken_space_tied_together_is_the_conforming_one(stack, degree):
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{rule.rule}{rule.points or ''}")
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
-def test_operator_equals_forms(ring, rule, degree, cell):
+def test_operator_equals_forms(ring, rule, degree, cell, verified):
     """Force and tangent of the sparse products and of the compiled UFL forms."""
     from archfem.models.full import full
 
@@ -109,6 +109,12 @@ def test_operator_equals_forms(ring, rule, degree, cell):
     assert 0.3 < closed.mean() < 0.7
     assert np.abs(model.force(q) - force).max() < 1e-12 * np.abs(force).max()
     assert abs(model.tangent(q) - tangent).max() < 1e-12 * abs(tangent).max()
+    off = max(
+        np.abs(model.force(q) - force).max() / np.abs(force).max(),
+        abs(model.tangent(q) - tangent).max() / abs(tangent).max(),
+    )
+    case = "operator path, force and tangent: cells, degrees, rules"
+    verified(case, "equal", "compiled UFL forms", "equal", difference=off)
 
 
 ALPHA, BETA = 1e-4, 3e-4
@@ -183,9 +189,13 @@ def jump_error(cells, degree, cell):
         (2, "triangle", 7e-7),
     ],
 )
-def test_manufactured_solution_with_a_jump(degree, cell, bound):
+def test_manufactured_solution_with_a_jump(degree, cell, bound, verified):
     """Order degree + 1 in L2, within 0.1, and a bound on the finest error itself."""
     cells = np.array([4, 8, 16])
     errors = [jump_error(int(n), degree, cell) for n in cells]
     assert observed_order(1.0 / cells, errors)[-1] == pytest.approx(degree + 1, abs=0.1)
     assert errors[-1] < bound
+    case = f"manufactured solution with a jump, {cell}s of degree {degree}: order in L2"
+    order = observed_order(1.0 / cells, errors)[-1]
+    off = abs(order / (degree + 1) - 1.0)
+    verified(case, degree + 1, "theory", round(order, 2), difference=off)

@@ -1,6 +1,7 @@
 """Pictures of limit analysis: what they show, not how they look."""
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import archfem as af
@@ -28,7 +29,7 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring, tmp_path):
 def test_a_load_that_never_overturns_shows_no_mechanism(ring):
     found = af.collapse_factor(ring, live=[af.PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
     axes = draw_collapse(ring, found).axes[0]
-    assert set(lines_of(axes)) == {"thrust line"}
+    assert set(lines_of(axes)) == {"thrust line", "live load"}
     assert len(axes.collections) == 1
     assert "never overturns" in axes.get_title()
 
@@ -36,7 +37,7 @@ def test_a_load_that_never_overturns_shows_no_mechanism(ring):
 def test_an_arch_that_falls_has_no_thrust_line():
     thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
     axes = draw_collapse(thin, af.collapse_factor(thin, live=af.BodyForce(1.0))).axes[0]
-    assert set(lines_of(axes)) == {"hinge"}
+    assert set(lines_of(axes)) == {"hinge", "live load"}
 
 
 def test_map_of_capacity_carries_known_values(tmp_path):
@@ -51,3 +52,15 @@ def test_map_of_capacity_carries_known_values(tmp_path):
     assert {text.get_text() for text in axes.texts} >= {"0.1075", "0.02285", "0.58", "1.264"}
     assert axes.get_ylim() == (0.0, 0.25)
     figure.savefig(tmp_path / "capacity.png")
+
+
+def test_the_load_is_drawn_and_told(ring):
+    found = af.collapse_factor(ring, live=af.PointLoad(-1.0, (0.0, -1e4)))
+    assert found.structure is ring
+    assert found.live == (af.PointLoad(-1.0, (0.0, -1e4)),)
+    axes = draw_collapse(ring, found).axes[0]
+    said = [text.get_text() for text in axes.texts]
+    assert f"{found.factor:.3g} × 10 kN" in said
+    assert axes.get_title().replace("\n", " ").startswith(f"{ring.name}: the load turns it")
+    arrow = next(text for text in axes.texts if text.arrow_patch is not None)
+    assert arrow.xy == pytest.approx(found.live[0].place(ring)[1])  # it points at the extrados

@@ -37,3 +37,17 @@ def test_an_instant_of_a_run_is_drawn_as_it_is_known(column, toppled):
     built = draw_during(column, bare, joints)
     wide = [np.ptp(figure.axes[0].dataLim.get_points()[:, 0]) for figure in (moved, built)]
     assert wide[0] > 1.1 * wide[1]
+
+
+def test_small_displacements_of_a_run_are_magnified():
+    """A stiff column that is shaken: drawn by a round number farther than it went, and told."""
+    stones = af.column(breadth=0.4, heights=[0.8, 0.8])
+    model = af.build(stones, fidelity="rigid")
+    motion = af.Motion(np.full(21, 0.5), 0.005)
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=5))
+    figure = draw_during(model, run, run.joints.isel(time=-1))
+    by = float(figure.axes[0].get_title().partition("displacements × ")[2])
+    drawn = np.concatenate([path.vertices for path in labelled(figure, "blocks").get_paths()])
+    places = model.cells.places + by * model.cells.displacement(run.dataset["q"].values[-1])
+    assert by >= 10.0
+    np.testing.assert_allclose(drawn.min(axis=0), places.min(axis=0))

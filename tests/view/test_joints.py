@@ -8,7 +8,7 @@ from glued import glued
 from pictures import history
 
 import archfem as af
-from archfem.view.joints import draw_joint, draw_joints
+from archfem.view.joints import draw_joint, draw_joints, telling_joints
 
 
 def units(axes):
@@ -94,3 +94,29 @@ def test_joints_that_never_slide_have_no_limit(ring):
     held = history(glued(ring), 0.1)
     held.dataset["ground"] = (("time", "axis"), np.zeros((2, 2)))
     assert len(draw_joints(held, [0]).axes[2].lines) == 1
+
+
+def test_joints_that_tell_most_are_no_twins(ring):
+    """Joints 4 and 13 hinge alike, mirror images; joint 9 slides for longest, and is the second."""
+    time = np.linspace(0.0, 1.0, 11)
+    found = np.zeros((11, 18, 3))
+    found[..., 0] = 1e4
+    found[5, [4, 13], 2] = 0.49 * 1e4 * 0.55
+    found[3:8, 13, 1] = 0.7e4
+    found[3:6, 9, 1] = 0.7e4
+    dataset = af.joints.joint_dataset(ring, found, time)
+    assert telling_joints(af.History(dataset, ring)) == [4, 9]
+    assert telling_joints(af.History(dataset)) == [4, 13]
+
+
+def test_friction_beyond_the_axis_is_told(ring):
+    """V / N of 9 where μ is 0.6: the axis ends at 1.8, and words say how far it goes."""
+    time = np.linspace(0.0, 1.0, 11)
+    found = np.zeros((11, 18, 3))
+    found[..., 0] = 1e4
+    found[5, 4, 1] = 9e4
+    dataset = af.joints.joint_dataset(ring, found, time)
+    dataset["ground"] = (("time", "axis"), np.zeros((11, 2)))
+    axes = draw_joints(af.History(dataset, ring), [4]).axes[-1]
+    assert axes.get_ylim()[1] == pytest.approx(1.8)
+    assert "up to 9" in " ".join(text.get_text() for text in axes.texts)

@@ -15,7 +15,7 @@ def drawn(axes):
 def test_picture_of_shapes(ring_model):
     found = af.modes(ring_model, 3)
     axes = draw_modes(found, [1, 3]).axes
-    assert axes[0].get_title() == "mode 1: 8.08 Hz, 72 % of the mass along x, 0 % along y"
+    assert axes[0].get_title() == "mode 1: 8.08 Hz\nmass along x 72 %, along y 0 %"
     assert axes[1].get_title().startswith("mode 3: 27.75 Hz")
     blocks = drawn(axes[0])
     assert len(blocks) == 17

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.motion.matching import Match
 from archfem.view.motions import PERIODS, draw_motion, draw_spectra, draw_suite
 
 
@@ -61,3 +62,11 @@ def test_more_motions_than_colours_differ_in_their_dashes(shaking):
     assert first.get_color() == last.get_color()
     assert first.get_linestyle() != last.get_linestyle()
     assert axes.get_title() == "horizontal or only component"
+
+
+def test_the_matched_band_is_shaded():
+    shaking = af.Motion.synthetic(duration=5.0, seed=1)
+    match = Match(shaking, {"horizontal": 0.02}, {}, {}, (0.1, 1.5))
+    suite = af.Suite("one", (shaking,), matches=(match,))
+    told = [text.get_text() for text in draw_suite(suite).legends[0].get_texts()]
+    assert "matched, 0.1 to 1.5 s" in told

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.pushover import draw_pushover
+from archfem.view.pushover import _apart, _runs, draw_pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 MODEL = af.build(RING, fidelity="rigid", quadrature="lobatto")
@@ -54,3 +55,14 @@ def test_one_to_six_curves_fit_a_picture(push):
     for pushes in ({}, {str(k): push for k in range(7)}):
         with pytest.raises(af.InvalidInput, match="give 1 to 6"):
             draw_pushover(pushes)
+
+
+def test_limits_and_discs_that_are_near_share_a_label():
+    assert _apart({"paper": 0.46, "limit": 0.457, "far": 0.1}, 0.5) == {
+        "far: 0.1": 0.1,
+        "limit: 0.457, paper: 0.46": 0.46,
+    }
+    axes = Figure().subplots()
+    axes.set(xlim=(0.0, 100.0), ylim=(0.0, 1.0))
+    runs = _runs([(1.0, 0.4), (20.0, 0.5), (21.0, 0.5), (23.0, 0.5), (60.0, 0.6)], axes)
+    assert [run[:2] for run in runs] == [(1, 1), (2, 4), (5, 5)]

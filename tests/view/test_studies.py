@@ -27,6 +27,18 @@ def test_medians_are_marks_and_what_was_not_reached_is_an_arrow():
 
 
 def test_the_level_of_the_reduced_motions_is_named_where_it_is_another():
-    for reduction, named in ((1.0, {"whole": 1.0}), (4.0, {"whole": 1.0, "R = 4": 0.25})):
+    for reduction, named in (
+        (1.0, {"whole motions": 1.0}),
+        (4.0, {"whole motions": 1.0, "1 / R, R = 4": 0.25}),
+    ):
         axes = draw_study(FOUND, reduction).axes[0]
         assert {text.get_text(): text.xy[0] for text in axes.texts} == named
+
+
+def test_definitions_by_which_nothing_fails_have_no_sign():
+    """That of a ring and a pier, where there are no piers; what the others mean is told."""
+    many = {"ring": {"any four joints": np.array([0.5, 2.0]), "ring and pier": np.full(2, np.inf)}}
+    page = draw_study(many, title="a $ study")
+    told = [text.get_text() for text in page.legends[0].get_texts()]
+    assert told == ["any four joints fail", "median, and range of the pairs"]
+    assert "first mechanism" in page.legends[0].get_title().get_text()

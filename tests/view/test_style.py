@@ -1,9 +1,13 @@
 """Pictures are saved whole."""
 
+from dataclasses import replace
+from html import escape
+
+import matplotlib
 import pytest
 
 import archfem as af
-from archfem.view.style import canvas, save
+from archfem.view.style import Page, canvas, entitle, save
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -23,3 +27,33 @@ def test_a_title_is_words_and_no_formula(tmp_path):
     figure = canvas(af.column(breadth=1.0, heights=[1.0]))
     figure.subplots().set_title("$$ a bridge worth $5 {")
     assert save(figure, tmp_path / "dear.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", ["worth $5 or $6", "a $\\frac{ bridge", "back\\slash_{x}"])
+def test_names_are_words_wherever_they_are_drawn(name, tmp_path):
+    """Also where matplotlib writes the page itself, as notebooks do."""
+    stones = replace(af.column(breadth=1.0, heights=[1.0]), name=name)
+    page = af.view.draw_structure(stones)
+    page.savefig(tmp_path / "page.svg")
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        page.savefig(tmp_path / "page.svg")
+    assert escape(name) in (tmp_path / "page.svg").read_text(encoding="utf-8")
+
+
+def test_powers_of_ten_at_an_axis_stay_powers(tmp_path):
+    page = Page()
+    axes = page.subplots()
+    axes.set(yscale="log", ylim=(1e-3, 1e3), title="worth $5 or $6")
+    page.savefig(tmp_path / "page.png")
+    assert {label.get_parse_math() for label in axes.get_yticklabels()} == {True}
+    assert not axes.title.get_parse_math()
+
+
+def test_long_titles_take_several_lines():
+    page = canvas(af.column(breadth=0.2, heights=[1.0, 1.0]))
+    axes = page.subplots()
+    entitle(axes, "a column with a title that is by far too long for a page as slim as its own")
+    assert axes.get_title().count("\n") >= 1
+    page.draw_without_rendering()
+    wide = axes.title.get_window_extent().width
+    assert wide < page.bbox.width

@@ -13,3 +13,7 @@ forces in what stands, which two rigid points of a joint leave open. Start readi
     handover  from a model of jointed blocks to loose ones
     verdict   `Fall`: what stands, is dislocated or has fallen
 """
+
+from archfem import compiled
+
+compiled.prepare()

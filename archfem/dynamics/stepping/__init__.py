@@ -34,3 +34,7 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     elimination      the order in which its unknowns are eliminated
     sparse_rows      compiled products of matrices and vectors
 """
+
+from archfem import compiled
+
+compiled.prepare()

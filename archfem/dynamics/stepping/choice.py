@@ -14,8 +14,8 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
+from archfem.arguments import said
 from archfem.arrays import Array
 from archfem.dynamics.stepping.banded import WIDEST, Banded
 from archfem.dynamics.stepping.equation import Equation
@@ -30,6 +30,7 @@ from archfem.dynamics.steps import State
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
 from archfem.statics.newton import Newton
+from archfem.threads import on_one_thread
 
 STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal, Turning)
 """In the order in which they are tried; the first that applies takes runs too short for timing."""
@@ -59,6 +60,7 @@ logger = logging.getLogger("archfem")
 _chosen: WeakKeyDictionary[Model, dict[object, type[Strategy]]] = WeakKeyDictionary()
 
 
+@on_one_thread
 def stepper_for(
     method: "str | Stepper",
     equation: Equation,
@@ -81,8 +83,8 @@ def stepper_for(
     """
     if isinstance(method, Stepper):
         return method
-    if method not in METHODS:
-        raise InvalidInput(f"method '{method}' is not known: use one of {METHODS}")
+    if not isinstance(method, str) or method not in METHODS:
+        raise InvalidInput(f"method {said(method)} is not known: use one of {METHODS}")
     strategy = None
     if method == "auto":
         strategy = chosen(equation, start, dt)
@@ -125,8 +127,7 @@ def chosen(
     if key in remembered:
         return remembered[key].of(equation)
     if steps >= SHORTEST:
-        with threadpool_limits(limits=1, user_api="blas"):
-            fastest = _fastest(equation, start, dt, strategies)
+        fastest = _fastest(equation, start, dt, strategies)
         if fastest is not None:
             remembered[key] = type(fastest)
             return fastest

@@ -44,9 +44,11 @@ class Elimination:
         """Return the order for a symmetric pattern, by minimum degree as SuperLU finds it.
 
         Args:
-            pattern: any matrix that has all entries of those to be factorised (n, n).
+            pattern: any matrix that has all entries of those to be factorised, on one side of the
+                diagonal at least: rounding may leave an entry without its mirror image (n, n).
         """
         ones = sparse.csr_matrix((np.ones(pattern.nnz), pattern.indices, pattern.indptr))
+        ones = ones + ones.T
         dominant = (ones + pattern.shape[0] * sparse.identity(pattern.shape[0])).tocsc()
         found = splu(dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         order = np.argsort(found.perm_c)

@@ -53,6 +53,7 @@ def factorised(matrix: sparse.csr_matrix, elimination: Elimination) -> Factor:
 
     Raises:
         LinAlgError: the matrix is not positive definite.
+        ValueError: it has an entry that the pattern has not.
     """
     panels = _panels(matrix.tocsc(), elimination)
     return Factor(
@@ -68,7 +69,7 @@ def factorised(matrix: sparse.csr_matrix, elimination: Elimination) -> Factor:
 def _panels(matrix: sparse.csc_matrix, elimination: Elimination) -> list[Array]:
     """Panel of each group, column by column, from fronts that pass on what is left of them."""
     rows, parent = elimination.rows, elimination.parent
-    place = np.empty(matrix.shape[0], dtype=np.int64)
+    place = np.full(matrix.shape[0], -1)
     waiting: list[list[tuple[Indices, Array]]] = [[] for _ in rows]
     panels = []
     for number, (start, end) in enumerate(elimination.groups):
@@ -79,10 +80,14 @@ def _panels(matrix: sparse.csc_matrix, elimination: Elimination) -> list[Array]:
         entries = slice(matrix.indptr[start], matrix.indptr[end])
         columns = np.repeat(np.arange(width), np.diff(matrix.indptr[start : end + 1]))
         keep = matrix.indices[entries] >= start + columns
-        front[place[matrix.indices[entries][keep]], columns[keep]] = matrix.data[entries][keep]
+        found = place[matrix.indices[entries][keep]]
+        if found.min(initial=0) < 0:
+            raise ValueError(f"columns {start} to {end - 1} have entries that the plan has not")
+        front[found, columns[keep]] = matrix.data[entries][keep]
         for own, rest in waiting[number]:
             front[np.ix_(place[own], place[own])] += rest
         waiting[number] = []
+        place[start:end], place[rows[number]] = -1, -1
         inverse = solve_triangular(
             np.linalg.cholesky(front[:width, :width]), np.eye(width), lower=True
         )

@@ -11,3 +11,7 @@
 
 Start reading at `moved`.
 """
+
+from archfem import compiled
+
+compiled.prepare()

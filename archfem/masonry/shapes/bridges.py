@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block, Point
@@ -23,6 +24,7 @@ THIN = 0.02
 """Least fill above rings and sidewalls [m]."""
 
 
+@as_annotated
 def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
     *,
     arches: Sequence[Arch],
@@ -45,8 +47,9 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
 
     Args:
         arches: one or more rings.
-        piers: one fewer.
-        sidewalls: left and right, or none: the outer springings are then fixed.
+        piers: one fewer; or one more, and then no sidewalls: the first and the last carry the outer
+            springings.
+        sidewalls: left and right, or none: the outer springings are then fixed, or on piers.
         backfill: or None.
         paving: or None; it lies on the backfill.
         width: out of plane [m].
@@ -83,13 +86,16 @@ def _check(
     arches: Sequence[Arch], piers: Sequence[Pier], sidewalls: Sequence[Sidewall], bare: bool
 ) -> None:
     """Refuse numbers of parts that do not go together."""
-    if not arches or len(piers) != len(arches) - 1:
+    if not arches or len(piers) not in (len(arches) - 1, len(arches) + 1):
         raise InvalidStructure(
             f"{len(arches)} arches and {len(piers)} piers: give at least one arch, and a pier "
-            "between each two"
+            "between each two, or also one under each end"
         )
-    if len(sidewalls) not in (0, 2):
-        raise InvalidStructure(f"{len(sidewalls)} sidewalls: give a left and a right one, or none")
+    if len(sidewalls) not in ((0, 2) if len(piers) < len(arches) else (0,)):
+        raise InvalidStructure(
+            f"{len(sidewalls)} sidewalls: give a left and a right one, or none, and none where "
+            "piers stand under the ends"
+        )
     if bare:
         raise InvalidStructure("paving lies on backfill: give backfill too, or no paving")
 

@@ -11,10 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from archfem.arguments import instance
+from archfem.arguments import instance, is_number, said
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Point
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
+from archfem.units import in_degrees
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +24,7 @@ class Arch:
 
     Attributes:
         span: between its springings, along the centre line [m].
-        embrace: angle that it subtends [degrees]; or
+        embrace: angle that it subtends [degrees], a small one with its unit, "5 degree"; or
         rise: of the centre line above the springings [m].
         thickness: of the ring [m].
         voussoirs: number of stones.
@@ -35,7 +36,7 @@ class Arch:
     span: float
     thickness: float
     voussoirs: int
-    embrace: float | None = None
+    embrace: float | str | None = None
     rise: float | None = None
     name: str = "arch"
 
@@ -44,16 +45,20 @@ class Arch:
         if (self.embrace is None) == (self.rise is None):
             raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
         _check_positive(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
-        if self.embrace is not None and not 0.0 < self.embrace < 360.0:
+        if self.embrace is None:
+            return
+        embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
+        object.__setattr__(self, "embrace", embrace)
+        if not 0.0 < embrace < 360.0:
             raise InvalidStructure(
-                f"'{self.name}': embrace {self.embrace:.4g}° is not between 0° and 360°"
+                f"'{self.name}': embrace {embrace:.4g}° is not between 0° and 360°"
             )
 
     @property
     def half(self) -> float:
         """Half the embrace [rad]."""
         if self.embrace is not None:
-            return radians(self.embrace) / 2.0
+            return radians(float(self.embrace)) / 2.0
         assert self.rise is not None
         return 2.0 * atan2(self.rise, self.span / 2.0)
 
@@ -72,10 +77,11 @@ class Arch:
 class Pier:
     """A pier of stone courses, flush with the intrados of the rings that spring from it.
 
-    Its top course is one skewback between the two springing joints.
+    Its top course is one skewback between the two springing joints, or behind the only one.
 
     Attributes:
-        gap: between the springings of the neighbouring centre lines [m].
+        gap: between the springings of the neighbouring centre lines, or from that of the only
+            one to the outer face [m].
         height: from foundation to springing level [m].
         course: height of a course, about; courses of a pier are equally high [m].
         name: of the part.
@@ -210,7 +216,8 @@ def _check_positive(part: Any, *keys: str) -> None:
     """Refuse lengths that cannot be meant."""
     for key in keys:
         value = getattr(part, key)
-        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
+        instance(value, Real, f"'{part.name}': {key} = {said(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
         if not 0.0 < value < 1e3:
             raise InvalidStructure(
                 f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
@@ -221,6 +228,7 @@ def _check_not_negative(part: Any, *keys: str) -> None:
     """Refuse lengths that can be 0 but no less."""
     for key in keys:
         value = getattr(part, key)
-        instance(value, Real, f"'{part.name}': {key} = {value!r}", "give a length in m")
+        instance(value, Real, f"'{part.name}': {key} = {said(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
         if not 0.0 <= value < 1e3:
             raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")

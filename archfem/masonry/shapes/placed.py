@@ -30,7 +30,7 @@ def ring_of(
     ring = circular_arch(
         radius=arch.radius,
         thickness=arch.thickness,
-        embrace=2.0 * np.degrees(arch.half),
+        embrace=f"{np.degrees(2.0 * arch.half):.17g} degree",
         voussoirs=arch.voussoirs,
         material=material,
         contact=contact,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, degrees, radians
+from math import asin, degrees, pi, radians, sin
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
-from archfem.units import G
+from archfem.units import G, in_degrees
+
+MOST = 10_000
+"""Voussoirs, or chords of each, beyond which nobody means it."""
 
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -20,7 +23,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     thickness: float,
     voussoirs: int,
     radius: float | None = None,
-    embrace: float | None = None,
+    embrace: float | str | None = None,
     span: float | None = None,
     rise: float | None = None,
     width: float = 1.0,
@@ -38,7 +41,8 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         thickness: ring depth t, from intrados to extrados [m].
         voussoirs: number of stones.
         radius: of the centre line [m]; goes with `embrace`.
-        embrace: angle that the ring subtends, between its springing joints [degrees].
+        embrace: angle that the ring subtends, between its springing joints [degrees];
+            a small one is given with its unit, "5 degree".
         span: clear span, at the intrados [m]; goes with `rise`, instead of the two above.
         rise: clear rise, at the intrados, at most half the span [m].
         width: out of plane [m].
@@ -50,7 +54,13 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         gravity: acceleration of gravity [m/s²].
 
     Raises:
+        InvalidInput: an angle looks like radians.
         InvalidStructure: the lengths do not make a ring.
+
+    Example:
+        >>> ring = af.circular_arch(radius=2.95, embrace=159.0, thickness=0.55, voussoirs=17)
+        >>> len(ring.blocks), len(ring.joints), round(ring.weight)
+        (19, 18, 90051)
     """
     real(thickness, "thickness [m]")
     radius, embrace = _circle(radius, embrace, span, rise, thickness)
@@ -62,8 +72,9 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
     pieces = 1 if chords is None else chords
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if real(count, key) < 1 or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number of 1 or more")
+        if not 1 <= real(count, key) <= MOST or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MOST}")
+    voussoirs, pieces = int(voussoirs), int(pieces)
     turn = embrace / voussoirs / pieces
     if turn > 120.0:
         raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
@@ -74,11 +85,14 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     faces = [(_on_circle(inner, a), _on_circle(outer, a)) for a in angles]
     centre = (0.0, 0.0) if chords is None else None
     stones = [
-        _stone(faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre)
+        stone_between(
+            faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre
+        )
         for k in range(voussoirs)
     ]
-    left = _abutment(faces[0], -1.0, thickness / 2.0, material, "left abutment")
-    right = _abutment(faces[-1], 1.0, thickness / 2.0, material, "right abutment")
+    depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
+    left = abutment_behind(faces[0], -1.0, depth, material, "left abutment")
+    right = abutment_behind(faces[-1], 1.0, depth, material, "right abutment")
     joints = [
         Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
         for k in range(voussoirs + 1)
@@ -110,6 +124,10 @@ def column(
 
     Raises:
         InvalidStructure: a length is not positive.
+
+    Example:
+        >>> [joint.name for joint in af.column(breadth=0.6, heights=[1.2, 1.2]).joints]
+        ['joint 0', 'joint 1']
     """
     heights = reals(heights, "heights of the blocks [m]")
     if real(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:
@@ -222,18 +240,18 @@ def _pier(
 
 def _circle(
     radius: float | None,
-    embrace: float | None,
+    embrace: float | str | None,
     span: float | None,
     rise: float | None,
     thickness: float,
 ) -> tuple[float, float]:
     """Radius of the centre line and embrace, from whichever pair was given."""
-    given = {"radius [m]": radius, "embrace [°]": embrace, "span [m]": span, "rise [m]": rise}
+    given = {"radius [m]": radius, "span [m]": span, "rise [m]": rise}
     for name, value in given.items():
         if value is not None:
             real(value, name)
     if radius is not None and embrace is not None and span is None and rise is None:
-        return radius, embrace
+        return radius, in_degrees(embrace, "embrace")
     if span is None or rise is None or radius is not None or embrace is not None:
         raise InvalidStructure("give a ring either radius and embrace, or span and rise")
     if not 0.0 < rise <= span / 2.0:
@@ -250,10 +268,17 @@ def _on_circle(radius: float, angle: float) -> Point:
     return (float(radius * np.sin(angle)), float(radius * np.cos(angle)))
 
 
-def _stone(
+def stone_between(
     faces: Sequence[tuple[Point, Point]], material: Material, name: str, centre: Point | None
 ) -> Block:
-    """Voussoir from its radial sections, left to right."""
+    """Return a voussoir from its radial sections.
+
+    Args:
+        faces: intrados and extrados of each section, left to right [m].
+        material: of the stone.
+        name: of the stone.
+        centre: of the arcs, or None for straight faces [m].
+    """
     intrados = [face[0] for face in faces]
     extrados = [face[1] for face in reversed(faces)]
     n = len(faces)
@@ -262,10 +287,18 @@ def _stone(
     return Block(outline, material, name, corners=corners, part="arch", centre=centre, role="ring")
 
 
-def _abutment(
+def abutment_behind(
     face: tuple[Point, Point], side: float, depth: float, material: Material, name: str
 ) -> Block:
-    """Fixed block behind a springing joint; side is -1 at the left and 1 at the right."""
+    """Return the fixed block behind a springing joint.
+
+    Args:
+        face: the joint's intrados and extrados [m].
+        side: -1 at the left and 1 at the right.
+        depth: of the block, across the joint [m].
+        material: of the block.
+        name: of the block and its part.
+    """
     inner, outer = np.array(face[0]), np.array(face[1])
     radial = (outer - inner) / np.linalg.norm(outer - inner)
     shift = side * depth * np.array([radial[1], -radial[0]])

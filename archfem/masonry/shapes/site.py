@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from archfem.arguments import pieces
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import Contact, Material
@@ -54,7 +55,7 @@ class Site:
 
         Args:
             arches: the rings.
-            piers: between them, one fewer.
+            piers: between them, one fewer, or also under both ends, one more.
             sidewalls: left and right, or none.
 
         Returns:
@@ -64,12 +65,15 @@ class Site:
             InvalidStructure: parts do not fit beside one another.
         """
         rings, x = [], sidewalls[0].length if sidewalls else 0.0
+        ends: Sequence[Courses] = sidewalls
+        if len(piers) > len(arches):
+            ends, piers = (piers[0], piers[-1]), piers[1:-1]
         for number, arch in enumerate(arches):
             rings.append(ring_of(arch, x, self.material, self.contact, self.chords))
             x += arch.span + (piers[number].gap if number < len(piers) else 0.0)
         faces = [(ring.joints[0], ring.joints[-1]) for ring in rings]
         springings = [(face_of(left), face_of(right)) for left, right in faces]
-        support = self._end(springings[0][0], 1.0, sidewalls[:1], "left abutment")
+        support = self._end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
             first = len(self.blocks)
             self.blocks += ring.blocks[1:-1]
@@ -77,7 +81,7 @@ class Site:
             if number < len(piers):
                 after = self._pier(piers[number], right, springings[number + 1][0])
             else:
-                after = self._end(right, -1.0, sidewalls[1:], "right abutment")
+                after = self._end(right, -1.0, ends[1:], "right abutment")
             stones = [support, *range(first, last + 1), after]
             for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
                 self._join(pair, face_of(joint), f"joint {k}", arch)
@@ -133,11 +137,11 @@ class Site:
             paving: the stones, about as long as they are asked to be.
         """
         breaks, levels = np.array(surface).T
-        pieces = [
-            np.linspace(a, b, max(1, round((b - a) / paving.length)) + 1)[:-1]
+        parts = [
+            np.linspace(a, b, pieces(b - a, paving.length, "paving stones") + 1)[:-1]
             for a, b in pairwise(breaks)
         ]
-        x = np.append(np.concatenate(pieces), breaks[-1])
+        x = np.append(np.concatenate(parts), breaks[-1])
         y = np.interp(x, breaks, levels)
         for k in range(len(x) - 1):
             low = [(x[k], y[k]), (x[k + 1], y[k + 1])]
@@ -178,7 +182,7 @@ class Site:
     def _pier(self, pier: Pier, left: Face, right: Face) -> int:
         """A pier under two springings; the number of its skewback."""
         (x0, y0), (x1, y1) = left[0], right[0]
-        step = pier.height / max(1, round(pier.height / pier.course))
+        step = pier.height / pieces(pier.height, pier.course, f"courses of '{pier.name}'")
         if not left[1][0] < right[1][0] or min(y0, y1) <= -step:
             raise InvalidStructure(
                 f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
@@ -210,9 +214,8 @@ class Site:
         low, high = levels
         if high - low < 1e-9:
             return below
-        for y, top in pairwise(
-            np.linspace(low, high, max(1, round((high - low) / part.course)) + 1)
-        ):
+        count = pieces(high - low, part.course, f"courses of '{part.name}'")
+        for y, top in pairwise(np.linspace(low, high, count + 1)):
             number = self._course(sides, (y, top), part)
             self._bed((below, number), sides, y, part)
             below = number
@@ -235,7 +238,7 @@ class Site:
         count = sum(joint.part == part.name for joint in self.joints)
         self._join(pair, (left, right), f"joint {count}" if count else "base", part)
 
-    def _end(self, face: Face, inward: float, walls: Sequence[Sidewall], bare: str) -> int:
+    def _end(self, face: Face, inward: float, walls: Sequence[Courses], bare: str) -> int:
         """What an outer springing bears on; the number of the block at the joint."""
         if not walls:
             outer, inner = face[1], face[0]
@@ -243,7 +246,25 @@ class Site:
             back = inward * 0.5 * np.array([-radial[1], radial[0]])
             far = [tuple(np.add(point, back)) for point in (outer, inner)]
             return self.add([inner, outer, *far], bare, fixed=True, structured=True)
+        if isinstance(walls[0], Pier):
+            return self._end_pier(walls[0], face, inward)
         return self._wall(walls[0], face, inward)
+
+    def _end_pier(self, pier: Pier, face: Face, inward: float) -> int:
+        """A pier under the only springing at an end; the number of its skewback."""
+        (x, y), (edge, level) = face
+        outer = 0.5 * (x + edge) - inward * pier.gap
+        step = pier.height / max(1, round(pier.height / pier.course))
+        if not inward * (edge - outer) >= 0.0 or y <= -step:
+            raise InvalidStructure(
+                f"'{pier.name}': a ring does not stand on a gap of {pier.gap:.3g} m and a course "
+                f"of {step:.3g} m: give a wider gap or higher courses"
+            )
+        below = self._courses((outer, x), (-pier.height, -step), pier)
+        outline = [(outer, -step), (x, -step), (x, y), (edge, level), (outer, level)]
+        top = self._stone(outline, "skewback", pier)
+        self._bed((below, top), (outer, x), -step, pier)
+        return top
 
     def _wall(self, wall: Sidewall, face: Face, inward: float) -> int:
         """A sidewall; the number of its skewback."""
@@ -260,7 +281,7 @@ class Site:
         if wall.state == "fixed":
             outline = [(outer, -wall.height), (x, -wall.height), (x, y), (edge, level)]
             return self.add([*outline, *reversed(steps)], wall.name, role=wall.role, fixed=True)
-        step = wall.height / max(1, round(wall.height / wall.course))
+        step = wall.height / pieces(wall.height, wall.course, f"courses of '{wall.name}'")
         below = self._courses((outer, x), (-wall.height, -step), wall)
         corner = [(back, level)] if wall.setback > 0.0 else []
         outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]

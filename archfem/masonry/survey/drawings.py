@@ -13,8 +13,13 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
+from archfem.files import check_file, text_of
 from archfem.masonry.naming import did_you_mean
+from archfem.masonry.survey.tagged import part_of, physical_surfaces
 from archfem.units import in_unit
+
+LARGEST = 2**25
+"""Most bytes of a drawing."""
 
 SIZES = (0.02, 20.0)
 """Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong."""
@@ -55,7 +60,8 @@ def outlines_in(
     Args:
         path: a .geojson or .json file, a FeatureCollection of Polygons with the properties of
             `PROPERTIES`; or a .dxf file, closed LWPOLYLINEs and POLYLINEs, each named by the TEXT
-            or MTEXT whose insertion point lies in it, or else by its layer and a number.
+            or MTEXT whose insertion point lies in it, or else by its layer and a number; or a .msh
+            file of gmsh, each physical surface a block on the layer that `part_of` tells.
         unit: of the coordinates. By default what a DXF file says ($INSUNITS), metres in GeoJSON.
         ignored: layers of a DXF file that are not read.
 
@@ -63,11 +69,10 @@ def outlines_in(
         InvalidInput: it is no such file, or holds what cannot be a block.
     """
     path = Path(path)
-    readers = {".geojson": _geojson, ".json": _geojson, ".dxf": _dxf}
+    readers = {".geojson": _geojson, ".json": _geojson, ".dxf": _dxf, ".msh": _msh}
     if path.suffix.lower() not in readers:
-        raise InvalidInput(f"{path} is no drawing: give a .geojson or a .dxf file")
-    if not path.is_file():
-        raise InvalidInput(f"there is no drawing {path}")
+        raise InvalidInput(f"{path} is no drawing: give a .geojson, a .dxf or a .msh file")
+    check_file(path, "drawing", LARGEST)
     try:
         outlines = list(readers[path.suffix.lower()](path, unit, ignored))
         _check_sizes(outlines)
@@ -79,8 +84,8 @@ def outlines_in(
 def _geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Polygons of a GeoJSON file."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8-sig"))
-    except ValueError as error:
+        found = json.loads(text_of(path, "drawing", LARGEST))
+    except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
         raise InvalidInput("it is no GeoJSON FeatureCollection: export the outlines as one")
@@ -92,6 +97,14 @@ def _geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator
             raise InvalidInput(f"feature {number} is not as GeoJSON has it: {error}") from error
         if outline.layer not in ignored:
             yield outline
+
+
+def _msh(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
+    """Physical surfaces of a mesh of gmsh."""
+    factor = in_unit(f"1 {unit or 'm'}", "m", "unit")
+    for name, points in physical_surfaces(path, factor):
+        if part_of(name) not in ignored:
+            yield Outline(points, name, part_of(name))
 
 
 def _feature(feature: dict[str, Any], name: str, factor: float) -> Outline:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archfem.annotated import as_annotated
 from archfem.arrays import Array
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
@@ -22,10 +23,11 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.roles import with_roles
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import TOUCHING, Structure
 from archfem.masonry.survey.drawings import Outline, outlines_in
 from archfem.masonry.survey.snapping import NEARLY, snapped
-from archfem.units import G
+from archfem.masonry.survey.tagged import physical_curves
+from archfem.units import G, in_unit
 
 SHARP, FLAT = np.radians(45.0), np.radians(10.0)
 """A vertex that turns by more than the one is a corner, by less than the other none."""
@@ -68,6 +70,7 @@ class Survey:
     moved: float
 
 
+@as_annotated
 def read_outlines(
     path: str | Path,
     *,
@@ -83,7 +86,7 @@ def read_outlines(
     the sides across a ring or a pier, otherwise the shorter ones.
 
     Args:
-        path: a GeoJSON or DXF file (see `outlines_in`), y upwards.
+        path: a GeoJSON or DXF file or a mesh of gmsh (see `outlines_in`), y upwards.
         unit: of its coordinates; by default what a DXF file says, metres in GeoJSON.
         snap: vertices and edges nearer than this are made to touch [m].
         layers: what is on the layers of the drawing. Where they are given, all must be. What a
@@ -149,13 +152,32 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     survey = read_outlines(
         path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
     )
-    return assembled(
+    structure = assembled(
         survey.blocks,
         by_materials(contact, contacts),
         width=width,
         gravity=gravity,
         name=Path(path).stem,
     )
+    return (
+        _named_by_curves(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
+    )
+
+
+def _named_by_curves(structure: Structure, path: Path, unit: str | None) -> Structure:
+    """The same with each joint named as the physical curve along it, if there is one."""
+    near, names = TOUCHING * structure.size, dict[int, str]()
+    for name, middles in physical_curves(path, in_unit(f"1 {unit or 'm'}", "m", "unit")):
+        away = middles[None] - structure.middles[:, None]
+        along = np.abs(np.einsum("jpk,jk->jp", away, structure.tangents))
+        beside = np.abs(np.einsum("jpk,jk->jp", away, structure.normals))
+        on = np.all((beside < near) & (along < structure.depths[:, None] / 2.0), axis=1)
+        names |= {int(number): name for number in np.flatnonzero(on)}
+    joints = tuple(
+        replace(joint, name=names.get(number, joint.name))
+        for number, joint in enumerate(structure.joints)
+    )
+    return replace(structure, joints=joints)
 
 
 def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path) -> None:

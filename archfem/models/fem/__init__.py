@@ -12,3 +12,8 @@ _fenicsx      what differs between versions of DOLFINx
 
 Start reading at `mesh`, then at `space`.
 """
+
+from archfem.packages import needed
+
+with needed("FEniCSx"):
+    from archfem.models.fem import _fenicsx as _fenicsx

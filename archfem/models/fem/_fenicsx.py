@@ -1,7 +1,7 @@
 """The one place that touches what differs between versions of DOLFINx.
 
-Features are tested, never version numbers: 0.5 (Debian 12) is the one in use, and 0.9 and newer
-are meant to follow. Everything here is serial: one analysis is one process.
+Features are tested, never version numbers: it works with 0.5 (Debian 12), 0.9 (Debian 13) and 0.11.
+Everything here is serial: one analysis is one process.
 """
 
 import logging
@@ -81,8 +81,9 @@ def cell_dofs(space: Any) -> Numbers:
 def facet_nodes(space: Any) -> Numbers:
     """Positions in a cell's node list of the nodes on each of its facets (facets, nodes)."""
     layout = space.dofmap.dof_layout
-    facets = space.mesh.ufl_cell().num_facets()
-    return np.array([layout.entity_closure_dofs(1, facet) for facet in range(facets)])
+    facets = space.mesh.ufl_cell().num_facets
+    count = facets() if callable(facets) else facets
+    return np.array([layout.entity_closure_dofs(1, facet) for facet in range(count)])
 
 
 def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
@@ -96,14 +97,14 @@ def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
         old.index_map_bs,
     )
     mesh = space._cpp_object.mesh
+    element = getattr(space.element, "_cpp_object", space.element)
     if hasattr(cpp.fem, "FunctionSpace"):
-        inner = cpp.fem.FunctionSpace(mesh, space.element, dofmap)
+        inner = cpp.fem.FunctionSpace(mesh, element, dofmap)
     else:
-        shape = space.value_shape
         try:
-            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap)
+            inner = cpp.fem.FunctionSpace_float64(mesh, element, dofmap)
         except TypeError:
-            inner = cpp.fem.FunctionSpace_float64(mesh, space.element, dofmap, shape)
+            inner = cpp.fem.FunctionSpace_float64(mesh, element, dofmap, space.value_shape)
     new = fem.FunctionSpace(space.mesh, space.ufl_element(), inner)
     new.original = space  # its compiled element must outlive this copy
     return new
@@ -146,7 +147,10 @@ def assembled_vector(form: Any) -> NDArray[np.float64]:
 def points_of_vertices(grid: Any) -> Numbers:
     """Number of the geometry point of each vertex (n_vertices,)."""
     corners = connect(grid, 2, 0)
-    listed = grid.geometry.dofmap
+    try:
+        listed = grid.geometry.dofmaps[0]
+    except (AttributeError, TypeError):
+        listed = grid.geometry.dofmap
     result = np.zeros(grid.topology.index_map(0).size_local, dtype=np.int32)
     for cell in range(grid.topology.index_map(2).size_local):
         nodes = listed.links(cell) if hasattr(listed, "links") else listed[cell]

@@ -12,6 +12,7 @@ cells grow with the distance from those.
 """
 
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 from scipy import sparse
@@ -31,6 +32,9 @@ ROUNDING = 1e-6
 
 GROWTH = 0.35
 """By how much the cells of a freely meshed block grow with the distance from its stones [-]."""
+
+MOST = 1_000_000
+"""Cells of a mesh, beyond which there is no room for it."""
 
 PIECES = 500
 """Into which an edge is cut to count the cells that fit on it."""
@@ -94,6 +98,7 @@ def divided(structure: Structure, asked: Discretisation) -> Division:
     """
     edges = edges_of(structure, [_along(block.fixed, asked) for block in structure.blocks])
     units = _units(edges, asked)
+    _check_room(edges, asked)
     least, fine = _wishes(edges, asked)
     counts = _assigned(edges, units, least)
     counts = _assigned(edges, units, _even(edges, units, counts, least))
@@ -113,6 +118,19 @@ def divided(structure: Structure, asked: Discretisation) -> Division:
 def _along(fixed: bool, asked: Discretisation) -> int:
     """Cells along a block; an abutment, which does not deform, has one."""
     return 1 if fixed else asked.along
+
+
+def _check_room(edges: Edges, asked: Discretisation) -> None:
+    """Refuse a mesh of more cells than there is room for, before it takes any."""
+    count = sum(prod(map(float, _wanted(edges, number, asked))) for number in edges.structured)
+    if asked.coarse is not None:
+        blocks = [edges.structure.blocks[number] for number in edges.unstructured]
+        count += sum(block.area for block in blocks if not block.fixed) / asked.coarse**2
+    if not count <= MOST:
+        raise MeshError(
+            f"a mesh of {count:.3g} cells, and there is room for {MOST}: use fewer cells, larger "
+            "ones (coarse), or the rung 'rigid', which has none"
+        )
 
 
 def _wanted(edges: Edges, number: int, asked: Discretisation) -> list[int]:

@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +20,10 @@ from archfem.masonry.structure import TOUCHING, Structure
 from archfem.models.discretisation import Discretisation
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.division import Division, divided
+from archfem.packages import needed
+
+with needed("gmsh"):
+    import gmsh
 
 FRONTAL = 6
 """Gmsh's number for the frontal Delaunay algorithm."""
@@ -84,7 +87,11 @@ def write_mesh(structure: Structure, path: str | Path, asked: Discretisation | N
 
 
 def read_mesh(structure: Structure, path: str | Path) -> Mesh:
-    """Read the mesh of a structure from a gmsh file with the same groups as `write_mesh` makes.
+    """Read the mesh of a structure from a gmsh file, of `write_mesh` or of one's own.
+
+    Cells belong to the block whose name their physical surface bears; without a name to the block
+    of its tag less one. Facets between two blocks belong to the joint that they lie on, whatever
+    their physical curves; blocks must share their nodes there.
 
     Args:
         structure: what was meshed.
@@ -103,16 +110,18 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
     if not given.startswith(MESH):
         raise MeshError(
             f"{path} does not begin with {MESH.decode()}: gmsh would run it as a script, commands "
-            "of the shell and all; give a mesh as write_mesh makes it"
+            "of the shell and all; give a mesh as gmsh saves it"
         )
     with _model(structure.name), TemporaryDirectory() as alone:
         mesh_only = Path(alone) / "mesh.msh"  # without options beside it, which gmsh runs too
         mesh_only.write_bytes(given)
         try:
             gmsh.merge(str(mesh_only))
-        except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path} is not a gmsh mesh: {error}") from error
-        return _imported(structure)
+            return _own(structure)
+        except MeshError:
+            raise
+        except Exception as error:  # neither gmsh nor FEniCSx raise anything more specific
+            raise MeshError(f"{path} is not a gmsh mesh of it: {error}") from error
 
 
 @contextmanager
@@ -213,6 +222,53 @@ def _imported(structure: Structure) -> Mesh:
     result = Mesh(structure, grid, blocks, (facets.indices, facets.values - 1))
     _check(result)
     return result
+
+
+def _own(structure: Structure) -> Mesh:
+    """The current gmsh model, whose groups are a user's own, as a checked mesh."""
+    numbers = {block.name: number for number, block in enumerate(structure.blocks)}
+    groups = [int(tag) for _, tag in gmsh.model.getPhysicalGroups(2)]
+    names = {tag: gmsh.model.getPhysicalName(2, tag) or f"block {tag}" for tag in groups}
+    strange = sorted({*names.values()} - {*numbers})
+    if strange or len(names) != len(numbers):
+        raise MeshError(
+            f"the mesh has {len(names)} physical surfaces, of which {strange} are no blocks, and "
+            f"the structure {len(numbers)} blocks: the mesh is of another structure"
+        )
+    grid, cells, _ = _fenicsx.mesh_from_gmsh(gmsh.model)
+    blocks = np.full(grid.topology.index_map(2).size_local, -1, dtype=np.int32)
+    blocks[cells.indices] = [numbers[names[int(tag)]] for tag in cells.values]
+    result = Mesh(structure, grid, blocks, _joint_facets(structure, grid, blocks))
+    _check(result)
+    return result
+
+
+def _joint_facets(
+    structure: Structure, grid: Any, blocks: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Facets between two blocks, and the joint that each lies on."""
+    cells_at, nodes_of = _fenicsx.connect(grid, 1, 2), _facet_points(grid)
+    near, by_pair = TOUCHING * structure.size, structure.pairs.tolist()
+    facets, joints = [], []
+    for facet in range(grid.topology.index_map(1).size_local):
+        sides = sorted({int(blocks[cell]) for cell in cells_at(facet)})
+        if len(sides) < 2:
+            continue
+        middle = grid.geometry.x[nodes_of(facet)][:, :2].mean(axis=0)
+        found = [number for number, pair in enumerate(by_pair) if pair == sides]
+        away = middle - structure.middles[found]
+        beside = np.abs(np.sum(away * structure.normals[found], axis=1))
+        along = np.abs(np.sum(away * structure.tangents[found], axis=1))
+        on = np.flatnonzero((beside < near) & (along < structure.depths[found] / 2.0))
+        if not len(on):
+            names = [structure.blocks[number].name for number in sides]
+            raise MeshError(
+                f"between {names} cells touch at ({middle[0]:.4g}, {middle[1]:.4g}), where the "
+                "structure has no joint: the mesh is of another structure"
+            )
+        facets.append(facet)
+        joints.append(found[on[0]])
+    return np.array(facets, dtype=np.int32), np.array(joints, dtype=np.int32)
 
 
 def _check(mesh: Mesh) -> None:

@@ -60,7 +60,7 @@ def broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
         mesh: conforming, of all blocks.
         degree: of the polynomials, 1 or 2.
     """
-    whole = _fenicsx.space(mesh.grid, "CG", degree, 2)
+    whole = _fenicsx.space(mesh.grid, "Lagrange", degree, 2)
     old = _fenicsx.cell_dofs(whole)
     count = int(old.max()) + 1
     keys = mesh.blocks[:, None].astype(np.int64) * count + old

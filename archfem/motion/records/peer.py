@@ -9,6 +9,7 @@ from archfem.motion.records.units import units_written
 _HEADER = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
 _BEFORE = re.compile(rf"\s*({COUNT})[\s,]+({NUMBER})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE)
+_OTHERS = re.compile(r"\b(?:VELOC|DISPL)", re.IGNORECASE)
 _AFTER = re.compile(rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT})[\s,]+({NUMBER})", re.IGNORECASE)
 
 
@@ -25,18 +26,20 @@ def read(text: RecordText) -> list[Channel]:
     """Return the one component of the file.
 
     The count and the step stand behind their names (`NPTS= 5437, DT= .0050 SEC`), in either order,
-    on one line or two, or both before or after the names (`4096 0.0100 NPTS, DT`).
+    on one line or two, or both before or after the names (`4096 0.0100 NPTS, DT`). What else stands
+    in the header is free, as in the El Centro record that OpenSees ships: a unit of acceleration
+    tells that it is one, unless a velocity or a displacement is named.
 
     Args:
         text: the file.
 
     Raises:
-        InvalidInput: the header cannot be read, tells of no acceleration, or the count is wrong.
+        InvalidInput: the header cannot be read, tells of another quantity, or the count is wrong.
     """
     count, dt, line = _count_and_step(text)
     header = " ".join(text.lines[:line])
-    if not re.search(r"\bACC", header, re.IGNORECASE):
-        raise text.error("the header does not tell of an acceleration")
+    if _OTHERS.search(header) and not re.search(r"\bACC", header, re.IGNORECASE):
+        raise text.error("the header does not tell of an acceleration, but of another quantity")
     units = units_written(header)
     if len(units) != 1:
         raise text.error("the header does not tell one unit, such as UNITS OF G")

@@ -11,6 +11,7 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
+from archfem.files import content_of
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 """Pattern of a number as Fortran and C print it."""
@@ -51,12 +52,8 @@ class RecordText:
         Raises:
             InvalidInput: there is no such file, it cannot be read, or it is not text.
         """
-        try:
-            place = Path(path)
-            content = place.read_bytes().rstrip(b"\x1a")  # what ends a text under DOS
-        except (OSError, ValueError, TypeError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise InvalidInput(f"cannot read the record {path}: {reason}") from error
+        content = content_of(path, "record").rstrip(b"\x1a")  # what ends a text under DOS
+        place = Path(path)
         if b"\0" in content or not content.strip():
             kind = "not a text file" if content.strip() else "empty"
             raise InvalidInput(f"{place} is {kind}: give an accelerogram as text")

@@ -1,9 +1,8 @@
-"""What surrounds a photographed structure: title, colour bar, legend, and the ground's motion."""
+"""A page about a structure that moves: title, colour bar, legend, and the ground's motion."""
 
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
@@ -14,10 +13,11 @@ from matplotlib.text import Text
 
 from archfem.arrays import Array
 from archfem.dynamics.history import History
-from archfem.joints.criteria import judged
 from archfem.view.films.colours import Scale
+from archfem.view.films.pen import Pen
 from archfem.view.films.setup import Setup
 from archfem.view.films.shots import Shot
+from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image
 from archfem.view.style import EDGE, FAINT, HINGE, INK, LINES, MOVED, SLIP, THRUST, dress
 
@@ -32,11 +32,7 @@ TYPE, LARGE = 10.5, 13.0
 
 
 class Page:
-    """A page whose still parts are drawn once.
-
-    Attributes:
-        room: width and height of the photograph [pixels].
-    """
+    """A page on which only what changes is drawn again."""
 
     def __init__(self, setup: Setup, size: tuple[int, int], run: History | None = None) -> None:
         dense = max(COARSE, size[0] / BROAD)
@@ -44,61 +40,76 @@ class Page:
         self._canvas = FigureCanvasAgg(self._figure)
         self._inches = np.array(size) / dense
         below = FOOT + (STRIP if run else 0.0)
-        left, top = round(EDGE_ROOM * dense), round(HEAD * dense)
-        self.room = (
-            size[0] - left - round(SIDE * dense),
-            size[1] - top - round(below * dense),
+        window = (
+            round(EDGE_ROOM * dense),
+            round(below * dense),
+            size[0] - round(SIDE * dense),
+            size[1] - round(HEAD * dense),
         )
-        self._window = (slice(top, top + self.room[1]), slice(left, left + self.room[0]))
         self._still(setup, run, below)
         self._said = self._write(0.985, "", ha="right", animated=True)
         self._cursor = self._strip(run) if run else None
-        self._canvas.draw()
-        self._background = self._canvas.copy_from_bbox(self._figure.bbox)
+        pen = Pen(self._canvas.get_renderer(), window, setup.low, setup.high)
+        self._stage, self._speed = Stage(setup, pen), 1.0
+        self._lay()
 
-    def compose(self, photograph: Image, shot: Shot) -> Image:
-        """Put a photograph on the page, with the time and the count of what has failed.
+    def compose(self, shot: Shot, speed: float = 1.0) -> Image:
+        """Draw a picture, with the time and the count of what has failed.
 
         Args:
-            photograph: of the structure, as large as `room`.
             shot: what it shows.
+            speed: at which a film shows it, relative to the real one [-].
 
         Returns:
-            The page (height, width, 3), red, green and blue from 0 to 255.
+            The page (height, width, 4), red, green, blue and opacity from 0 to 255; the next call
+            draws over it.
         """
+        if speed != self._speed:
+            self._speed = speed
+            self._lay()
         self._canvas.restore_region(self._background)
+        self._stage.draw(shot)
         self._said.set_text(_sentence(shot))
         self._figure.draw_artist(self._said)
         if self._cursor is not None and shot.time is not None:
             self._cursor.set_xdata([shot.time, shot.time])
             self._figure.draw_artist(self._cursor)
-        page = np.array(self._canvas.buffer_rgba())[..., :3]
-        page[self._window] = photograph
+        page: Image = np.asarray(self._canvas.buffer_rgba())
         return page
+
+    def _lay(self) -> None:
+        """Draw what stays as it is."""
+        self._told.set_text(f"{self._by}{_speed_words(self._speed) if self._cursor else ''}")
+        self._canvas.draw()
+        self._stage.still()
+        self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _still(self, setup: Setup, run: History | None, below: float) -> None:
         """Draw title, colour bar and legend."""
         name = run.dataset.attrs["title"] if run else setup.model.structure.name
         self._write(0.02, name[:1].upper() + name[1:], ha="left")
         self._colour_bar(setup.scale, below)
-        by = f"displacements × {setup.magnification:g}"
+        self._by = f"displacements × {setup.magnification:g}"
         middle = (below - 0.5 * FOOT) / self._inches[1]
         self._figure.legend(
             handles=_symbols(run is not None, bool(setup.outlines)), loc="center left", ncols=6,
             frameon=False, fontsize=TYPE, bbox_to_anchor=(0.01, middle), columnspacing=1.4,
             handletextpad=0.5,
         )  # fmt: skip
-        self._figure.text(0.985, middle, by, fontsize=TYPE, ha="right", va="center", color=INK)
+        self._told = self._figure.text(
+            0.985, middle, "", fontsize=TYPE, ha="right", va="center", color=INK
+        )
 
     def _write(self, x: float, words: str, *, ha: str, animated: bool = False) -> Text:
         """Write into the header."""
         y = 1.0 - 0.5 * HEAD / self._inches[1]
         return self._figure.text(
-            x, y, words, fontsize=LARGE, ha=ha, va="center", color=INK, animated=animated
-        )
+            x, y, words, fontsize=LARGE, ha=ha, va="center", color=INK, animated=animated,
+            parse_math=False,
+        )  # fmt: skip
 
     def _colour_bar(self, scale: Scale, below: float) -> None:
-        """Draw the colour bar at the right of the photograph."""
+        """Draw the colour bar at the right of the window."""
         wide, high = self._inches
         tall = 0.86 * (high - below - HEAD)
         low = below + 0.07 * (high - below - HEAD)
@@ -159,21 +170,17 @@ def _flag(axes: Axes, time: float, words: str) -> None:
 
 def _sentence(shot: Shot) -> str:
     """Time, and how many joints that are judged hinge, slide or are open."""
-    words = ["blocks are loose"] if shot.joints is None else _failing(judged(shot.joints))
-    time = shot.time
-    if time is None and shot.joints is not None and "time" in shot.joints.coords:
-        time = float(shot.joints["time"])
-    return "    ".join(words if time is None else [*words, f"t = {time:6.3f} s"])
+    time = [] if shot.time is None else [f"t = {shot.time:6.3f} s"]
+    return "    ".join([*shot.words, *time])
 
 
-def _failing(joints: xr.Dataset) -> list[str]:
-    """How many joints hinge, slide or are open."""
-    counts = {
-        "hinging": int((joints["hinge"] != 0).sum()),
-        "sliding": int(joints["slide"].sum()),
-        "open": int(joints["open"].sum()),
-    }
-    return [f"{count} {name}" for name, count in counts.items() if count]
+def _speed_words(speed: float) -> str:
+    """How fast a film shows what happens."""
+    if abs(speed - 1.0) < 0.01:
+        return ", real time"
+    if speed < 1.0:
+        return f", slow motion: 1/{1.0 / speed:.3g} of real time"
+    return f", {speed:.3g} times real time"
 
 
 def _symbols(film: bool, motion: bool) -> list[Line2D]:

@@ -16,10 +16,10 @@ from archfem.limit.verified import VerifiedMechanism
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.view.films.colours import check_colour
+from archfem.view.films.pace import Pace, Window, pace_of
 from archfem.view.films.page import Page
 from archfem.view.films.setup import Setup
 from archfem.view.films.shots import falling, moving, still
-from archfem.view.films.stage import Stage
 from archfem.view.films.writer import Image, film_path, write_film
 from archfem.view.marks import displaced, swung
 from archfem.view.moved import Falls, fields_at, kept_fields
@@ -40,6 +40,7 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
     seconds: float | None = None,
     size: tuple[int, int] = (1280, 720),
     mechanism: VerifiedMechanism | None = None,
+    window: Window = None,
 ) -> Path:
     """Film a time history: blocks move, the thrust line wanders, hinges come and go.
 
@@ -65,6 +66,9 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
         size: width and height, even numbers [pixels].
         mechanism: as found by `first_verified_mechanism`: from its instant on, the outlines of the
             blocks that it moves are drawn where it takes them.
+        window: from when until when the film is in slow motion [s], and in real time else; "auto"
+            for around the instant in which blocks come loose, or else the first mechanism by
+            count. Slow motion is a tenth of the speed, or faster where few fields were kept.
 
     Returns:
         The film's path.
@@ -73,15 +77,15 @@ def film(  # noqa: PLR0913  (what is filmed, and how)
         InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
     """
     target = film_path(path)
-    _check_picture(model, colour, magnification, size)
-    _check_run(model, run)
+    check_film(model, run, colour, magnification, size)
     falls = Falls.of(model.structure, run)
     known = kept_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
-    times, fps = _times(known, fps, seconds)
-    held = times if falls is None else times[times < falls.times[0]]
+    pace = pace_of(run, falls, known, fps, seconds, window)
+    held = pace.times if falls is None else pace.times[pace.times < falls.times[0]]
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
-    return write_film(target, _shots(_with(setup, mechanism), run, times, falls, size), fps)
+    shots = _shots(_with(setup, mechanism), run, pace, falls, size)
+    return write_film(target, shots, pace.fps)
 
 
 def picture(
@@ -116,10 +120,30 @@ def picture(
     model, q = drawn(model, q)
     joints = joints_at(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    page = Page(setup, size)
-    with Stage(setup, page.room) as stage:
-        shot = still(setup, q, joints)
-        return page.compose(stage.photograph(shot), shot)
+    return Page(setup, size).compose(still(setup, q, joints))[..., :3].copy()
+
+
+def check_film(
+    model: Model,
+    run: History,
+    colour: str,
+    magnification: float | None,
+    size: tuple[int, int] = SMALLEST,
+) -> None:
+    """Refuse what cannot be shown moving.
+
+    Args:
+        model: that made the run.
+        run: with fields.
+        colour: of the blocks.
+        magnification: of displacements, or None [-].
+        size: width and height [pixels].
+
+    Raises:
+        InvalidInput: the run has no fields or is another model's, or an option cannot be meant.
+    """
+    _check_picture(model, colour, magnification, size)
+    _check_run(model, run)
 
 
 def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
@@ -132,9 +156,10 @@ def _with(setup: Setup, mechanism: VerifiedMechanism | None) -> Setup:
 
 
 def _shots(
-    setup: Setup, run: History, times: Array, falls: Falls | None, size: tuple[int, int]
+    setup: Setup, run: History, pace: Pace, falls: Falls | None, size: tuple[int, int]
 ) -> Iterator[Image]:
-    """Yield the frames of a film, from their times; a bar shows progress."""
+    """Yield the frames of a film; a bar shows progress."""
+    times = pace.times
     page, held = Page(setup, size, run), times
     if falls is not None:
         held, loose = times[times < falls.times[0]], times[times >= falls.times[0]]
@@ -142,19 +167,8 @@ def _shots(
     if falls is not None:
         shown = chain(shown, falling(setup, falls, loose))
     bar = tqdm(shown, total=len(times), unit="frame", disable=None, leave=False)
-    with Stage(setup, page.room) as stage:
-        for shot in bar:
-            yield page.compose(stage.photograph(shot), shot)
-
-
-def _times(times: Array, fps: float, seconds: float | None) -> tuple[Array, float]:
-    """Even times to show, and the frames a second that make them last as asked."""
-    for key, value in (("fps", fps), ("seconds", seconds)):
-        if value is not None and not 0.0 < value < 1e4:
-            raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
-    lasting = seconds or max(float(times[-1] - times[0]), 1.0 / fps)
-    count = min(len(times), max(1, round(lasting * fps)))
-    return np.linspace(times[0], times[-1], count), count / lasting
+    for shot, speed in zip(bar, pace.speeds, strict=True):
+        yield page.compose(shot, float(speed))
 
 
 def _check_picture(

@@ -9,7 +9,7 @@ from archfem.arrays import Array
 from archfem.models.model import Model
 from archfem.models.moving import Moving
 from archfem.view.films.colours import Scale, scale_for
-from archfem.view.marks import SWING, support_outlines
+from archfem.view.marks import round_magnification, support_outlines
 from archfem.view.moved import Falls
 
 MARGIN = 0.02
@@ -63,7 +63,7 @@ class Setup:
         cells, structure = model.cells, model.structure
         moves = np.array([cells.displacement(q) for q in fields])
         size = float(np.abs(moves).max()) / structure.size
-        by = magnification or (1.0 if isinstance(model, Moving) else _magnification(size))
+        by = magnification or (1.0 if isinstance(model, Moving) else round_magnification(size))
         still = support_outlines(model, by)
         moved = cells.places + by * moves
         points = np.concatenate([*still, cells.places, moved.min(axis=0), moved.max(axis=0)])
@@ -100,11 +100,3 @@ class Setup:
         low[1] = min(low[1], falls.level - MARGIN * size)
         scale = replace(self.scale, extend="max") if self.scale.extend == "neither" else self.scale
         return replace(self, low=low, high=high, scale=scale, level=falls.level)
-
-
-def _magnification(displacement: float) -> float:
-    """One of 1, 2, 5, 10, … that brings a relative displacement nearest to `SWING`."""
-    if displacement * 1.5 >= SWING or displacement == 0.0:
-        return 1.0
-    steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
-    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])

@@ -20,7 +20,7 @@ def inclined(duration):
     return af.Motion(level, 0.01, np.full(count, G * (np.cos(INCLINE) - 1.0)))
 
 
-def test_a_block_slides_down_an_incline():
+def test_a_block_slides_down_an_incline(verified):
     """½ (sin α - μ cos α) g t²; the first step ends at its end's speed, ½ Δt late."""
     structure = floor((-0.3, 0.0, 0.3, 0.3), friction=0.3)
     end = Falling(structure, dt=1e-3).last(Loose.built(structure), 1.0, inclined(1.0))
@@ -29,6 +29,7 @@ def test_a_block_slides_down_an_incline():
     assert end.balance.lost == pytest.approx(
         0.3 * np.cos(INCLINE) * structure.weight * slid, rel=1e-5
     )
+    verified("block sliding down an incline for 1 s [m]", slid, "closed form", end.poses[1, 0])
 
 
 def test_a_block_sticks_to_an_incline():
@@ -51,7 +52,7 @@ def test_a_block_that_lands_flat_rebounds(restitution, height):
     assert np.abs([frame.poses[1, 2] for frame in frames]).max() < 1e-4  # sweeps end at 1e-5
 
 
-def test_a_block_topples():
+def test_a_block_topples(verified):
     """From rest at 0.02 rad beyond balance to 1 rad: 1.15800 s, by quadrature."""
     structure = floor((-0.1, 0.0, 0.1, 1.0))
     exact = toppling_time(0.2, 1.0, 0.02, 1.0)
@@ -63,11 +64,12 @@ def test_a_block_topples():
         times, angles = np.array([(frame.time, -frame.poses[1, 2]) for frame in found]).T
         turns[dt] = np.interp(1.0, angles[angles < 1.2], times[angles < 1.2])
     assert turns[1e-3] == pytest.approx(exact, rel=2e-6)
+    verified("block toppling to 1 rad [s]", exact, "quadrature", turns[1e-3])
     assert turns[2e-3] - exact == pytest.approx(4.0 * (turns[1e-3] - exact), rel=0.1)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3])
-def test_a_rocking_block_loses_what_housner_says(restitution):
+def test_a_rocking_block_loses_what_housner_says(restitution, verified):
     structure = rocking_block()
     start = tilted(structure, 0.5 * TILT)
     falling = Falling(structure, dt=2e-4, restitution=restitution)
@@ -79,6 +81,8 @@ def test_a_rocking_block_loses_what_housner_says(restitution):
     rates = PULSE * np.sqrt(2.0 * (np.cos(TILT - peaks) - np.cos(TILT)))
     assert len(rates) == 5
     assert rates[1:] / rates[:-1] == pytest.approx(KEPT, abs=0.002)
+    case = f"rocking block, restitution {restitution:g}: speed kept by four impacts"
+    verified(case, KEPT, "Housner (1963)", rates[1:] / rates[:-1])
 
 
 def test_what_is_heavy_pushes_what_is_light_as_momentum_says():

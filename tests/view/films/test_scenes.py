@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.films.scenes import _times, film, picture
+from archfem.view.films.pace import even
+from archfem.view.films.scenes import film, picture
 from archfem.view.moved import fields_at
 from archfem.view.style import HINGE, MOVED
 
@@ -59,7 +60,8 @@ def test_frames_follow_at_even_times_whatever_the_steps(model):
     run = af.History(
         xr.Dataset({"q": (("frame", "coordinate"), q)}, {"frame_time": ("frame", kept)})
     )
-    times, fps = _times(kept, 20.0, None)
+    pace = even(kept, 20.0, None)
+    times, fps = pace.times, pace.fps
     assert fps == 20.0
     assert np.diff(times) == pytest.approx(1.0 / 19.0)
     assert fields_at(run, times) == pytest.approx(np.outer(times, np.arange(1.0, 4.0)))
@@ -72,7 +74,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     run = af.time_history(model, motion, record=af.Record(fields_every=2))
     steps = np.diff(run.dataset["frame_time"].values)
     assert steps.max() > 5.0 * steps.min()
-    times, _ = _times(run.dataset["frame_time"].values, 100.0, None)
+    times = even(run.dataset["frame_time"].values, 100.0, None).times
     fields = fields_at(run, times)
     assert np.diff(times) == pytest.approx(times[1] - times[0])
     nearest = run.dataset["q"].values[
@@ -188,7 +190,7 @@ def test_pictures_on_paper_load_nothing_that_films_need():
 import sys
 import archfem as af
 for name in af.view.__all__:
-    if not name.startswith(("film", "picture")):
+    if not name.startswith(("film", "picture", "viewer", "Viewer")):
         getattr(af.view, name)
 print(*({"pyvista", "imageio", "vtk"} & set(sys.modules)))
 """

@@ -1,16 +1,4 @@
-"""Damage record files of every format at random: no foreign traceback may come of it.
-
-    python tests/benchmarks/mutated_records.py [COUNT] [FOLDER_WITH_REAL_RECORDS]
-
-Prints how many damaged files were refused with archfem's own error, how many were read, and how
-those differ from the undamaged record.
-"""
-
-import sys
-import tempfile
-import time
-from collections import Counter
-from pathlib import Path
+"""Records of every format, damaged at random, and what reading one leads to."""
 
 import numpy as np
 
@@ -19,7 +7,6 @@ from archfem.motion.records.read import read_channels
 
 WAVE = 0.5 * np.sin(0.7 * np.arange(40)) - 0.5 * np.sin(0.7 * np.arange(40)).mean()  # m/s²
 PEAK = 100.0 * np.abs(WAVE).max()  # cm/s²
-LARGEST_FILE = 70_000  # bytes; larger real files only cost time
 
 
 def rows(values, form, per_line):
@@ -185,33 +172,3 @@ def outcome(path, original):
     if any(steps):
         return "read, other step"
     return "read, as undamaged" if max(apart) == 0 else f"read, {min(max(apart), 3)} samples differ"
-
-
-def main(count, folder):
-    """Damage that many files and print what became of them."""
-    sources = [sample.encode() for sample in SAMPLES.values()]
-    if folder:
-        paths = [path for path in sorted(folder.rglob("*")) if path.suffix != ".md"]
-        sources += [
-            path.read_bytes()
-            for path in paths
-            if path.is_file() and path.stat().st_size < LARGEST_FILE
-        ]
-    tally, begun = Counter(), time.perf_counter()
-    with tempfile.TemporaryDirectory() as place:
-        path = Path(place) / "record.txt"
-        originals = []
-        for source in sources:
-            path.write_bytes(source)
-            originals.append(read_channels(path))
-        for number, content in enumerate(mutants(count, seed=0, sources=sources)):
-            path.write_bytes(content)
-            tally[outcome(path, originals[number % len(sources)])] += 1
-    print(f"{count} damaged files from {len(sources)}, {time.perf_counter() - begun:.0f} s")
-    for what, times in tally.most_common():
-        print(f"{times:7d}  {what}")
-
-
-if __name__ == "__main__":
-    arguments = sys.argv[1:]
-    main(int(arguments[0]) if arguments else 10_000, Path(arguments[1]) if arguments[1:] else None)

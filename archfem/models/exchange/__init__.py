@@ -1,0 +1,1 @@
+"""States of a model as files of other programs."""

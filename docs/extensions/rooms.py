@@ -1,0 +1,243 @@
+"""Pages of the public names, room by room, from the `__init__.pyi` of the package and its rooms.
+
+The package loads its names when they are first used, so nothing but those lists says what is
+public; they are read, and a page a room written into `docs/api`, before Sphinx begins.
+"""
+
+import ast
+import importlib
+import inspect
+import re
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+import archfem
+
+PACKAGE = Path(archfem.__file__).parent
+ROOMS = {
+    "motion": "ground motions: records, made motions, spectra, matching, suites",
+    "masonry": "what stands and what acts on it: blocks, joints, structures, materials, actions",
+    "joints": "how dry joints answer: law, quadrature, resultants, criteria",
+    "limit": "rigid blocks without stiffness: collapse factor, least thickness, mechanisms",
+    "models": "the ladder of models: what may be asked of a structure that moves",
+    "statics": "a model at rest and about rest: dead load, pushover, modes, stress",
+    "dynamics": "a model shaken: schemes, damping, events, histories, falls",
+    "view": "pictures and films",
+    "cases": "analyses as files",
+    "studies": "many cases: sweeps, incremental dynamic analysis, fragility, convergence",
+    "commands": "the command line",
+}
+COLON = "\ue000"
+"""Stands for a colon while docstrings are taken apart."""
+
+PLAIN = {
+    "errors": "what can go wrong, one class for each remedy",
+    "units": "multipliers into SI, and quantities as people write them",
+}
+FOREIGN = (
+    "numpy",
+    "scipy",
+    "xarray",
+    "matplotlib",
+    "collections",
+    "pathlib",
+    "typing",
+    "enum",
+    "pandas",
+    "pd",
+    "dolfinx",
+    "petsc4py",
+    "mpi4py",
+    "np",
+    "xr",
+    "abc",
+    "types",
+    "datetime",
+    "os",
+    "dataclasses",
+)
+"""Packages whose names are written out and lead nowhere: pages need no network."""
+
+
+def listed(stub: Path) -> dict[str, str]:
+    """The names that a stub makes public, each with the module it comes from ("" for a room)."""
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    found = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in found for alias in node.names}
+
+
+def public() -> dict[str, dict[str, Any]]:
+    """Room by room the values that are public, by the shortest dotted name each is known by."""
+    top = {name: module for name, module in listed(PACKAGE / "__init__.pyi").items() if module}
+    found: dict[str, dict[str, Any]] = {}
+    for room in ROOMS:
+        mine = [name for name, module in top.items() if module.split(".")[0] == room]
+        names = {f"archfem.{name}": getattr(archfem, name) for name in mine}
+        if (PACKAGE / room / "__init__.pyi").is_file():
+            place = importlib.import_module(f"archfem.{room}")
+            for name in listed(PACKAGE / room / "__init__.pyi"):
+                if name not in top:
+                    names[f"archfem.{room}.{name}"] = getattr(place, name)
+        found[room] = {n: v for n, v in names.items() if not isinstance(v, ModuleType)}
+    shapes = importlib.import_module("archfem.masonry.shapes")
+    known = {id(value) for value in found["masonry"].values()}
+    for name, value in vars(shapes).items():
+        if (
+            getattr(value, "__module__", "").startswith("archfem.masonry")
+            and id(value) not in known
+        ):
+            found["masonry"][f"archfem.shapes.{name}"] = value
+    return found
+
+
+def title(text: str, under: str = "=") -> list[str]:
+    """A heading."""
+    return [text, under * len(text), ""]
+
+
+def table(names: list[str]) -> list[str]:
+    """A summary of names that leads to a page for each."""
+    rows = [f"   {name}" for name in names]
+    return [".. autosummary::", "   :toctree: generated", "   :nosignatures:", "", *rows, ""]
+
+
+def write_pages(folder: Path) -> None:
+    """Write the page of each room, and of `errors` and `units`, into a folder.
+
+    Args:
+        folder: is made; a page that has not changed is left as it is.
+    """
+    folder.mkdir(exist_ok=True)
+    for room, values in public().items():
+        lines = [*title(room), f"``archfem.{room}``: {ROOMS[room]}.", ""]
+        lines += table(sorted(values, key=lambda name: (name.count("."), name.lower())))
+        told = inspect.getdoc(importlib.import_module(f"archfem.{room}")) or ""
+        modules = [line for line in told.splitlines() if line.startswith("    ")]
+        lines += [*title("Its modules", "-"), ".. code-block:: text", "", *modules, ""]
+        keep(folder / f"{room}.rst", lines)
+    for name, says in PLAIN.items():
+        module = f"archfem.{name}"
+        lines = [*title(name), f"``{module}``: {says}.", "", f".. automodule:: {module}"]
+        keep(folder / f"{name}.rst", [*lines, "   :members:", "   :show-inheritance:", ""])
+
+
+def keep(path: Path, lines: list[str]) -> None:
+    """Write a file unless it holds these lines already."""
+    text = "\n".join(lines)
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
+    """Make a docstring reStructuredText: formulas as they stand, and no mark-up but backticks."""
+    told, before, outer, inside, section = [], "", 0, 0, False
+    for line in without_types(lines):
+        indent, blank = len(line) - len(line.lstrip()), not line.strip()
+        if not blank and not indent:
+            section = bool(re.fullmatch(r"[A-Z]\w*( \w+)?:", line.strip()))
+        if not blank and indent < inside:
+            inside = 0
+        if not blank and not section and not inside and indent >= outer + 4 and not before.strip():
+            told += [" " * outer + ".. code-block:: text", ""]
+            inside = indent
+        if not blank and not inside:
+            outer = indent
+        told.append(line if inside or line.lstrip().startswith((">>>", "...")) else escaped(line))
+        before = line
+    if kind == "data":
+        told = [f"A `{type(value).__name__}`."]
+    if kind in {"property", "attribute"}:  # what stands before a colon there is no type
+        told = [line.replace(":", COLON) for line in told]
+    lines[:] = told
+
+
+def restored(
+    _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
+) -> None:
+    """Put back the colons of properties."""
+    lines[:] = [line.replace(COLON, ":") for line in lines]
+
+
+def without_types(lines: list[str]) -> list[str]:
+    """Lines in which what is returned is a sentence: a colon in it ends no type."""
+    kept: list[str] = []
+    for line in lines:
+        begins = bool(kept) and kept[-1] in {"Returns:", "Yields:"}
+        if begins:
+            kept[-1] = f":{kept[-1].lower()}"
+            kept[-1] += " " + line.strip()
+        else:
+            kept.append(line)
+    return kept
+
+
+def escaped(line: str) -> str:
+    """A line in which bars, stars and final underscores are just that, but around *words*."""
+    parts = re.split(r"(``[^`]*``|`[^`]*`|(?<!\S)\*[^\W\d][\w ]*\*)", line)
+    for k in range(0, len(parts), 2):
+        parts[k] = re.sub(r"([|*]|_(?!\w))", r"\\\1", parts[k])
+    return "".join(parts)
+
+
+def aliases() -> dict[str, str]:
+    """The public name of every public value, by where it is defined, and by its last part."""
+    found: dict[str, str] = {}
+    for values in public().values():
+        for name, value in values.items():
+            if hasattr(value, "__qualname__"):
+                found[f"{value.__module__}.{value.__qualname__}"] = name
+            found[name.rpartition(".")[2]] = name
+            found["af." + name.removeprefix("archfem.")] = name
+    return found
+
+
+def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Node) -> nodes.Node | None:
+    """Lead a name to where its value is described, under whatever name it was written."""
+    if node.get("refdomain") != "py":
+        return None
+    target = node["reftarget"].removesuffix("()")
+    names = app.archfem_names  # type: ignore[attr-defined]
+    stem, _, last = target.rpartition(".")
+    for name in (names.get(target), f"{names[stem]}.{last}" if stem in names else None):
+        if name is not None and name != target:
+            found = env.get_domain("py").resolve_xref(
+                env, node["refdoc"], app.builder, "obj", name, node, content
+            )
+            if found is not None:
+                return found
+    if node["reftype"] == "obj" or target.split(".")[0] in FOREIGN or internal(target):
+        return content
+    return None
+
+
+@cache
+def classes() -> set[str]:
+    """Names of all classes of the package, as annotations name those that are loaded late."""
+    texts = [path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")]
+    return {name for text in texts for name in re.findall(r"^class (\w+)", text, re.MULTILINE)}
+
+
+def internal(target: str) -> bool:
+    """Whether a name is one of the package that is not public, or a word of Python's."""
+    if not target.startswith("archfem."):
+        return hasattr(__builtins__, target) or target in {"Array", "NDArray", "Any"} | classes()
+    module, _, name = target.rpartition(".")
+    try:
+        return hasattr(importlib.import_module(module), name)
+    except ImportError:
+        return False
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages, and have docstrings and names treated as above."""
+    write_pages(Path(app.srcdir) / "api")
+    app.archfem_names = aliases()  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", plain, priority=400)
+    app.connect("autodoc-process-docstring", restored, priority=600)
+    app.connect("missing-reference", resolved, priority=400)
+    return {"parallel_read_safe": True}

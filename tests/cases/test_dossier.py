@@ -1,0 +1,138 @@
+"""Reports: what the folder holds is in them, what it does not hold is said."""
+
+import logging
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pages import read_page
+
+import archfem as af
+from archfem.cases.dossier.check_part import borne_share, digest
+from archfem.cases.dossier.results import applied
+
+CASE = """
+title = "a column <b>& more</b> under two pairs"
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0, 1.0]
+[model]
+fidelity = "rigid"
+[suite]
+name = "small"
+reduction = 2.0
+[suite.pairs]
+first = { synthetic = { seed = 1, duration = 1.0, pga = 1.0 } }
+second = { synthetic = { seed = 2, duration = 1.0, pga = 1.0, vertical_ratio = 0.0 } }
+[output]
+fields_every = 10
+"""
+
+
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Folder of a suite of two pairs, with what a report reads of it."""
+    folder = tmp_path_factory.mktemp("suite")
+    case = af.Case.of(tomllib.loads(CASE))
+    (folder / "case.toml").write_text(case.text())
+    list(af.cases.carried_out(case, folder))
+    return folder
+
+
+@pytest.fixture
+def kept(carried_out, undrawn, tmp_path):
+    """A copy of it."""
+    return Path(shutil.copytree(carried_out, tmp_path / "out"))
+
+
+def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
+    (kept / "modes.txt").write_text("mode 1 at 3.14 Hz")
+    page = kept / "page.html"
+    assert af.commands.main(["report", str(kept), "--out", str(page)]) == 0
+    assert f"wrote {page}" in capsys.readouterr().out
+    read = read_page(page.read_text(encoding="utf-8"))
+    words = " ".join(read.words)
+    assert [scene["title"].split(": ")[1] for scene in read.scenes] == ["first", "second"]
+    assert all(scene["note"] == "" for scene in read.scenes)
+    assert "a column <b>& more</b> under two pairs" in words
+    assert "mode 1 at 3.14 Hz" in words
+    assert "Not among the results: stress in the blocks, for they are rigid" in words
+    assert "Not among the results: a target spectrum" in words
+    assert "another case" not in words
+    case = af.Case.read(kept / "case.toml")
+    assert digest(case.text().encode()) in words
+    assert "1.0000 of the weight" in words
+    run = af.History.read(kept / "first" / "history.nc", case.structure)
+    assert f"{float(run.joints['friction'].max()):.3f}" in words
+
+
+def test_pairs_that_lack_and_cases_that_differ_are_said(kept):
+    (kept / "second" / "history.nc").unlink()
+    text = (kept / "case.toml").read_text()
+    (kept / "case.toml").write_text(text.replace("reduction = 2.0", "reduction = 3.0"))
+    found = af.cases.opened(kept)
+    assert (list(found.runs), found.missing) == (["first"], ("second",))
+    assert found.player().scene.run is found.runs["first"]
+    with pytest.raises(af.InvalidInput, match=r"no run 'third': there are \['first'\]"):
+        found.player("third")
+    assert found.report() == kept / "report.html"
+    words = " ".join(read_page((kept / "report.html").read_text(encoding="utf-8")).words)
+    assert "Not among the results: runs of second" in words
+    assert "first: the run carries another case than that of this report" in words
+
+
+def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
+    with pytest.raises(af.InvalidInput, match="there is no folder"):
+        af.cases.opened(tmp_path / "nowhere")
+    with pytest.raises(af.InvalidInput, match=r"has no case.toml.*run the case again"):
+        af.cases.opened(tmp_path)
+    with pytest.raises(af.InvalidInput, match="of one pair of a suite; give the suite's folder"):
+        af.cases.opened(kept / "first")
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(af.InvalidInput, match="it is of a study"):
+        af.cases.opened(tmp_path)
+    (tmp_path / "case.toml").write_text("title = ")
+    with pytest.raises(af.InvalidInput, match="is not TOML"):
+        af.cases.opened(tmp_path)
+    drawing = '[structure]\nshape = "outlines"\nfile = "stones.geojson"\n'
+    (tmp_path / "case.toml").write_text(drawing)
+    with pytest.raises(af.InvalidInput, match=r"names the drawing stones.geojson.*--inputs"):
+        af.cases.opened(tmp_path)
+
+
+def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
+    case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
+    *_, run = af.cases.carried_out(case, pairs=["first"])
+    words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
+    assert "5 % of critical at 5 Hz, proportional to stiffness" in words
+    assert "kept no displacements" in run.player().scene.data["note"]
+
+
+def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
+    text = small.read_text().split("[suite]")[0]
+    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "limit.txt").write_text("it stands")
+    words = " ".join(read_page(af.cases.opened(tmp_path).report().read_text()).words)
+    assert "Not among the results: the dead load" in words
+    assert "Not among the results: a run." in words
+    assert "it stands" in words
+
+
+def test_supports_bear_the_weight_or_the_report_doubts_it(ring, caplog):
+    caplog.set_level(logging.ERROR)
+    rest = af.dead_load(af.build(ring, fidelity="rigid"))
+    assert borne_share(ring, rest.joints) == pytest.approx(1.0, abs=1e-9)
+    half = rest.joints.assign(N=0.5 * rest.joints["N"], V=0.5 * rest.joints["V"])
+    assert borne_share(ring, half) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_the_ground_of_a_run_is_that_which_was_applied(stack):
+    motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
+    run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
+    found = applied(run, "ground")
+    assert found.dt == pytest.approx(0.005)
+    assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
+    assert found.pga == pytest.approx(motion.pga)

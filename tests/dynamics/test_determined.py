@@ -1,0 +1,49 @@
+"""How long histories are the same: of motions that hardly differ, and of different steppers."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.determined import parted
+
+DAMPED = af.StiffnessDamping(0.05, 8.0)
+
+
+@pytest.fixture(scope="module")
+def slender():
+    """A ring of a few stones that rattles when it is not damped."""
+    contact = af.Contact(1.48e10, 0.30e10, 0.6)
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 7}
+    return af.build(af.circular_arch(**given, contact=contact), fidelity="rigid")
+
+
+def test_in_calm_motion_nothing_grows(slender):
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    found = af.dynamics.predictability(slender, motion, damping=DAMPED, method="contact")
+    assert found.until == np.inf
+    assert found.difference < 1e-8
+    assert found.text.startswith("histories stay equal to")
+
+
+def test_steppers_part_when_a_nudge_says_so(slender):
+    """Undamped impacts: both differ by all there is in the end, though peaks hardly do."""
+    motion, given = af.Motion.synthetic(duration=2.0, pga=12.0, seed=2), {"dt": 0.005}
+    nudged = af.dynamics.predictability(slender, motion, method="compliance", **given)
+    runs = [af.time_history(slender, motion, method=m, **given) for m in ("contact", "compliance")]
+    steppers = parted(*runs)
+    assert 0.1 < nudged.until < 2.0
+    assert steppers.until > 0.8 * nudged.until  # the same to a millionth as long as is promised
+    assert nudged.growth > 5.0
+    assert nudged.peaks < 0.05
+    assert "from then on only statistics are" in nudged.text
+
+
+def test_growth_of_a_difference_that_is_known(slender):
+    """Made by hand: e-fold by e-fold."""
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    run = af.time_history(slender, motion, dt=0.005, damping=DAMPED)
+    off = 1e-9 * np.exp(20.0 * run.time)[:, None] * np.abs(run.joints["N"].values).max()
+    other = af.History(run.dataset.assign(N=run.dataset["N"] + off))
+    found = parted(run, other)
+    assert found.growth == pytest.approx(20.0, rel=0.01)
+    assert found.until == pytest.approx(np.log(1e3) / 20.0, abs=0.006)

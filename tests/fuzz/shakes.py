@@ -1,0 +1,28 @@
+"""Random structures under random motions, displacements small and large."""
+
+import runpy
+from pathlib import Path
+
+from archfem.dynamics.guard import WRONG
+from fuzz.trial import ANSWERED, FOREIGN, NONSENSE, REFUSED, Came
+
+SCRIPT = Path(__file__).parents[1] / "benchmarks" / "random_structures.py"
+tried = runpy.run_path(str(SCRIPT))["tried"]
+
+
+def ready() -> None:
+    """Load what is compiled."""
+    tried(0, "small")
+
+
+def trial(seed: int, number: int, folder: Path) -> Came:
+    """Shake one."""
+    del folder
+    displacements = ("small", "large")[number % 2]
+    told = f"{SCRIPT.name}: tried({1000 * seed + number}, {displacements!r})"
+    came = tried(1000 * seed + number, displacements)
+    if came.kind == "FOREIGN":
+        return Came(FOREIGN, came.words, told)
+    if came.steps and not abs(came.drift) <= WRONG:
+        return Came(NONSENSE, f"drift {came.drift:.0%}; {came.words}", told)
+    return Came(ANSWERED if came.steps else REFUSED, came.words, told)

@@ -1,0 +1,70 @@
+"""Arches in a row and between buttresses, by one call: lengths, areas, names."""
+
+import numpy as np
+import pytest
+import shapely
+
+import archfem as af
+from archfem.masonry import shapes
+
+
+def test_two_spans_on_piers_of_different_height():
+    heights, breadths = [2.0, 3.0, 2.5], [1.4, 1.8, 1.5]
+    arcade = shapes.arcade(
+        spans=[4.0, 5.0],
+        embraces=170.0,
+        thicknesses=0.6,
+        voussoirs=[9, 11],
+        heights=heights,
+        breadths=breadths,
+    )
+    for k, (high, broad) in enumerate(zip(heights, breadths, strict=True), 1):
+        base = arcade.joints[arcade.joint_number(f"pier {k}, base")]
+        assert base.depth == pytest.approx(broad, rel=1e-12)
+        assert base.middle[1] == pytest.approx(-high, rel=1e-12)
+    assert {joint.part for joint in arcade.joints} == {
+        "arch 1", "arch 2", "pier 1", "pier 2", "pier 3",
+    }  # fmt: skip
+    feet = [arcade.joints[arcade.joint_number(f"arch 2, joint {k}")].middle for k in (0, 11)]
+    assert feet[1] - feet[0] == pytest.approx((5.0, 0.0), abs=1e-12)
+    polygons = [shapely.Polygon(block.points) for block in arcade.blocks]
+    assert sum(p.area for p in polygons) == pytest.approx(shapely.union_all(polygons).area)
+    assert np.all(arcade.judged)
+    assert af.stands(arcade)
+
+
+def test_an_arch_between_buttresses():
+    """Its buttresses hold the thrust from some breadth on, and overturn below."""
+    given = {"span": 5.0, "embrace": 150.0, "thickness": 0.5, "voussoirs": 15, "height": 3.0}
+    narrow, broad = (shapes.buttressed_arch(breadth=b, **given) for b in (0.7, 2.0))
+    assert not af.stands(narrow)
+    assert af.stands(broad)
+    top = next(block for block in broad.blocks if block.name == "pier 1, skewback")
+    spring = broad.joints[broad.joint_number("arch 1, joint 0")]
+    assert np.ptp(top.points[:, 0]) == pytest.approx(2.0, rel=1e-12)
+    assert any(np.allclose(point, spring.extrados) for point in top.points)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"heights": [2.0, 2.0]}, "2 heights: give one for all, or 3"),
+        ({"breadths": 0.3}, "gap"),
+        ({"rises": 1.5}, "either embrace or rise"),
+    ],
+)
+def test_numbers_that_do_not_go_together(change, says):
+    given = {"spans": [4.0, 4.0], "embraces": 150.0, "thicknesses": 0.5, "voussoirs": 9}
+    given |= {"heights": 2.0, "breadths": 1.5, **change}
+    with pytest.raises(af.InvalidStructure, match=says):
+        shapes.arcade(**given)
+
+
+def test_piers_under_the_ends_of_a_bridge_leave_no_place_for_sidewalls():
+    arch = shapes.Arch(span=4.0, rise=1.6, thickness=0.45, voussoirs=9)
+    piers = [shapes.Pier(gap=1.0, height=2.0, name=name) for name in ("left", "right")]
+    wall = shapes.Sidewall(length=1.5, height=2.0)
+    with pytest.raises(af.InvalidStructure, match="none where piers stand under the ends"):
+        af.bridge(arches=[arch], piers=piers, sidewalls=[wall, wall])
+    with pytest.raises(af.InvalidStructure, match="a ring does not stand on a gap"):
+        af.bridge(arches=[arch], piers=[shapes.Pier(gap=0.1, height=2.0, name="l"), piers[1]])

@@ -1,0 +1,59 @@
+"""A circle fitted to surveyed points: exact on a circle, and the least there is beside it."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import archfem as af
+from archfem.masonry.survey.circles import fitted_circle
+
+# The intradoses of the three arches of Prusias ad Hypium, Table 1 of Demirel and Aldemir (2021):
+# span along the centre line [m], embrace [degrees] and thickness [m].
+ARCHES = [(4.71, 157.0, 0.527), (5.81, 159.0, 0.577), (4.89, 150.0, 0.546)]
+
+
+def intrados(span, embrace, thickness, count=60):
+    half = np.radians(embrace) / 2.0
+    radius = span / (2.0 * np.sin(half)) - thickness / 2.0
+    angles = np.linspace(-half, half, count)
+    return radius, radius * np.column_stack([np.sin(angles), np.cos(angles)]) + (100.0, 20.0)
+
+
+@pytest.mark.parametrize("arch", ARCHES)
+def test_points_of_a_circle(arch):
+    radius, points = intrados(*arch)
+    found = fitted_circle(points)
+    assert found.radius == pytest.approx(radius, rel=1e-9)
+    assert found.centre == pytest.approx((100.0, 20.0), abs=1e-8)
+    assert found.embrace == pytest.approx(arch[1], rel=1e-9)
+    assert found.rms < 1e-9
+    ring = af.circular_arch(span=found.span, rise=found.rise, thickness=arch[2], voussoirs=14)
+    assert np.ptp(ring.middles[:, 0]) == pytest.approx(arch[0], rel=1e-9)  # the table's span
+
+
+def test_rough_points_have_the_circle_of_least_squares():
+    """As found by a search that knows nothing of circles."""
+    radius, points = intrados(*ARCHES[1])
+    points = points + np.random.default_rng(4).normal(0.0, 0.02, points.shape)
+    found = fitted_circle(points)
+
+    def square(given):
+        return np.sum((np.linalg.norm(points - given[:2], axis=1) - given[2]) ** 2)
+
+    best = minimize(square, (100.0, 20.0, radius), method="Nelder-Mead", tol=1e-12)
+    assert (*found.centre, found.radius) == pytest.approx(best.x, abs=1e-5)  # of the search
+    assert found.rms == pytest.approx(0.02, rel=0.25)  # of 60 points
+    assert found.radius == pytest.approx(radius, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("points", "says"),
+    [
+        ([(0, 0), (1, 1)], "make no circle"),
+        ([(0, 0), (1, 1), (2, 2), (3, 3)], "make no circle"),
+        ([(0, 0), (1, 1, 1)], r"points\[1\]"),
+    ],
+)
+def test_what_makes_no_circle(points, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        fitted_circle(points)

@@ -1,0 +1,113 @@
+"""A user's own tagged mesh as a survey, and what is refused."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.masonry.survey.tagged import part_of, physical_surfaces
+
+gmsh = pytest.importorskip("gmsh")
+pytest.importorskip("meshio")
+
+LAYERS = {"ground": af.masonry.Layer(fixed=True), "pier": af.masonry.Layer()}
+
+
+def own(path, *, version=4.1, binary=False, curve="waist", apart=False):
+    """A mesh as a user makes it: two stones on the ground, tags and names of the user's own."""
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ = gmsh.model.occ
+        boxes = [(-1.0, -0.3, 2.0, 0.3), (-0.5, 0.0, 1.0, 1.0), (-0.5, 1.0, 1.0, 0.8)]
+        made = [(2, occ.addRectangle(x, y, 0.0, dx, dy)) for x, y, dx, dy in boxes]
+        occ.fragment(made[:1], made[1:])
+        occ.synchronize()
+        names = {"ground": [], "pier, stone 1": [], "pier, stone 2": []}
+        for _, tag in gmsh.model.getEntities(2):
+            y = occ.getCenterOfMass(2, tag)[1]
+            names[list(names)[2 if y > 1 or (apart and y < 0) else int(y > 0)]].append(tag)
+        for number, (name, tags) in enumerate(reversed(names.items())):
+            if tags:
+                gmsh.model.addPhysicalGroup(2, tags, 30 + 7 * number, name)
+        for _, tag in gmsh.model.getEntities(1):
+            x, y, _ = occ.getCenterOfMass(1, tag)
+            if curve and abs(y - 1.0) < 1e-9 and abs(x) < 0.4:
+                gmsh.model.addPhysicalGroup(1, [tag], 5, curve)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+        gmsh.model.mesh.generate(2)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", int(binary))
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("version", "binary"), [(4.1, False), (4.1, True), (2.2, False), (2.2, True)]
+)
+def test_blocks_by_physical_surface_and_joints_found(tmp_path, version, binary):
+    path = own(tmp_path / "own.msh", version=version, binary=binary)
+    structure = af.masonry.surveyed(path, layers=LAYERS)
+    blocks = {block.name: block for block in structure.blocks}
+    assert set(blocks) == {"ground", "pier, stone 1", "pier, stone 2"}
+    assert len(blocks["pier, stone 1"].outline) == 4  # without the nodes along its sides
+    assert blocks["pier, stone 2"].area == pytest.approx(0.8, rel=1e-9)
+    assert blocks["ground"].fixed
+    assert {joint.name for joint in structure.joints} == {"pier, base", "waist"}
+    assert structure.depths == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("curve", ["waist", None])
+def test_a_model_on_that_mesh(tmp_path, curve):
+    """Its own cells carry it: the weight above each joint, from triangles of the file."""
+    path = own(tmp_path / "own.msh", curve=curve)
+    structure = af.masonry.surveyed(path, layers=LAYERS)
+    model = af.build(structure, file=path)
+    dead = af.dead_load(model).joints
+    assert sorted(dead["N"].values) == pytest.approx([16e3, 36e3], rel=1e-6)  # of the solver
+    triangles = sum(len(cell) == 3 for cell in model.cells.polygons)
+    assert triangles == len(model.cells.polygons) > 20
+    (tmp_path / "case.toml").write_text(
+        '[structure]\nshape = "outlines"\nfile = "own.msh"\n'
+        "[structure.layers]\nground = { fixed = true }\npier = {}\n"
+        '[model]\nfile = "own.msh"\n'
+    )
+    case = af.Case.read(tmp_path / "case.toml")
+    assert af.build(case.structure, file=case.discretisation.file).size == model.size
+
+
+def test_a_surface_in_pieces_is_refused(tmp_path):
+    path = own(tmp_path / "own.msh", apart=True)
+    with pytest.raises(af.InvalidInput, match="'pier, stone 2' is in pieces or has a hole"):
+        physical_surfaces(path)
+
+
+def test_a_mesh_of_another_structure_is_refused(tmp_path):
+    path = own(tmp_path / "own.msh")
+    with pytest.raises(af.errors.MeshError, match="3 physical surfaces, of which"):
+        af.build(af.column(breadth=1.0, heights=[1.0, 0.8]), file=path)
+    with pytest.raises(af.InvalidInput, match="'rigid' has no mesh"):
+        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid", file=path)
+    with pytest.raises(af.InvalidInput, match="'auto' chooses"):
+        af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="auto", file=path)
+    (tmp_path / "words.msh").write_text("words")
+    with pytest.raises(af.InvalidInput, match="no mesh of gmsh"):
+        af.masonry.read_outlines(tmp_path / "words.msh")
+
+
+def test_parts_by_the_names_of_blocks():
+    names = ["north arch, voussoir 3", "voussoir 12", "left abutment", "3"]
+    assert [part_of(name) for name in names] == ["north arch", "voussoir", "left abutment", ""]
+
+
+def test_edges_of_a_mesh_follow_an_arc(tmp_path):
+    """What archfem writes itself is read as a survey: a ring of stones in chords."""
+    ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=3)
+    af.models.write_mesh(ring, tmp_path / "ring.msh", af.models.Discretisation(cells=(2, 4)))
+    layers = {name: af.masonry.Layer(fixed=True) for name in ("left abutment", "right abutment")}
+    layers["voussoir"] = af.masonry.Layer(role="ring")
+    again = af.masonry.surveyed(tmp_path / "ring.msh", layers=layers)
+    assert [joint.name for joint in again.joints] == [joint.name for joint in ring.joints]
+    turn = np.radians(150.0) / 3 / 4
+    assert again.weight == pytest.approx(ring.weight * np.sin(turn) / turn, rel=1e-9)

@@ -1,0 +1,1 @@
+"""Changed physics, one place at a time: do the default tests notice?"""

@@ -1,0 +1,51 @@
+"""Pages read by the standard library's reader: whether elements close, and what they ask for."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+VOID = {"br", "hr", "img", "input", "link", "meta", "path", "circle", "rect", "col"}
+"""Elements without a closing tag, and those of SVG that close themselves."""
+
+
+class Reader(HTMLParser):
+    """Keeps which elements are open, what is asked for, and what is said."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.asked, self.words, self.scenes, self.ids = [], [], [], [], []
+        self.feed(page)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.asked += [given[key] for key in ("src", "href", "data") if key in given]
+        self.ids += [given["id"]] if "id" in given else []
+        self.scripted = given.get("type") == "application/json"
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] == "script":
+            if self.scripted:
+                self.scenes.append(json.loads(data))
+        elif self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+
+def read_page(page):
+    """Read a page that must be well-formed and ask nobody for anything."""
+    found = Reader(page)
+    for asked in found.asked:
+        assert asked.startswith(("data:image/", "#"))
+    style = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
+    assert not any(word in each for each in style for word in ("url(", "@import"))
+    assert len(found.ids) == len(set(found.ids))
+    return found

@@ -1,0 +1,96 @@
+"""Without PETSc and SLEPc: SciPy finds the same equilibria and modes."""
+
+import sys
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import archfem as af
+from archfem.packages import FENICSX
+from archfem.statics import dense_eigen, eigen, modes, newton
+from archfem.statics.newton import Newton, Solver
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """As if FEniCSx and what it stands on were not installed."""
+
+    def found(name):
+        return None if name in FENICSX else name
+
+    for module in (newton, modes):
+        monkeypatch.setattr(module, "find_spec", found)
+
+
+def kinked(q):
+    """The force of a spring that is stiff where it is closed, under a load."""
+    return np.where(q < 0.0, 2.0, 1e-3) * q + 1.0
+
+
+def stiffness(q):
+    return sparse.csr_matrix([[2.0 if q[0] < 0.0 else 1e-3]])
+
+
+@pytest.mark.parametrize("search", ["basic", "cp"])
+def test_a_kink_is_solved_exactly(alone, search):
+    solved = Solver(1).solve(kinked, stiffness, np.array([5.0]), 1.0, [search])
+    assert solved.q[0] == pytest.approx(-0.5, rel=1e-9)
+
+
+def test_dead_load_and_modes_are_those_of_petsc(ring, monkeypatch):
+    """Both solve to 1e-10 of the load."""
+    model = af.build(ring, fidelity="rigid")
+    usual = af.dead_load(model)
+    for module in (newton, modes):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    other = af.dead_load(model)
+    assert other.q == pytest.approx(usual.q, rel=1e-8, abs=1e-8 * np.abs(usual.q).max())
+    squares, shapes = eigen.lowest(model.closed(), model.mass, 4)
+    found, also = dense_eigen.lowest(model.closed(), model.mass, 4)
+    assert found == pytest.approx(squares, rel=1e-8)
+    assert np.abs(shapes.T @ (model.mass @ also)) == pytest.approx(np.eye(4), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("force", "tangent", "says"),
+    [
+        (lambda q: q * 0.0 + 1.0, lambda q: sparse.csr_matrix([[0.0]]), "the tangent is singular"),
+        (lambda q: q + np.nan, stiffness, "the residual is not a number"),
+        (lambda q: np.exp(q), lambda q: sparse.csr_matrix([[np.exp(q[0])]]), "too many iterations"),
+    ],
+)
+def test_what_has_no_solution_says_why(alone, force, tangent, says):
+    with pytest.raises(af.DidNotConverge, match=says):
+        Solver(1).solve(force, tangent, np.array([0.0]), 1.0, ["basic"])
+
+
+def test_a_step_that_leads_nowhere_down(alone):
+    with pytest.raises(af.DidNotConverge, match="no way down"):
+        Solver(1).solve(lambda q: 1.0 + q**2, stiffness, np.array([5.0]), 1.0, ["cp"])
+
+
+def test_a_mechanism_has_no_modes(alone):
+    stiff = sparse.diags([-1e6, 2.0, 3.0]).tocsr()
+    with pytest.raises(af.DidNotConverge, match="singular or negative"):
+        dense_eigen.lowest(stiff, sparse.identity(3, format="csr"), 2)
+
+
+def test_what_only_petsc_and_slepc_can_do_says_how_they_are_had(monkeypatch):
+    monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
+    with pytest.raises(af.errors.NotInstalled, match="python3-dolfinx"):
+        Solver(1, Newton(petsc={"pc_type": "svd"}))
+    many = sparse.identity(dense_eigen.MOST + 1, format="csr")
+    with pytest.raises(af.errors.NotInstalled, match="conda-forge"):
+        dense_eigen.lowest(many, many, 1)
+
+
+@pytest.mark.parametrize("library", ["PETSc", "SciPy"])
+def test_what_only_rounding_holds_is_no_equilibrium(library, request):
+    """A stiff block that flies away, but for a stiffness of the size of rounding: 1e9 m far."""
+    if library == "SciPy":
+        request.getfixturevalue("alone")
+    stiff = sparse.csr_matrix([[1e11, -1e11], [-1e11, 1e11 + 1e-4]])
+    load = np.array([0.0, 1e5])
+    with pytest.raises(af.DidNotConverge, match=r"rounding holds it|singular|iterations"):
+        Solver(2).solve(lambda q: stiff @ q - load, lambda q: stiff, np.zeros(2), 1e5)

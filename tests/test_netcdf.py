@@ -1,0 +1,69 @@
+"""A damaged file is known before it is read."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import archfem as af
+from archfem.netcdf import read_dataset, write_dataset
+
+
+@pytest.fixture
+def written(tmp_path):
+    values = np.random.default_rng(0).normal(size=(50, 4))
+    dataset = xr.Dataset(
+        {"N": (("time", "joint"), values), "name": ("joint", list("abcd"))},
+        coords={"time": np.arange(50.0)},
+        attrs={"title": "as it was", "steps": 49},
+    )
+    path = write_dataset(dataset, tmp_path / "run.nc", {"N": {"zlib": True}})
+    return dataset, path
+
+
+def test_a_file_holds_what_was_written(written):
+    dataset, path = written
+    assert read_dataset(path, "history").identical(dataset)
+    with xr.open_dataset(path) as plain:  # what does not know of the seal passes over it
+        assert plain["N"].equals(dataset["N"])
+
+
+def test_any_damage_is_known(written):
+    """Each of 100 files is cut off, or has a byte changed, left out or put in, seal included."""
+    _, path = written
+    whole, rng = path.read_bytes(), np.random.default_rng(1)
+    for number in range(100):
+        last = number % 5 == 0  # the seal itself
+        at = int(rng.integers(len(whole) - 110 if last else 0, len(whole)))
+        other = bytes([whole[at] ^ (1 << int(rng.integers(8)))])
+        content = (
+            whole[:at],
+            whole[:at] + other + whole[at + 1 :],
+            whole[:at] + whole[at + 1 :],
+            whole[:at] + b"\0" + whole[at:],
+        )[number % 4]
+        path.write_bytes(content)
+        with pytest.raises(af.InvalidInput, match=r"is damaged|is not a NetCDF file"):
+            read_dataset(path, "history")
+
+
+def test_a_file_of_an_earlier_version_has_no_seal(written, tmp_path):
+    dataset, _ = written
+    dataset.to_netcdf(tmp_path / "old.nc", engine="netcdf4")
+    assert read_dataset(tmp_path / "old.nc", "history").identical(dataset)
+
+
+def test_a_damaged_history_is_run_again(small, undrawn, capsys):
+    """Of two finished pairs the one whose file has another byte is run again."""
+    out = small.parent / "out"
+    command = ["run", str(small), "--out", str(out)]
+    assert af.commands.main(command) == 0
+    path = out / "second" / "history.nc"
+    before = path.read_bytes()
+    path.write_bytes(before[:5000] + bytes([before[5000] ^ 1]) + before[5001:])
+    capsys.readouterr()
+    assert af.commands.main(command) == 0
+    said = capsys.readouterr().out
+    assert "first: finished before" in said
+    assert "second: finished before" not in said
+    with af.History.read(path).dataset as again:
+        assert again.attrs["ended"] == "finished"

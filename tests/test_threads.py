@@ -1,0 +1,69 @@
+"""Linear algebra takes one thread, whatever the environment says, and so gives the same bits."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import archfem as af
+from archfem.threads import on_one_thread
+
+WORK = """
+import hashlib
+import archfem as af
+quake = af.Motion.synthetic(duration=2.0, pga=6.0, seed=3)
+ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
+for rung, method in (("full", "contact"), ("faces", "contact"), ("full", "compliance")):
+    model = af.build(ring, fidelity=rung, cells=(4, 4))
+    given = {"dt": 0.005, "damping": af.Rayleigh(0.05, (8.0, 16.0)), "method": method}
+    run = af.time_history(model, quake, **given)
+    bits = b"".join(run.joints[name].values.tobytes() for name in ("N", "V", "M"))
+    print(hashlib.sha256(bits).hexdigest())
+"""
+
+
+def threads():
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+def test_what_is_decorated_takes_one_thread_and_gives_them_back():
+    inner = on_one_thread(threads)
+    with threadpool_limits(limits=2, user_api="blas"):
+        assert threads() == {2}
+        assert on_one_thread(lambda: (inner(), threads()))() == ({1}, {1})
+        assert threads() == {2}
+
+
+def test_a_run_takes_one_thread():
+    """As seen from within, by its event."""
+    seen = {}
+    column = af.column(breadth=1.0, heights=[1.0])
+    with threadpool_limits(limits=2, user_api="blas"):
+        model = af.build(column, fidelity="rigid")
+        af.time_history(
+            model,
+            af.Motion.synthetic(duration=1.0, pga=0.5),
+            dt=0.01,
+            until=lambda structure, resultants: seen.update(run=threads()),
+        )
+        assert threads() == {2}
+    assert seen == {"run": {1}}
+
+
+@pytest.mark.slow
+def test_another_process_another_cache_and_two_threads_give_the_same_bits(tmp_path):
+    found = set()
+    for threads_asked, cache in (("1", None), ("2", None), ("2", tmp_path)):
+        asked = {"OPENBLAS_NUM_THREADS": threads_asked, "OMP_NUM_THREADS": threads_asked}
+        asked |= {} if cache is None else {"NUMBA_CACHE_DIR": str(cache)}
+        done = subprocess.run(
+            [sys.executable, "-c", WORK],
+            env={**os.environ, **asked},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        found.add(done.stdout)
+    assert len(found) == 1

@@ -1,0 +1,112 @@
+"""The player and the report in a browser: what is drawn is what the history says."""
+
+import re
+
+import numpy as np
+import pytest
+from chromium import browser, complaints, opened, printed
+
+import archfem as af
+from archfem.view.pages.outlines import Outlines
+
+pytestmark = pytest.mark.slow
+
+SCALE = """
+const p = document.querySelector("figure.player").player;
+return [p.scene.box[0][0], p.scene.box[1][1], p.scale, p.by, p.time];
+"""
+SET = """
+const [name, value] = arguments, slider = document.querySelector(`.player-${name}`);
+slider.value = value;
+slider.dispatchEvent(new Event("input", { bubbles: true }));
+"""
+
+
+def corners(driver, block):
+    """Corners of a block as drawn, back in metres, with what they are magnified by."""
+    found = driver.find_element("css selector", f"[data-block='{block}']").get_attribute("d")
+    drawn = np.array(re.findall(r"(-?[\d.]+) (-?[\d.]+)", found), float)
+    left, top, scale, by, time = driver.execute_script(SCALE)
+    return np.column_stack([left + drawn[:, 0] / scale, top - drawn[:, 1] / scale]), by, time, scale
+
+
+def test_the_player_draws_what_the_history_says(rocked, tmp_path):
+    model, run = rocked
+    path = af.view.player(run, model).save(tmp_path / "player.html")
+    outlines = Outlines(model.structure)
+    with browser() as driver:
+        opened(driver, path)
+        pictures = set()
+        for frame in (20, 40):
+            driver.execute_script(SET, "time", float(run.dataset["frame_time"][frame]))
+            moved = outlines.moved(model, run.dataset["q"].values[frame][None])[0]
+            pictures.add(driver.find_element("css selector", ".player-stage").screenshot_as_base64)
+            for block in range(len(model.structure.blocks)):
+                found, by, time, scale = corners(driver, block)
+                assert time == pytest.approx(float(run.dataset["frame_time"][frame]), abs=1e-9)
+                own = outlines.block == block
+                expected = outlines.points[own] + by * moved[own]
+                # quantum of displacements, of coordinates, and of what is drawn
+                close = by * np.abs(moved).max() / 4000 + 1e-4 + 0.01 / scale
+                assert np.abs(found - expected).max() < close
+        assert len(pictures) == 2
+        driver.execute_script(SET, "magnification", 0.0)
+        assert corners(driver, 0)[1] == 1.0
+        hinge = int(np.argmax((run.joints["hinge"].values != 0).sum(axis=1)))
+        driver.execute_script(SET, "time", float(run.time[hinge]))
+        discs = driver.find_elements("css selector", ".hinges circle")
+        assert len(discs) == (run.joints["hinge"].values[hinge] != 0).sum() > 0
+        assert complaints(driver) == []
+
+
+def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
+    model, run = rocked
+    path = af.view.player(run, model).save(tmp_path / "player.html")
+    find = "css selector"
+    with browser() as driver:
+        opened(driver, path)
+        curves = []
+        for number, joint in enumerate(model.structure.joints):
+            driver.find_element(find, f"[data-joint='{number}']").click()
+            words = driver.find_element(find, ".player-readout").text
+            assert joint.name in words
+            time = driver.execute_script(SCALE)[4]
+            e = run.joints["eccentricity"].isel(joint=number).sel(time=time, method="nearest")
+            shown = re.search(r"e = (\S+)", words)[1].replace("−", "-")
+            assert float(shown) == pytest.approx(float(e), abs=1e-3)
+            curves.append(driver.find_element(find, ".player-e .curve").get_attribute("d"))
+        assert curves[0] != curves[1]
+        driver.execute_script(SET, "time", 0.0)
+        driver.find_element(find, ".player-play").click()
+        driver.implicitly_wait(1)
+        assert (
+            driver.execute_async_script(
+                "const done = arguments[0]; setTimeout(() => done("
+                "document.querySelector('figure.player').player.time), 400)"
+            )
+            > 0.05
+        )
+        assert complaints(driver) == []
+
+
+def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
+    """Of each figure all is on one page; it may not break, and none is higher than a page."""
+    case = af.Case.read(small, ["output.fields_every=10"])
+    *_, run = af.cases.carried_out(case, pairs=["first"])
+    path = run.report(tmp_path / "report.html")
+    with browser(wide=665) as driver:  # the width of the text on A4
+        opened(driver, path)
+        pages = [page.extract_text() for page in printed(driver).pages]
+        (page,) = [text for text in pages if "ground acceleration [m/s²]" in text]
+        assert "a column under two pairs" in page
+        assert "V / N [–]" in page
+        assert all(words in "".join(pages) for words in ("Dead load", "Versions, hashes"))
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        figures = driver.execute_script(
+            "return [...document.querySelectorAll('figure')].map(f => "
+            "[getComputedStyle(f).breakInside, f.offsetHeight, f.scrollWidth - f.clientWidth])"
+        )
+        assert len(figures) >= 4
+        high = (297 - 18 - 20) / 25.4 * 96
+        assert all(how == "avoid" and tall <= high and wide <= 0 for how, tall, wide in figures)
+        assert complaints(driver) == []

@@ -1,0 +1,75 @@
+"""What the player is given is what the history holds."""
+
+import json
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.view.pages.outlines import Outlines
+from archfem.view.pages.packing import unpacked
+from archfem.view.pages.scenes import Scene
+
+
+def arrays(scene):
+    data = json.loads(scene.text)
+    return data, unpacked(data["pack"], data["bytes"])
+
+
+def test_a_page_holds_the_history_to_its_quantum(rocked):
+    model, run = rocked
+    data, found = arrays(Scene(model.structure, run, model))
+    quantum = {each["name"]: 0.501 * each["quantum"] for each in data["pack"]}
+    names = {"e": "eccentricity", "ratio": "friction", "normal": "N", "opening": "opening"}
+    for name, key in names.items():
+        values = run.joints[key].values.T
+        values = np.minimum(values, data["most"]) if name == "ratio" else values
+        assert np.array_equal(np.isnan(found[name]), np.isnan(values))
+        assert np.nanmax(np.abs(found[name] - values)) <= quantum[name]
+    assert np.abs(found["time"][0] - run.time).max() <= quantum["time"]
+    assert np.abs(found["ground"].T - run.dataset["ground"].values).max() <= quantum["ground"]
+    hinge = (found["flags"].astype(int) & 3) - 1
+    assert np.array_equal(hinge, run.joints["hinge"].values.T)
+    assert np.array_equal(found["flags"].astype(int) & 4 > 0, run.joints["slide"].values.T)
+    moved = Outlines(model.structure).moved(model, run.dataset["q"].values)
+    rows = moved.reshape(len(moved), -1).T
+    assert np.abs(found["frame_points"] - rows).max() <= quantum["frame_points"]
+    assert np.allclose(found["frame_time"][0], run.dataset["frame_time"].values, atol=1e-6)
+    assert (data["every"], data["note"], data["loose"]) == (1, "", None)
+
+
+def test_points_of_the_thrust_line_are_those_of_the_history(rocked):
+    """On the line through both ends of a joint, at 1/2 + e of the way."""
+    model, run = rocked
+    data, found = arrays(Scene(model.structure, run, model))
+    ends = np.array([joint["ends"] for joint in data["joints"]])
+    share = 0.5 + found["e"][:, 0, None]
+    line = (1.0 - share) * ends[:, 0] + share * ends[:, 1]
+    rest = run.joints.isel(time=0)
+    assert np.allclose(line, af.joints.thrust_line(model.structure, rest).values, atol=1e-3)
+
+
+def test_where_there_is_little_room_steps_are_left_out(rocked):
+    model, run = rocked
+    room = len(Scene(model.structure, run, model).packed[0].text) * 2 // 3
+    data, found = arrays(Scene(model.structure, run, model, largest=room))
+    assert data["every"] > 1
+    assert len(data["bytes"]) <= room
+    assert found["time"][0, -1] == pytest.approx(run.time[-1], abs=1e-6)
+    assert np.abs(found["time"][0] - data["still"]).min() < 1e-5
+
+
+def test_without_displacements_blocks_stand_still(rocked):
+    model, run = rocked
+    data, found = arrays(Scene(model.structure, af.History(run.dataset.drop_vars("q"))))
+    assert "kept no displacements" in data["note"]
+    assert "frame_points" not in found
+
+
+def test_scenes_of_another_structure_or_model_are_refused(rocked, ring):
+    model, run = rocked
+    with pytest.raises(af.InvalidInput, match="has 2 joints, and the structure 18"):
+        Scene(ring, run)
+    dataset = run.dataset.isel(coordinate=slice(3)).drop_vars(["last_q"])
+    with pytest.raises(af.InvalidInput, match="has 3 coordinates, and the model 6"):
+        Scene(model.structure, af.History(dataset), model)

@@ -1,0 +1,31 @@
+"""The dead load in a picture has its numbers beside it."""
+
+import re
+
+import pytest
+
+import archfem as af
+from archfem.view.dead import draw_dead_load
+
+
+@pytest.mark.parametrize("heights", [[0.8, 0.8], [0.8, 0.8, 0.4]])
+def test_numbers_of_a_column_are_the_weights_above(heights):
+    """Of stones of 25 kN/m³ or whatever stone weighs: N at the base is the weight of all."""
+    stones = af.column(breadth=0.4, heights=heights)
+    dead = af.dead_load(af.build(stones, fidelity="rigid"))
+    page = draw_dead_load(dead)
+    heavy = stones.weight / 1e3
+    light = heavy * heights[-1] / sum(heights)
+    title = " ".join(page.axes[0].get_title().split())
+    assert f"weight {heavy:.4g} kN" in title
+    assert f"N from {light:.3g} to {heavy:.3g} kN" in title
+    told = " ".join(text.get_text() for text in page.legends[0].get_texts())
+    assert f"largest N = {heavy:.3g} kN" in re.sub(r"\s+", " ", told)
+
+
+def test_letters_stand_at_the_joints_that_are_told(ring):
+    page = draw_dead_load(af.dead_load(af.build(ring, fidelity="rigid")))
+    letters = {text.get_text() for text in page.axes[0].texts}
+    told = [text.get_text() for text in page.legends[0].get_texts()]
+    assert letters == {"a", "b"}
+    assert sum(each.startswith("joint ") for each in told) == 2
