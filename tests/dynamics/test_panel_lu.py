@@ -1,4 +1,4 @@
-"""Gauss's elimination in dense panels: against SuperLU, of matrices whose entries change in part."""
+"""Elimination in dense panels against SuperLU, of matrices whose entries change in part."""
 
 import logging
 

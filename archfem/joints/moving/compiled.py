@@ -6,13 +6,17 @@ compute. Where none is made there is nothing to count, and numba's option `_nrt`
 function that makes arrays nevertheless does not compile. Nor do divisions ask whether to raise.
 """
 
+from typing import Any
+
 import numba
 
-computing = numba.njit(cache=True, error_model="numpy", _nrt=False)
+_SETTINGS: Any = {"cache": True, "error_model": "numpy", "_nrt": False}
+
+computing: Any = numba.njit(**_SETTINGS)
 """Compiles a function that makes no arrays."""
 
-inlined = numba.njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+inlined: Any = numba.njit(**_SETTINGS, forceinline=True)
 """The same, as part of those that call it."""
 
-summing = numba.njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc"})
+summing: Any = numba.njit(**_SETTINGS, fastmath={"contract", "reassoc"})
 """Compiles one whose sums may be taken in any order, several terms at a time."""
