@@ -128,7 +128,7 @@ def test_too_few_effective_modes():
     ("given", "words"),
     [
         ((5.0, 8.0), "ratio 5.0"),
-        ((0.05, 0.0), "damping frequency 0.0 Hz is not above 0"),
+        ((0.05, 0.0), "damping frequency 0.0 Hz is not between 1 mHz"),
         ((0.05, (8.0, 16.0)), "is not a finite number"),
         ((0.05, 8.0, "open"), "joints = 'open'"),
     ],

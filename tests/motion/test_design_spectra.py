@@ -150,7 +150,7 @@ def test_table_is_straight_between_its_points():
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").horizontal(-0.1), "from 0 s upwards"),
         (lambda: Eurocode8(ag=0.2, ground="S1"), "expected type 1 or 2 on ground A"),
         (lambda: Eurocode8(ag=0.2, ground="A", type=3), "expected type 1 or 2"),
-        (lambda: Eurocode8(ag=0.0, ground="A"), "0.0 g is not in 0 to 10"),
+        (lambda: Eurocode8(ag=0.0, ground="A"), "0.0 g: expected more than 0, up to 10"),
         (lambda: Eurocode8(ag=0.2, ground="A").horizontal(4.5), "defined up to 4 s"),
         (lambda: TableSpectrum([0.0, 0.0], [1.0, 1.0]), "a row that grows"),
         (lambda: TableSpectrum([0.0, 1.0], [1.0, -1.0]), "2 positive values"),
