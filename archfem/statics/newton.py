@@ -147,13 +147,20 @@ class Solver:
         return bool(rest <= 8.0 * np.finfo(float).eps * rounding)
 
     def _checked(self, tangent: Tangent) -> Tangent:
-        """Note how stiff tangents are; refuse methods for symmetric ones where one is not."""
+        """Note how stiff the first tangent is; refuse methods for symmetric ones where one is not.
+
+        The first is that of the start. Later ones may be those of iterates that went anywhere.
+        """
         chosen = self.settings.petsc
         asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
+        noted = False
 
         def checked(q: Array) -> sparse.csr_matrix:
+            nonlocal noted
             matrix = tangent(q)
-            self._stiffest = max(self._stiffest, float(abs(matrix.data).max(initial=0.0)))
+            if not noted:
+                self._stiffest = max(self._stiffest, float(abs(matrix.data).max(initial=0.0)))
+                noted = True
             if asked and abs(matrix - matrix.T).max() > ASYMMETRY * abs(matrix).max():
                 raise InvalidInput(
                     f"petsc = {asked} is for symmetric matrices, and where joints slide the "

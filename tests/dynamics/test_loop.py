@@ -22,6 +22,7 @@ class SlidingSystem(NamedTuple):
 
     mass: float
     dt: float
+    stored: float
 
 
 class Sliding:
@@ -32,6 +33,8 @@ class Sliding:
 
     def __init__(self, equation):
         self.mass = equation.model.mass[0, 0]
+        q = af.dead_load(equation.model).q
+        self.stored = equation.model.energy(q) - equation.weight @ q  # at rest, and for good
 
     @classmethod
     def of(cls, equation):
@@ -44,7 +47,7 @@ class Sliding:
         return np.hstack([vectors, np.zeros((3, 2))])
 
     def system(self, dt):
-        return SlidingSystem(self.mass, dt)
+        return SlidingSystem(self.mass, dt, self.stored)
 
 
 def slides(system):
@@ -86,7 +89,7 @@ def _measure(system, kept, step, states, ground, results, memory):
             moved = states[1, 0, 0] - states[0, 0, 0]
             resultants[0, 0] = system.mass * GRAVITY
             resultants[0, 1] = kept[0]
-            energy[1] = 0.0
+            energy[1] = system.stored
             energy[0] = 0.5 * system.mass * states[1, 1, 0] ** 2
             energy[2] = -system.mass * ground[0] * moved
             energy[3] = kept[0] * moved

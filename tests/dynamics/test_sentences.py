@@ -12,8 +12,9 @@ from archfem.limit.episodes import episode
 
 
 def test_the_verdict_says_what_was_largest_and_what_is_left(run):
-    """Each number and name against those looked up in the dataset by hand."""
-    sentence, *lines = run.verdict.splitlines()
+    """Each number and name against those looked up in the dataset by hand; a doubt comes first."""
+    doubt, sentence, *lines = run.verdict.splitlines()
+    assert doubt == f"in doubt: {run.doubts[0]}"
     joints = run.joints
     turned = abs(joints["rotation"]).where(joints["hinge"] != 0).fillna(0.0).values
     instant, joint = np.unravel_index(turned.argmax(), turned.shape)
@@ -32,7 +33,7 @@ def test_the_verdict_says_what_was_largest_and_what_is_left(run):
 
 
 def test_each_mechanism_has_its_duration_and_opening(run):
-    counted, published, moved = run.verdict.splitlines()[1:]
+    counted, published, moved = run.verdict.splitlines()[2:]
     for line, found in (
         (counted, run.mechanism),
         (published, run.demirel_aldemir),
@@ -69,7 +70,7 @@ def test_a_calm_run_says_so(model, motion):
 
 def test_a_run_that_did_not_finish_says_so_first(model, motion):
     halted = af.time_history(model, motion, dt=0.005, until=af.CountedMechanism())
-    first, _, counted, *_ = halted.verdict.splitlines()
+    first, _, counted, *_ = halted.verdict.splitlines()[len(halted.doubts) :]
     assert first == f"outcome: {halted.outcome}"
     assert "a mechanism of arch by joint" in first
     assert f"{halted.time[-1]:.3f} s by joint" in counted
@@ -82,13 +83,13 @@ def test_the_verdict_of_files(run, tmp_path):
     assert af.History.read(path, run.structure).verdict == run.verdict
     alone = af.History.read(path).verdict.splitlines()
     assert alone[0] == run.verdict.splitlines()[0]
-    assert len(alone) == 3
+    assert len(alone) == 4
     new = ["opening", "rotation", "slip"]
     blocks = ["largest_displacement", "largest_displacement_time", "residual_displacement"]
     old = af.History(run.dataset.drop_vars([*new, *blocks, "block"]))
     read = af.History.read(old.save(tmp_path / "old.nc"), run.structure)
     assert extremes(read.dataset) == ""
-    counted, _, moved = read.verdict.splitlines()
+    _, counted, _, moved = read.verdict.splitlines()
     lasts = re.search(r"it lasts \S+ ms", run.verdict).group()
     assert f"{lasts} and closes again" in counted
     assert moved.startswith("verified: local")
