@@ -46,8 +46,14 @@ def test_notebooks_are_shipped_as_their_scripts_ran(name):
     assert (FOLDER / f"{name}.ipynb").stat().st_size < 6e6 / len(EXPECTED)
 
 
-LONG = ("05_speed_against_error", "06_a_roman_bridge")
-"""What these arrive at, tests of predicted errors and of the weight on bases check as well."""
+LONG = (
+    "02_how_thin_can_it_be",
+    "04_how_many_springs",
+    "05_speed_against_error",
+    "06_a_roman_bridge",
+    "07_from_first_hinge_to_the_ground",
+)
+"""What these arrive at, tests of what they are about check as well."""
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,7 @@ def test_share_of_a_case_is_checked_when_it_is_read(small):
         af.Case.read(small, ["analysis.damping.kind=mass"])
 
 
+@pytest.mark.slow
 def test_command(small, capsys):
     out = small.parent / "out"
     assert main(["modes", str(small), "--out", str(out), "--count", "3"]) == 0

@@ -2,6 +2,8 @@
 
 import os
 
+import pytest
+
 import archfem as af
 from archfem.cases import report as results
 
@@ -25,6 +27,7 @@ def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, undrawn,
     assert not results.is_written(run)
 
 
+@pytest.mark.slow
 def test_a_case_may_ask_for_a_free_body(tmp_path):
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     tables = {"structure": {**ring, "voussoirs": 9}, "output": {"free_body": "voussoir 3"}}

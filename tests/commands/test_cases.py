@@ -111,6 +111,7 @@ def told(small, shake):
     tell(case, af.cases.carried_out(case, out, shake=shake), out)
 
 
+@pytest.mark.slow
 def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     def broken_off(case, motion, *given):
         history = af.cases.shaken(case, motion, *given)

@@ -24,6 +24,7 @@ def test_six_horizontals_share_three_verticals():
     assert spectra[:, 0] == pytest.approx([1.5 * level.pga for level in levels])
 
 
+@pytest.mark.slow
 def test_synthetic_suite_is_matched_and_repeats():
     build = {"horizontals": 2, "verticals": 1, "duration": 8.0, "reduction": 3.0}
     suite = af.Suite.synthetic(CASE_STUDY, seed=11, **build)

@@ -40,6 +40,7 @@ def unscaled(study):
     study.write_text(study.read_text().replace("[0.3, 2.0]", "[1.0, 1.0]"))
 
 
+@pytest.mark.slow
 def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
     asked = af.studies.Comparison.read(study, QUICK)
     found = dict(compared(asked, tmp_path / "out"))

@@ -28,6 +28,7 @@ def test_values_that_do_not_settle_have_no_order_and_a_wide_bar():
     assert converged([4.0, 2.0, 1.0], [1.0, 1.0, 1.0]).error == 0.0
 
 
+@pytest.mark.slow
 def test_error_bar_of_a_ring_holds_its_converged_eccentricity():
     """The crown's |e| converges to 0.2853 (README); the springings have the largest."""
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}

@@ -139,6 +139,7 @@ def test_a_changed_case_is_told_apart(
     assert "6 points of other cases" in caplog.text
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_is_replaced(small_ring, tmp_path, finders, monkeypatch):
     monkeypatch.setattr("archfem.studies.processes.ATTEMPTS", 2)
     over = {"structure.thickness": [0.5, 0.6]}

@@ -59,7 +59,14 @@ def least():
 
 
 @pytest.mark.parametrize(
-    ("voussoirs", "ratio"), [(7, 0.0962), (11, 0.1049), (17, 0.1056), (27, 0.1068), (50, 0.1075)]
+    ("voussoirs", "ratio"),
+    [
+        (7, 0.0962),
+        (11, 0.1049),
+        (17, 0.1056),
+        pytest.param(27, 0.1068, marks=pytest.mark.slow),
+        pytest.param(50, 0.1075, marks=pytest.mark.slow),
+    ],
 )
 def test_semicircle_of_few_voussoirs(voussoirs, ratio, verified):
     found = af.minimum_thickness(lambda t: ring(t, voussoirs), friction=None)
@@ -84,6 +91,7 @@ def test_semicircle_with_a_joint_where_it_hinges(least, verified):
     assert [side for _, side in spread.hinges] == ["intrados", "extrados", "intrados"]
 
 
+@pytest.mark.slow
 def test_thrust_at_the_least_thickness_by_statics(least):
     """From extrados at the crown to extrados at the springing, H = V (1 - x_c / (R + t/2))."""
     joints = af.collapse_factor(
@@ -114,6 +122,7 @@ def test_friction_that_a_semicircle_needs(least, verified):
     )
 
 
+@pytest.mark.slow
 def test_below_that_friction_more_thickness_is_needed():
     free = af.minimum_thickness(lambda t: ring(t, 50), friction=None, tolerance=1e-5)
     assert af.stands(ring(1.0001 * free, 50, friction=0.40))

@@ -73,6 +73,7 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
     assert 1.0 / 2.0 < predicted.error / actual < 5.0
 
 
+@pytest.mark.slow
 def test_choice_climbs_as_the_tolerance_falls():
     structure, pga = SCENES["ring"]
     motion = af.Motion.synthetic(duration=1.5, pga=pga, seed=1)
@@ -122,7 +123,9 @@ def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
 
 @pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, float("nan")])
 def test_a_tolerance_that_cannot_be_meant(tolerance):
-    with pytest.raises(af.InvalidInput, match=r"tolerance .* is not (between 0 and 1|a finite number)"):
+    with pytest.raises(
+        af.InvalidInput, match=r"tolerance .* is not (between 0 and 1|a finite number)"
+    ):
         af.build(SCENES["ring"][0], fidelity="auto", tolerance=tolerance)
 
 

@@ -91,6 +91,7 @@ def test_the_restored_bridge_is_stiffer_and_nearer_its_centre_lines(dead):
     assert largest[1] < 0.7 * largest[0]
 
 
+@pytest.mark.slow
 def test_run_command_on_the_bridge(tmp_path, capsys):
     changes = [
         "model={ fidelity = { backfill = 'full', rest = 'rigid' }, cells = [2, 2] }",

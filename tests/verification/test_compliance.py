@@ -84,6 +84,7 @@ def test_history_is_that_of_snes(filled, rule, joints, scheme):
     assert np.abs(drift).max() < 1e-6  # of a joule, where hundreds are exchanged
 
 
+@pytest.mark.slow
 def test_steps_that_do_not_settle_are_left_to_snes(filled):
     model = af.build(filled, fidelity="rigid")
     equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (4.0, 20.0)))
@@ -118,6 +119,7 @@ class Laborious(Sparse):
         return super().of(equation)
 
 
+@pytest.mark.slow
 def test_the_fastest_strategy_is_taken_and_remembered(ring):
     model = af.build(glued(ring), fidelity="rigid", cells=(1, 1), quadrature="exact")
     equation = af.dynamics.Equation(model, STRONG, af.Rayleigh(0.05, (8.0, 16.0)), NEWMARK)
