@@ -52,6 +52,7 @@ def test_a_file_of_an_earlier_version_has_no_seal(written, tmp_path):
     assert read_dataset(tmp_path / "old.nc", "history").identical(dataset)
 
 
+@pytest.mark.slow
 def test_a_damaged_history_is_run_again(small, undrawn, capsys):
     """Of two finished pairs the one whose file has another byte is run again."""
     out = small.parent / "out"

@@ -89,6 +89,7 @@ def pulse(peak=8.0, duration=0.4, dt=0.05):
     )
 
 
+@pytest.mark.slow
 def test_a_block_that_slides_to_and_fro_rises_by_how_far_it_is_out():
     """Whatever the way there: at every step the rise is tan ψ |slid|, but for how it is pressed."""
     model = block(1e8, friction=0.3, dilatancy=0.15)

@@ -49,6 +49,7 @@ def test_a_slow_push_hinges_a_block_as_statics_says():
     assert "has no such joints" in found.table()
 
 
+@pytest.mark.slow
 def test_bounds_are_those_of_whole_runs(on_piers):
     """Each bound again, to the end of the motion, without the event that shortens runs."""
     motion = af.Motion.synthetic(duration=2.0, pga=6.0, seed=2)

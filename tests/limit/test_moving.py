@@ -68,6 +68,7 @@ def test_the_worst_place_is_that_of_the_least_factor():
     assert len(found.worst.hinges) == 4
 
 
+@pytest.mark.slow
 def test_the_vehicle_comes_on_and_leaves():
     found = over(arch_bridge(), *LORRY, fill=GRAVEL).factors
     axles, factors = found["axles"].values, found["factor"].values

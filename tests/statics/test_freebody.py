@@ -40,6 +40,7 @@ def test_forces_on_every_block_balance(request, name, rung):
     check_balance(model, af.dead_load(model).joints)
 
 
+@pytest.mark.slow
 def test_forces_on_every_block_of_a_bridge_balance(verified):
     """Soil joints, skewbacks and the backfill itself included."""
     model = af.build(af.Case.read(BRIDGE).structure, fidelity="full")

@@ -64,7 +64,7 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     [
         ("faces", "two at the crown"),
         ("condensed", "sideways"),
-        ("full", "two at the crown"),
+        pytest.param("full", "two at the crown", marks=pytest.mark.slow),
         pytest.param("faces", "sideways", marks=pytest.mark.slow),
         pytest.param("condensed", "two at the crown", marks=pytest.mark.slow),
         pytest.param("full", "sideways", marks=pytest.mark.slow),

@@ -111,6 +111,7 @@ def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, name, ins
     assert not [*folder.glob("*/*/*.json"), *folder.glob("thi*.json")]
 
 
+@pytest.mark.slow
 def test_a_case_that_does_not_stand_is_named(study, tmp_path):
     unscaled(study)
     study.write_text(study.read_text().replace("thickness=0.4", "thickness=0.1"))

@@ -102,6 +102,7 @@ def test_thrust_at_the_least_thickness_by_statics(least):
     assert float(joints["friction"][0]) == pytest.approx(expected, rel=1e-4)  # least: 1e-6
 
 
+@pytest.mark.slow
 def test_friction_that_a_semicircle_needs(least, verified):
     """It is H / V at the springing: 0.3953; 0.3958 with all weight on the centre line."""
     thickness = 1.00001 * least

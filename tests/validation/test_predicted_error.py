@@ -169,6 +169,7 @@ def test_without_a_motion_a_severe_one_is_assumed(ring):
     assert run.dataset.attrs["tolerance"] == model.prediction.pace
 
 
+@pytest.mark.slow
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
     motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
     model = choose(ring, 1e-9, motion, builder=quick)

@@ -81,6 +81,7 @@ def test_modes_of_a_trial(verified):
     verified(told, [3.03, 3.57, 4.22], "another mesh and program", found.frequencies)
 
 
+@pytest.mark.slow
 def test_the_restored_bridge_is_stiffer_and_nearer_its_centre_lines(dead):
     restored = af.cases.at_rest(case("prusias_restored"))
     first = [float(af.modes(each.model, 1, about=each).frequencies[0]) for each in (dead, restored)]
