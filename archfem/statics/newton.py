@@ -147,7 +147,7 @@ class Solver:
         return bool(rest <= 8.0 * np.finfo(float).eps * rounding)
 
     def _checked(self, tangent: Tangent) -> Tangent:
-        """Note how stiff the first tangent is; refuse methods for symmetric ones where one is not."""
+        """Note the stiffness of the first tangent; refuse methods for symmetric ones elsewhere."""
         # the first is that of the start; later ones may be of iterates that went anywhere
         chosen = self.settings.petsc
         asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
