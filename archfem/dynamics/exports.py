@@ -1,6 +1,8 @@
-"""What a run is written as for other programs: a base of `History`."""
+"""What a run is written as, for other programs and for people: a base of `History`."""
 
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -10,7 +12,10 @@ from archfem.models.model import Model
 
 
 class Exports:
-    """Files of a run for other programs."""
+    """Files of a run for other programs, and pages of it for people.
+
+    Pages are looked up when they are asked for, so that this room knows none that comes after it.
+    """
 
     dataset: xr.Dataset
 
@@ -59,3 +64,33 @@ class Exports:
         """
         names = [name for name, values in self.dataset.items() if "joint" in values.dims]
         return write_joint_table(self.dataset[names], path)
+
+    def player(self, model: Model | None = None, *, title: str = "") -> Any:
+        """Return the player of the run, as `archfem.view.player` does.
+
+        Args:
+            model: that made the run; needed where it has fields.
+            title: above the picture; by default the run's own.
+
+        Returns:
+            The player: it shows itself in a notebook, and can be saved as a page.
+
+        Raises:
+            InvalidInput: as `archfem.view.player` does.
+        """
+        return import_module("archfem.view.pages.player").player(self, model, title=title)
+
+    def report(self, path: str | Path) -> Path:
+        """Write a report of the run and the case that it is of: one HTML file, to print.
+
+        Args:
+            path: the file, .html; folders are made.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: the run was made in Python, and knows of no case.
+        """
+        written: Path = import_module("archfem.cases.dossier.writing").report_of(self, path)
+        return written

@@ -16,7 +16,8 @@ import numpy as np
 import archfem as af
 
 MESHES = Path(__file__).parents[2] / "meshes"
-MODEL = "model={ fidelity = { backfill = 'full', rest = 'faces' }, quadrature = 'exact' }"
+FIDELITY = "{ backfill = 'full', rest = 'faces' }"
+MODEL = f"model={{ fidelity = {FIDELITY}, quadrature = 'exact', cells = [2, 2] }}"
 
 
 def bridge(name: str, pairs: int) -> af.Case:

@@ -111,6 +111,19 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     assert "kept no displacements" in run.player().scene.data["note"]
 
 
+def test_a_history_has_them_too(kept, tmp_path):
+    """By the case that it keeps; one of a model made in Python has a player alone."""
+    run = af.History.read(kept / "first" / "history.nc")
+    words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
+    assert "a column <b>& more</b> under two pairs" in words
+    assert "first" in words
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    alone = af.time_history(model, af.Motion(np.array([0.0, 0.1, 0.0]), 0.01), dt=0.01)
+    with pytest.raises(af.InvalidInput, match="keeps no case to report on"):
+        alone.report(tmp_path / "none.html")
+    assert "<iframe" in alone.player()._repr_html_()
+
+
 def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
     text = small.read_text().split("[suite]")[0]
     (tmp_path / "case.toml").write_text(text)

@@ -2,12 +2,16 @@
 
 from pathlib import Path
 
+from archfem.cases.case import Case
 from archfem.cases.dossier.case_part import case_sections
 from archfem.cases.dossier.check_part import check_section, digest, source_section
 from archfem.cases.dossier.ground_part import ground_section
 from archfem.cases.dossier.rest_part import rest_sections
 from archfem.cases.dossier.results import Results
 from archfem.cases.dossier.run_part import facts_of, run_sections
+from archfem.cases.toml import tables_of
+from archfem.dynamics.history import History
+from archfem.errors import InvalidInput
 from archfem.view.pages.document import Document
 from archfem.view.pages.player import write_page
 
@@ -47,3 +51,30 @@ def write_report(results: Results, path: str | Path) -> Path:
         The file.
     """
     return write_page(path, document_of(results).page)
+
+
+def report_of(run: History, path: str | Path) -> Path:
+    """Write the report of one run, by the case that it keeps.
+
+    Args:
+        run: of a case.
+        path: as for `write_report`.
+
+    Returns:
+        The file.
+
+    Raises:
+        InvalidInput: the run keeps no case.
+    """
+    text = run.dataset.attrs.get("case")
+    if not text:
+        raise InvalidInput(
+            "this run was made in Python and keeps no case to report on: run.player(model) shows "
+            "it, and archfem.cases.carried_out runs a case"
+        )
+    case = Case.of(tables_of(text))
+    known = run if run.structure is not None else History(run.dataset, case.structure)
+    pairs, title = list((case.suite or {}).get("pairs", ())), run.dataset.attrs.get("title", "")
+    name = next((pair for pair in pairs if title.endswith(f": {pair}")), "run")
+    missing = tuple(pair for pair in pairs if pair != name)
+    return write_report(Results(case, {name: known}, missing=missing), path)
