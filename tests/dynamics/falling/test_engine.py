@@ -235,5 +235,4 @@ def test_an_arch_falls_under_a_pulse_as_by_joints_of_springs(duration, least):
         samples = np.full(round(duration / 1e-3) + 1, factor * least * G)
         motion = af.Motion(samples, 1e-3)
         frames = Falling(arch, dt=1e-3).frames(Loose.built(arch), 8.0, motion, spacing=0.1)
-        moved = [np.abs(frame.poses[:, :2]).max() for frame in frames]
-        assert bool(moved[-1] > 2.0) is wanted
+        assert any(np.abs(frame.poses[:, :2]).max() > 2.0 for frame in frames) is wanted
