@@ -1,6 +1,5 @@
 """Rings from a few lengths: weights, spans, and what is refused."""
 
-import math
 from math import radians
 
 import numpy as np
