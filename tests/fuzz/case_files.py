@@ -246,7 +246,7 @@ LUMPS = (
 
 def _torn(content: bytes, rng: np.random.Generator) -> bytes:
     """A file with a byte changed, a lump put in, a piece taken out, or its end cut off."""
-    at, kind = int(rng.integers(len(content))), rng.integers(5)
+    at, kind = int(rng.integers(len(content) + 1)), rng.integers(5)
     if kind == 0:
         return content[:at] + bytes([rng.integers(256)]) + content[at + 1 :]
     if kind == 1:
