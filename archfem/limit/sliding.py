@@ -68,11 +68,15 @@ class WithoutDilatancy:
 
     def __str__(self) -> str:
         """Where solutions lie, in one line."""
+        tried, led = self.starts
+        least, most = self.bracket
+        if not np.isfinite(least):
+            return "without dilatancy it does not either: no factor is too large"
         low, high = self.between
+        found = f"found from {low:.4g} to {high:.4g}" if led else "were not found"
         return (
-            f"solutions without dilatancy found from {low:.4g} to {high:.4g} "
-            f"({self.starts[1]} of {self.starts[0]} starts); all lie from {self.bracket[0]:.4g} to "
-            f"{self.bracket[1]:.4g}"
+            f"solutions without dilatancy {found} ({led} of {tried} starts); all lie from "
+            f"{least:.4g} to {most:.4g}"
         )
 
 

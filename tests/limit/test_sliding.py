@@ -292,3 +292,11 @@ def test_the_words_tell_names_and_where_solutions_lie():
     words = str(af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated"))
     assert "brick" in words
     assert "solutions without dilatancy found from" in words
+    pressed = af.collapse_factor(
+        af.column(breadth=1.0, heights=[1.0, 1.0]),
+        live=af.PointLoad(x=0.0, force=(0.0, -1e3)),
+        friction="nonassociated",
+    )
+    assert str(pressed.solutions) == (
+        "without dilatancy it does not either: no factor is too large"
+    )
