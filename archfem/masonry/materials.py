@@ -10,6 +10,9 @@ from archfem.units import G, GPa, MPa, kN
 DENSITIES = (1000.0, 4000.0)
 """Densities of soils and stones [kg/m³]; nothing that is built with has such a weight in N/m³."""
 
+WEAKEST = 1e3
+"""Compressive strength below which a number is a slip [Pa]."""
+
 
 def _require(holds: bool, what: str, remedy: str) -> None:
     if not holds:
@@ -62,8 +65,8 @@ class Material:
             f"give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have {self.unit_weight * G:.4g}",
         )
         _require(
-            self.strength is None or self.strength > 0.0,
-            f"strength {self.strength} Pa {of} is not positive",
+            self.strength is None or self.strength >= WEAKEST,
+            f"strength {self.strength} Pa {of} is below {WEAKEST:g} Pa, which nothing is built of",
             "leave it out where it is not known",
         )
 
