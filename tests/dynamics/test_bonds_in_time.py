@@ -46,6 +46,7 @@ def drift(energies):
     return np.abs(balance).max() / largest, energy[:, 3].min() / largest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [8e-3, pytest.param(2e-3, marks=pytest.mark.slow)])
 def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
     """m (g + t s̈) = N and m s̈ = -μ N: it stops after v² (1 + μ t) / (2 μ g), risen by t of that.
@@ -71,6 +72,7 @@ def test_a_block_thrown_up_its_teeth_stops_as_it_should(dt):
     assert lost == pytest.approx((friction - teeth) * 2e3 / along * way, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_without_teeth_and_bonds_nothing_changes():
     """Dilatancy 0 and tension 0 are the contact as it was, to the last bit of a history."""
     plain, given = block(1e8, friction=0.5), block(1e8, friction=0.5, dilatancy=0.0, tension=0.0)

@@ -100,6 +100,7 @@ def integrated(lag, normal=1e9, impacts=2):
     return np.sqrt(last / first) ** (1.0 / impacts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wanted", [0.97, pytest.param(0.95, marks=pytest.mark.slow), 0.92])
 def test_found_damping_gives_the_wanted_restitution(wanted):
     """To 1e-3, by the block's own equations, and by a run of the package on a finer scale."""

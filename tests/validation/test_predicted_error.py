@@ -89,6 +89,7 @@ def test_choice_climbs_as_the_tolerance_falls():
     assert tried[0] == 2 < tried[1]  # the steps, and the first model
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.005])
 def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_damping(ring, dt):
     built, asked = [], []

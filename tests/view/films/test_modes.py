@@ -8,6 +8,7 @@ import archfem as af
 from archfem.view.films.modes import FRAMES, film_modes
 
 
+@pytest.mark.slow
 def test_film_of_shapes(tmp_path):
     model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
     path = film_modes(af.modes(model, 2), tmp_path / "film.gif", [1])
