@@ -42,7 +42,9 @@ def check_file(path: str | os.PathLike[str], what: str, most: int = LARGEST) -> 
                 f"{place} has {found.st_size} bytes, and a {what} at most {most}: give that file"
             )
     except FileNotFoundError as error:
-        raise InvalidInput(f"there is no {what} {path}") from error
+        raise InvalidInput(
+            f"there is no {what} {path}: look at its name, and at the folder where it starts"
+        ) from error
     except InvalidInput:
         raise
     except (OSError, ValueError, TypeError) as error:

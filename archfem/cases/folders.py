@@ -1,6 +1,5 @@
 """Result folders opened again."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from archfem.cases.case import Case
 from archfem.cases.inputs import input_files
 from archfem.cases.kept import HISTORY
 from archfem.cases.reportable import Reportable
+from archfem.cases.toml import tables_in
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput
 
@@ -106,10 +106,7 @@ def _no_results(place: Path) -> str:
 def _case(place: Path, inputs: Path | None) -> Case:
     """Read the case of a folder, whose drawing stays where it was when the case was run."""
     path, start = place / CASE, place if inputs is None else inputs
-    try:
-        settings = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} is not TOML: {error}") from error
+    settings = tables_in(path, "case file")
     drawing = input_files({"structure": settings.get("structure")}, start)
     if drawing and not drawing[0].is_file():
         raise InvalidInput(

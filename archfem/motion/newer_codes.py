@@ -174,10 +174,7 @@ class Asce2022:
         Raises:
             InvalidInput: always.
         """
-        raise InvalidInput(
-            "ASCE 7-22 is here without its vertical spectrum: give one by points, as a "
-            "TableSpectrum with vertical_values"
-        )
+        raise InvalidInput(_without_vertical("ASCE 7-22"))
 
 
 _CUT = 0.02  # T_A [s], below which the ground's own acceleration is meant
@@ -261,10 +258,14 @@ class Eurocode2024:
         Raises:
             InvalidInput: always.
         """
-        raise InvalidInput(
-            "Eurocode 8 (2024) is here without its vertical spectrum: give one by points, as a "
-            "TableSpectrum with vertical_values"
-        )
+        raise InvalidInput(_without_vertical("Eurocode 8 (2024)"))
+
+
+def _without_vertical(code: str) -> str:
+    return (
+        f"{code} is here without its vertical spectrum: give one by points, as a TableSpectrum "
+        "with vertical_values"
+    )
 
 
 def _positive(value: float, name: str) -> float:
