@@ -10,6 +10,13 @@ ALL_MODES = 3e-8
 """Off in N, V, M, relative to the largest, by the modes of all nodes: ω² spans ten decades, and
 their rounding shows where a joint all but opens. Found 4e-9 to 1.4e-8; the banded one has 1e-12."""
 
+G = 9.81
+
+SLIP = 1e-3
+"""Off in the slip of a block, of itself: the closed form takes the block not to rock on its joint,
+which makes shear softer by 12 k_s/k_n (h/2b)² = 1 %, and the step is a quarter of a radian of its
+vibration. Found 1e-4 and 2.5e-4. A bed that is rigid until it slides is off by 0.09 at μ = 0.3."""
+
 
 @case("joints 1000 × softer", "dead load compresses by centimetres", stiffer=1e-3, quick=True)
 @case("joints 10 × softer", "the ring's own periods lengthen", stiffer=0.1)
@@ -35,24 +42,46 @@ def stiffness_of_elastic_stones(stiffer):
     return answer(run, off(run, exact), 1e-6)
 
 
-@case("friction 0.01", "slides for seconds after a push", quick=True)
-def slippery():
-    """A block on ground that is pushed at a for T slips by (a - μg) a T² / (2 μg), and stays."""
-    friction, push, last, step = 0.01, 1.0, 0.199, 0.001  # half a step less at each end
-    times = np.arange(0.0, 4.0, step)
-    motion = af.Motion(np.where((times > 0.0) & (times < 0.2), push, 0.0), step)
-    block = af.column(breadth=1.0, heights=[0.5], contact=joints(friction=friction))
-    model = af.build(block, fidelity="rigid")
-    record = af.Record(every=10, fields_every=10)
-    run = shaken(model, motion, dt=step, record=record, damping=None)
-    hold = friction * 9.81
-    known = (push - hold) * push * last**2 / (2.0 * hold)
-    slipped = abs(run.dataset["last_q"].values[0])
+@case("friction 0.01", "slides for seconds after a push", friction=0.01, push=1.0, quick=True)
+@case("friction 0.3", "elastic shear lends it speed", friction=0.3, push=3.5, quick=True)
+def slippery(friction, push, last=0.2, step=5e-4):
+    """A block on ground that is pushed slips as far as an elastic-plastic oscillator does."""
+    hold = friction * G
+    times = np.arange(0.0, 1.2 * push * last / hold, step)
+    pushed = (times > step / 2.0) & (times < last + step / 2.0)
+    motion = af.Motion(np.where(pushed, push, 0.0), step)
+    block = af.column(breadth=4.0, heights=[0.5], contact=joints(friction=friction))
+    run = shaken(af.build(block, fidelity="rigid"), motion, dt=step, damping=None)
+    stone, contact = block.blocks[1], block.joints[0].contact
+    square = contact.shear_stiffness * G / (stone.material.unit_weight * 0.5)
+    known = _slip(hold, push, last, step, square)
+    slipped = np.abs(run.joints["slip"].values).max()
     error = float(abs(slipped / known - 1.0))
-    use = run.joints["V"].values / run.joints["N"].values
-    held = np.abs(use).max() < (1.0 + 1e-6) * friction
-    said = f"slips by {slipped:.4f} m, V/N to {np.abs(use).max():.4f}"
-    return Found(said, bool(error < 0.005 and held), error, run)
+    use = np.abs(run.joints["V"].values / run.joints["N"].values).max()
+    said = f"slips by {slipped:.4f} m, V/N to {use:.4f}"
+    return Found(said, bool(error < SLIP and use < (1.0 + 1e-6) * friction), error, run)
+
+
+def _slip(hold, push, last, step, square):
+    """Farthest slip [m] after a push a for T whose ends are ramps of a step r, in closed form.
+
+    Shear grows with ω² per unit mass up to μ g, at y = μ g / ω². The push reaches that while the
+    block lags behind, which is then faster by v than a rigid bed would have it: to first order the
+    slip is (a - μ g) a T² / (2 μ g) + v a T / (μ g), and v may be a tenth of what the push gives.
+    """
+    way, yields = np.sqrt(square), hold / square
+    along = push * (1.0 / square - np.sin(way * step) / (way**3 * step))  # at the end of the ramp
+    speed = push * (1.0 - np.cos(way * step)) / (square * step)
+    size = np.hypot(along - push / square, speed / way)
+    ahead = np.arctan2(speed / way, along - push / square)
+    until = (ahead - np.arccos((yields - push / square) / size)) / way % (2.0 * np.pi / way)
+    speed = way * size * np.sin(ahead - way * until)
+    left = last - step - until
+    slip = yields + left * (speed + left * (push - hold) / 2.0)
+    speed += left * (push - hold)
+    slip += step * (speed + step * (push / 3.0 - hold / 2.0))
+    speed += step * (push / 2.0 - hold)
+    return slip + speed**2 / (2.0 * hold)
 
 
 def _compared(rung, rule, pga, method):
