@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from archfem.arguments import instance, real
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
 from archfem.dynamics.probe import severe_motion, strongest, usual_damping
@@ -146,18 +148,16 @@ def choose(
         considered.append((label(asked), in_model + in_time))
         if in_model <= allowed:
             break
+    by_chance = yardstick.by_chance(_cheapest(found), steps)
     in_model, asked, model = min(found, key=lambda each: (each[0] > allowed, each[0]))
-    error = in_model + in_time
+    error = max(in_model, by_chance) + in_time
     if displacements == "large":
         small, model = 0.0, builder(structure, replace(asked, displacements=displacements))
     else:
         small = error_of_small(yardstick, steps)
-    told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tuple(considered), small)
-    chosen, doubts = model.predicted(told), []
-    if not told.met:
-        doubts.append(_unmet(told, in_model <= allowed))
-    if small > tolerance:
-        doubts.append(_far(small, tolerance))
+    tried = tuple(considered)
+    told = Prediction(error, in_time, tolerance, steps.dt, steps.pace, tried, small, by_chance)
+    chosen, doubts = model.predicted(told), _doubts(told, in_model, allowed)
     for words in doubts:
         logger.warning("%s", words)
     chosen.doubts = (*model.doubts, *doubts)
@@ -196,15 +196,35 @@ def _climbed(
     for level in LEVELS:
         if level is not LEVELS[0]:
             finer = builder(structure, best(structure, level))
-            yardstick = Yardstick(finer, yardstick.window, yardstick.damping)
+            yardstick = yardstick.by(finer)
         for asked in candidates(structure, level):
             model = before[1] if asked == before[0] else builder(structure, asked)
             yield asked, model, yardstick.in_model(model, steps)
 
 
-def _unmet(told: Prediction, model_errs_little: bool) -> str:
+def _cheapest(found: list[tuple[float, Discretisation, Model]]) -> Model:
+    """The first model that did not fail; the first of all where each did."""
+    return next((model for error, _, model in found if error < np.inf), found[0][2])
+
+
+def _doubts(told: Prediction, in_model: float, allowed: float) -> list[str]:
+    """What is doubtful of a choice, a sentence each."""
+    doubts = []
+    if not told.met:
+        doubts.append(_unmet(told, in_model, allowed))
+    if told.of_small > told.tolerance:
+        doubts.append(_far(told.of_small, told.tolerance))
+    return doubts
+
+
+def _unmet(told: Prediction, in_model: float, allowed: float) -> str:
     """Why a tolerance is not met, and what to do."""
-    if not model_errs_little:
+    if told.of_chance > max(in_model, allowed):
+        remedy = (
+            "impacts decide: by motions 1 and 2 % weaker and stronger so much of the largest |e| "
+            "is chance, which no finer model lessens; shake by several motions, and judge by all"
+        )
+    elif in_model > allowed:
         remedy = "no finer mesh is tried: ask for one by fidelity and cells, and compare"
     elif told.dt:
         remedy = "the time step errs: leave dt out, and steps choose their length"

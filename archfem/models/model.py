@@ -32,6 +32,8 @@ class Prediction:
             steps alone, then of models with the steps taken.
         of_small: error of taking displacements as small, which no finer model lessens [-];
             infinite where blocks fall that small displacements let stand.
+        of_chance: what impacts leave to chance of the largest |e|, by how far it is from growing
+            evenly over motions 1 and 2 % weaker and stronger [-]; no error is predicted below it.
     """
 
     error: float
@@ -41,6 +43,7 @@ class Prediction:
     pace: float | None
     considered: tuple[tuple[str, float], ...]
     of_small: float = 0.0
+    of_chance: float = 0.0
 
     @property
     def met(self) -> bool:
@@ -55,7 +58,8 @@ class Prediction:
         return (
             f"predicted to err by {self.error:.2g} in the largest |e|, of which {self.in_time:.2g} "
             f"by steps of {steps}, and by {self.of_small:.2g} because displacements are taken as "
-            f"small; {self.tolerance:g} was asked for (tried: {tried})"
+            f"small; {self.tolerance:g} was asked for (tried: {tried}); impacts leave "
+            f"{self.of_chance:.2g} to chance"
         )
 
 

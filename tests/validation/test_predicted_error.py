@@ -17,14 +17,22 @@ from archfem.models.rigid import rigid
 
 STIFF = af.Contact(1.48e10, 0.3e10)
 SCENES = {
-    "ring": (af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17), 1.7),
-    "semicircle": (af.circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15), 0.6),
+    "ring": (af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17), 1.7, 1),
+    "semicircle": (
+        af.circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15),
+        0.6,
+        1,
+    ),
     "stiff joints": (
         af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, contact=STIFF),
         1.7,
+        1,
     ),
-    "column": (af.column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6),
+    "column": (af.column(breadth=1.0, heights=[1.0, 1.0, 1.0]), 1.6, 1),
+    "rocking block": (af.column(breadth=0.6, heights=[2.4]), 1.8, 9),
+    "slender block": (af.column(breadth=0.5, heights=[2.5]), 1.9, 7),
 }
+"""Structures, the peak of the motion that shakes each [m/s²], and its seed."""
 
 FILLED = {"backfill": "full", "rest": "condensed"}
 
@@ -45,12 +53,14 @@ def damping_of(structure):
         pytest.param("ring", marks=pytest.mark.slow),
         pytest.param("semicircle", marks=pytest.mark.slow),
         pytest.param("stiff joints", marks=pytest.mark.slow),
+        pytest.param("rocking block", marks=pytest.mark.slow),
+        pytest.param("slender block", marks=pytest.mark.slow),
     ],
 )
 def scene(request):
     """A structure, its motion and damping, and the peaks of a finer model over all of it."""
-    structure, pga = SCENES[request.param]
-    motion = af.Motion.synthetic(duration=12.0, pga=pga, seed=1)
+    structure, pga, seed = SCENES[request.param]
+    motion = af.Motion.synthetic(duration=12.0, pga=pga, seed=seed)
     damping = damping_of(structure)
     finest = af.build(structure, fidelity="condensed", cells=(12, 12), quadrature="exact")
     return structure, motion, damping, peaks(finest, motion, damping, 0.00125)
@@ -62,6 +72,7 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
 
     What models and what steps err by is predicted as a sum, though one may make up for the other:
     the prediction is held against each of them apart, from above, and against both, from below.
+    Where impacts decide it may be larger, by what they leave to chance, and says so.
     """
     structure, motion, damping, reference = scene
     model = af.build(
@@ -75,12 +86,14 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
     of_model = largest_difference(in_short_steps, reference)
     assert actual <= tolerance or not predicted.met
     assert predicted.error > actual / 2.0
-    assert predicted.error < 3.0 * (of_steps + of_model)
+    assert predicted.error < 3.0 * max(of_steps + of_model, predicted.of_chance)
+    said = any("impacts decide" in words for words in model.doubts)
+    assert said or predicted.of_chance <= max(tolerance - predicted.in_time, tolerance / 2.0)
 
 
 @pytest.mark.slow
 def test_choice_climbs_as_the_tolerance_falls():
-    structure, pga = SCENES["ring"]
+    structure, pga, _ = SCENES["ring"]
     motion = af.Motion.synthetic(duration=1.5, pga=pga, seed=1)
     tried = [
         len(af.build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
@@ -191,7 +204,7 @@ def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
     tried = [name for name, _ in told.considered]
     assert len(tried) == 1 + sum(len(level.rungs) for level in LEVELS)
     assert all(name in told.text for name in tried)
-    assert [name for name, error in told.considered if error == told.error]
+    assert min(error for _, error in told.considered[1:]) <= told.error
 
 
 @pytest.mark.slow
