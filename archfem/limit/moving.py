@@ -15,7 +15,8 @@ from archfem.errors import InvalidInput
 from archfem.limit.collapse import Collapse, collapse_factor
 from archfem.limit.fill import Fill
 from archfem.limit.filled import Stones
-from archfem.limit.programme import Programme
+from archfem.limit.programme import Optimum, Programme
+from archfem.limit.sliding import some_starts, weakest_from
 from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import PointLoad
 from archfem.masonry.structure import Structure
@@ -27,6 +28,13 @@ POSITIONS = 101
 
 UNFELT = 1e-9
 """Part of a vehicle's weight that reaches the stones below which they do not feel it."""
+
+
+CHANCES = 2
+"""States by chance from which sliding without dilatancy is searched at each place."""
+
+Row = tuple[PointLoad, ...]
+"""Axles that stand on the structure, from left to right."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +75,9 @@ def moving_load(
     At each place the vehicle is a row of vertical point loads on the road, which grow together
     over self-weight (`collapse_factor`): through a fill they spread in fans, elsewhere they stand
     on the stones. Axles before and behind the structure do nothing. The programme is made once,
-    and only its live load moves; sliding without dilatancy is searched anew at each place.
+    and only its live load moves. Sliding without dilatancy is searched at each place from what was
+    found beside it and from a few states more, and by the whole search of `collapse_factor` at the
+    worst place, and where nothing is found.
 
     Args:
         structure: the bridge.
@@ -104,15 +114,15 @@ def moving_load(
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     factors = np.full(count.shape, np.nan)
     if balanced(dead.unbalanced(), dead):
-        found = {
-            row: _factor(stones, dead, row, options)
-            for row in dict.fromkeys((*rows["right"], *rows["left"]))
-        }
+        places_of = tuple(dict.fromkeys((*rows["right"], *rows["left"])))
+        found = _factors(stones, dead, places_of, options)
         factors[:] = [[found[row] for row in rows[sense]] for sense in DIRECTIONS]
     way, place = _worst(factors, count)
     direction = DIRECTIONS[way]
     live = list(rows[direction][place])
     worst = collapse_factor(structure, live=live, **options)
+    if friction == "nonassociated":
+        factors[way, place] = worst.factor  # by the whole search, which may find a weaker state
     return MovingLoad(_dataset(places, factors, count), worst, direction, float(places[place]))
 
 
@@ -147,9 +157,7 @@ def _places(structure: Structure, vehicle: Array, positions: Sequence[float] | N
     return np.linspace(low - half, high + half, POSITIONS)
 
 
-def _row(
-    structure: Structure, vehicle: Array, direction: str, position: float
-) -> tuple[PointLoad, ...]:
+def _row(structure: Structure, vehicle: Array, direction: str, position: float) -> Row:
     """The axles that stand on the structure, from left to right."""
     sense = 1.0 if direction == "right" else -1.0
     axles = sorted((position + sense * ahead, weight) for weight, ahead in vehicle.tolist())
@@ -163,17 +171,53 @@ def _under(structure: Structure, x: float) -> bool:
     )
 
 
-def _factor(
-    stones: Stones, dead: Programme, row: tuple[PointLoad, ...], options: dict[str, Any]
-) -> float:
-    """Collapse factor of the axles at one place, by the programme made once where that can be."""
-    load = stones.load(row)
-    if np.abs(load).max() <= UNFELT * -sum(axle.force[1] for axle in row):
-        return np.inf
+def _factors(
+    stones: Stones, dead: Programme, rows: Sequence[Row], options: dict[str, Any]
+) -> dict[Row, float]:
+    """Collapse factor of each row of axles, by the programme made once where that can be."""
+    found = dict.fromkeys(rows, np.inf)
+    loads = {row: stones.load(row) for row in rows}
+    felt = {
+        row: dead.growing(load)
+        for row, load in loads.items()
+        if np.abs(load).max() > UNFELT * -sum(axle.force[1] for axle in row)
+    }
+    associated = {row: programme.solve() for row, programme in felt.items()}
+    states = associated
     if options["friction"] == "nonassociated":
-        return collapse_factor(stones.whole, live=list(row), **options).factor
-    found = dead.growing(load).solve()
-    return np.inf if found is None else -found.value
+        states = _without_dilatancy(felt, associated)
+    for row, state in states.items():
+        if state is not None:
+            found[row] = -state.value
+        elif associated[row] is not None:  # the whole search, or a bound
+            found[row] = collapse_factor(stones.whole, live=list(row), **options).factor
+    return found
+
+
+def _without_dilatancy(
+    felt: dict[Row, Programme], associated: dict[Row, Optimum | None]
+) -> dict[Row, Optimum | None]:
+    """Search states that slide without dilatancy from place to place, for the weakest of each.
+
+    Each search starts from the associated optimum, from a few states by chance, and from what was
+    found at the place before; then once more from what was found at the place behind.
+
+    Returns:
+        The weakest state that was found at each; None where none was.
+    """
+    states: dict[Row, Optimum | None] = dict.fromkeys(felt)
+    for back in (False, True):
+        beside: list[Array] = []
+        for seed, row in enumerate(reversed(felt) if back else felt):
+            programme, start, known = felt[row], associated[row], states[row]
+            starts = list(beside)
+            if not back:
+                starts += some_starts(programme, start, CHANCES, seed)
+            found = weakest_from(programme, starts)
+            if known is None or (found is not None and found.value > known.value):
+                states[row] = known = found
+            beside = [] if known is None else [known.forces]
+    return states
 
 
 def _worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:

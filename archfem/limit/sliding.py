@@ -12,6 +12,7 @@ for given forces: a bilinear programme over two separate polyhedra, searched fro
 solving for one and the other in turn.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,12 +116,44 @@ def without_dilatancy(
     return weakest, _checked(programme, weakest, gap, known)
 
 
+def weakest_from(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
+    """Return the weakest state without dilatancy that is found from given forces, or None.
+
+    Args:
+        programme: with Coulomb's limits.
+        starts: forces at the joints (3 n_joints,) each [mean block weights], as solutions under
+            loads near by have them.
+    """
+    found = [state for forces in starts if (state := _solution(programme, forces))]
+    return max((state for state, _ in found), key=lambda state: state.value, default=None)
+
+
+def some_starts(programme: Programme, start: Optimum | None, number: int, seed: int) -> list[Array]:
+    """Return forces from which to search: the associated optimum's, and so many by chance.
+
+    Args:
+        programme: with Coulomb's limits.
+        start: its optimum, with associated sliding; None where it has no limit.
+        number: of those by chance; fewer where equilibrium permits none of them.
+        seed: of chance.
+    """
+    tried = _vertices(programme, start, number, np.random.default_rng(seed))
+    return tried if start is None else [start.forces, *tried]
+
+
 def _starts(programme: Programme, start: Optimum | None) -> list[Array]:
     """Forces of the associated optimum, and of vertices of what equilibrium permits."""
-    chance = np.random.default_rng(0)
-    tried = [] if start is None else [start.forces]
     joints = len(programme.blocks.structure.depths)
-    for _ in range(max(2, STARTS * min(joints, JOINTS) ** 2 // joints**2)):
+    number = max(2, STARTS * min(joints, JOINTS) ** 2 // joints**2)
+    return some_starts(programme, start, number, 0)
+
+
+def _vertices(
+    programme: Programme, start: Optimum | None, number: int, chance: np.random.Generator
+) -> list[Array]:
+    """Forces of so many vertices of what equilibrium permits; fewer where there are none."""
+    tried = []
+    for _ in range(number):
         try:
             state = _vertex(programme, start, chance)
         except DidNotConverge:  # no state of equilibrium under so much load
@@ -143,7 +176,8 @@ def _vertex(
     live, others = programme.columns[:, :1], programme.columns[:, 1:]
     if start is None:
         column = float(abs(live).sum())
-        size = 10.0 ** chance.uniform(-1, 1) * float(np.abs(programme.load).sum()) / column
+        weight = float(np.abs(programme.load).sum())
+        size = 10.0 ** chance.uniform(-1, 1) * weight / column if column > 0.0 else 0.0
     else:
         size = float(chance.random() * start.unknowns[0])
     load = programme.load - live @ np.array([size])

@@ -5,6 +5,7 @@ import pytest
 from backfilled import SOIL, arch_bridge, fill_of
 
 import archfem as af
+from archfem.limit.programme import Programme
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
@@ -54,6 +55,28 @@ def test_each_place_is_a_row_of_point_loads(fill, direction):
         here = found.sel(direction=direction, position=place)
         assert int(here["axles"]) == len(live)
         assert float(here["factor"]) == pytest.approx(expected, rel=EXACT)
+
+
+def test_sliding_flat_is_searched_from_place_to_place(monkeypatch):
+    """As weak as by the whole search at each place, in a fifth of its programmes."""
+    solved, solve = [], Programme.solve
+    monkeypatch.setattr(Programme, "solve", lambda self: solved.append(self) or solve(self))
+    slick = af.Contact(1.48e9, 0.3e9, 0.3)
+    structure, places = ring(voussoirs=9, contact=slick), np.linspace(-2.0, 2.0, 9)
+    found = over(structure, 60e3, positions=places, friction="nonassociated")
+    swept = len(solved)
+    whole = [
+        af.collapse_factor(
+            structure, live=af.PointLoad(place, (0.0, -60e3)), friction="nonassociated"
+        ).factor
+        for place in places[2:4]
+    ]
+    each = (len(solved) - swept) / len(whole)
+    factors = found.factors["factor"].sel(direction="right").values
+    assert factors[2:4] == pytest.approx(whole, rel=EXACT)
+    assert factors == pytest.approx(factors[::-1], rel=1e-4)
+    assert found.worst.factor == factors.min()
+    assert swept < each * (1.0 + len(places) / 5.0)  # the worst place by the whole search, too
 
 
 def test_the_worst_place_is_that_of_the_least_factor():
