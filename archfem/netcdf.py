@@ -51,7 +51,7 @@ def write_dataset(
 
 
 def read_dataset(path: str | Path, what: str) -> xr.Dataset:
-    """Return what is in a NetCDF file.
+    """Return what is in a NetCDF file, which is read once, seal and all.
 
     Args:
         path: the file; one of an earlier version has no seal.
@@ -68,7 +68,9 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     if seal and digest != _digest(before):
         raise damaged
     try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
+        inside = netCDF4.Dataset(Path(path).name, memory=before if seal else content)
+        store = xr.backends.NetCDF4DataStore(inside)  # type: ignore[no-untyped-call]
+        with xr.open_dataset(store) as opened:
             dataset = opened.load()
     except Exception as error:  # of HDF5, NetCDF or xarray, as it happens to be damaged
         raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error

@@ -27,6 +27,16 @@ def test_a_file_holds_what_was_written(written):
         assert plain["N"].equals(dataset["N"])
 
 
+def test_a_file_is_read_once(written, monkeypatch):
+    """What is taken to be sound is what is read: the file is gone before its numbers are wanted."""
+    dataset, path = written
+    content = path.read_bytes()
+    monkeypatch.setattr(
+        "archfem.netcdf.content_of", lambda path, what, largest: path.unlink() or content
+    )
+    assert read_dataset(path, "history").identical(dataset)
+
+
 def test_any_damage_is_known(written):
     """Each of 100 files is cut off, or has a byte changed, left out or put in, seal included."""
     _, path = written

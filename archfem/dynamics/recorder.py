@@ -205,6 +205,7 @@ class Recorder:
         self._add_coordinates(dataset)
         dataset.attrs |= {
             "title": f"{structure.name}: {motion.name or 'time history'}",
+            "motion": motion.name,
             "outcome": outcome,
             "ended": str(ended),
             "fidelity": self.model.fidelity,

@@ -114,9 +114,11 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
 def test_a_history_has_them_too(kept, tmp_path):
     """By the case that it keeps; one of a model made in Python has a player alone."""
     run = af.History.read(kept / "first" / "history.nc")
+    run.dataset.attrs["title"] = "of another name: second"  # what it ran is told by `motion` alone
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
     assert "a column <b>& more</b> under two pairs" in words
-    assert "first" in words
+    assert run.dataset.attrs["motion"] == "first"
+    assert "runs of first" not in words
     model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
     alone = af.time_history(model, af.Motion(np.array([0.0, 0.1, 0.0]), 0.01), dt=0.01)
     with pytest.raises(af.InvalidInput, match="keeps no case to report on"):

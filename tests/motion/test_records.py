@@ -88,6 +88,16 @@ def test_real_records_have_their_published_count_and_peak(recorded, name, dt, co
         assert reached == pytest.approx(peak, abs=digits * 1.001)
 
 
+def test_what_no_ground_does_is_refused_however_it_is_read(write):
+    """Beyond 5 g it is a wrong unit, of which file is told; one of two columns may be sound."""
+    path = write("0.1 0.1\n0.2 -60.0\n0.0 0.1\n0.1 0.0\n")
+    given = {"units": "m/s2", "dt": 0.01}
+    for read in (read_channels, read_components, af.Motion.read):
+        with pytest.raises(af.InvalidInput, match=rf"{path.name}: .* 6.12 g, more than 5 g"):
+            read(path, column=2, **given)
+        read(path, column=1, **given)
+
+
 def test_a_downward_vertical_is_turned_up(recorded):
     # The first sample of the file is -0.4595648E-03 g, positive downwards.
     motion = af.Motion.read(

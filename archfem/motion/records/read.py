@@ -5,6 +5,7 @@ from os import PathLike
 from typing import Protocol
 
 from archfem.errors import InvalidInput
+from archfem.motion import signals
 from archfem.motion.records import afad, columns, cosmos, csmip, esm, knet, peer, smc
 from archfem.motion.records.channel import Channel
 from archfem.motion.records.text import RecordText
@@ -90,7 +91,8 @@ def read_channels(
         The channels in the order of the file, accelerations in m/s², verticals upwards.
 
     Raises:
-        InvalidInput: the file cannot be read as an accelerogram without doubt; names file and line.
+        InvalidInput: the file cannot be read as an accelerogram without doubt, or a channel is none
+            that `signals.checked` lets pass, such as one beyond 5 g; names file and line.
     """
     text = RecordText.opened(path)
     if units is not None:
@@ -99,14 +101,24 @@ def read_channels(
         raise InvalidInput(f"dt {dt!r} is a number in seconds and column {column!r} a whole number")
     form = next((form for form in _FORMATS if form.recognises(text)), None)
     if form is None:
-        return columns.read(text, column=column, units=units, dt=dt)
+        return _sound(text, columns.read(text, column=column, units=units, dt=dt))
     channels = form.read(text)
     if units is not None or dt is not None:
         raise text.error(
             "this format states its units and its step itself: leave out units= and dt="
         )
     if column is None:
-        return channels
+        return _sound(text, channels)
     if not 1 <= column <= len(channels):
         raise InvalidInput(f"{text.path} has {len(channels)} components: column {column} is none")
-    return [channels[column - 1]]
+    return _sound(text, [channels[column - 1]])
+
+
+def _sound(text: RecordText, channels: list[Channel]) -> list[Channel]:
+    """The channels, once each is such as any motion must be."""
+    for channel in channels:
+        try:
+            signals.checked(channel.samples, channel.direction or "recorded")
+        except InvalidInput as error:
+            raise InvalidInput(f"{text.path}: {error}") from error
+    return channels
