@@ -8,9 +8,11 @@ refined.
 import logging
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from tqdm import tqdm
 
 from archfem.arguments import instance, real
 from archfem.dynamics.candidates import LEVELS, best, candidates, label
@@ -34,6 +36,9 @@ Damping = Viscous | Callable[[Model], Viscous | None] | None
 Builder = Callable[[Structure, Discretisation], Model]
 
 logger = logging.getLogger("archfem")
+
+RUNS = 8
+"""That a choice takes as a rule: two of steps, one or two of models, four of motions near by."""
 
 FINEST = 1e-4
 """Smallest tolerance of |e| by which steps are tried: 0.5 ms or so where a ring is shaken [-]."""
@@ -140,15 +145,16 @@ def choose(
     """
     Discretisation(displacements=displacements)  # refuses what is neither small nor large
     first = builder(structure, best(structure, LEVELS[0]))
-    yardstick = _yardstick(first, motion, damping)
-    steps, in_time, considered = _steps(yardstick, tolerance, dt)
-    allowed, found = max(tolerance - in_time, tolerance / 2.0), []
-    for asked, model, in_model in _climbed(structure, yardstick, steps, builder):
-        found.append((in_model, asked, model))
-        considered.append((label(asked), in_model + in_time))
-        if in_model <= allowed:
-            break
-    by_chance = yardstick.by_chance(_cheapest(found), steps)
+    with tqdm(total=RUNS, unit="run", disable=None, leave=False, desc="choosing a model") as bar:
+        yardstick = _yardstick(first, motion, damping, partial(_told, bar))
+        steps, in_time, considered = _steps(yardstick, tolerance, dt)
+        allowed, found = max(tolerance - in_time, tolerance / 2.0), []
+        for asked, model, in_model in _climbed(structure, yardstick, steps, builder):
+            found.append((in_model, asked, model))
+            considered.append((label(asked), in_model + in_time))
+            if in_model <= allowed:
+                break
+        by_chance = yardstick.by_chance(_cheapest(found), steps)
     in_model, asked, model = min(found, key=lambda each: (each[0] > allowed, each[0]))
     error = max(in_model, by_chance) + in_time
     if displacements == "large":
@@ -162,6 +168,12 @@ def choose(
         logger.warning("%s", words)
     chosen.doubts = (*model.doubts, *doubts)
     return chosen
+
+
+def _told(bar: tqdm) -> None:
+    """Count a run; where more are needed than was thought, another is to come."""
+    bar.total = max(bar.total, bar.n + 2)
+    bar.update()
 
 
 def _steps(
@@ -243,7 +255,9 @@ def _far(error: float, tolerance: float) -> str:
     )
 
 
-def _yardstick(finest: Model, motion: Motion | None, damping: Damping) -> Yardstick:
+def _yardstick(
+    finest: Model, motion: Motion | None, damping: Damping, told: Callable[[], object]
+) -> Yardstick:
     """The finest model of the first level; what is not known of the run is assumed."""
     structure = finest.structure
     soil = bool(soft_blocks(structure))
@@ -252,6 +266,7 @@ def _yardstick(finest: Model, motion: Motion | None, damping: Damping) -> Yardst
         finest,
         strongest(motion) if motion is not None else severe_motion(probe),
         damping_for(finest, damping) or usual_damping(probe),
+        told,
     )
 
 

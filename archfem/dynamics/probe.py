@@ -12,7 +12,9 @@ from archfem.joints.criteria import judged
 from archfem.masonry.actions import BodyForce
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium, equilibrium_under, self_weight
+from archfem.statics.equilibrium import Equilibrium, dead_load, self_weight
+from archfem.statics.newton import Solver
+from archfem.statics.search import found_nearby
 
 WINDOW = 8.0
 """Length of the part of a motion on which errors are predicted, its peak in the middle [s]."""
@@ -38,11 +40,14 @@ def severe_motion(model: Model) -> Motion:
     Args:
         model: any rung of the ladder; its judged joints tell.
     """
-    weight, low, high = self_weight(model), 0.0, 2.0
+    solver, rest = Solver(model.size), dead_load(model)
+    low, high = 0.0, 2.0
     for _ in range(10):
         middle = 0.5 * (low + high)
-        try:
-            joints = equilibrium_under(model, weight + model.load(BodyForce(middle))).joints
+        load = self_weight(model) + model.load(BodyForce(middle))
+        try:  # from the dead load in a few full steps: a long search under too large a load is idle
+            pushed, found = found_nearby(solver, rest.model, load, rest.q)
+            joints = Equilibrium(pushed, found.q, 1, found.iterations).joints
             severe = float(abs(judged(joints)["eccentricity"]).max()) > SEVERE
         except DidNotConverge:
             severe = True

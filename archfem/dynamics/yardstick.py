@@ -14,6 +14,7 @@ than models differ by, and two may agree by luck. Motions a little weaker and st
 of the largest |e| is left to chance: nothing is predicted to err by less.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -70,11 +71,13 @@ class Yardstick:
         model: the finest.
         window: the part of the motion.
         damping: of all runs.
+        told: called after each run.
     """
 
     model: Model
     window: Motion
     damping: Viscous | None
+    told: Callable[[], object] = lambda: None
     _known: dict[tuple[Model, Steps, float], Array] = field(default_factory=dict)
     _dead: dict[Model, Equilibrium] = field(default_factory=dict)
 
@@ -149,4 +152,5 @@ class Yardstick:
                 tolerance=steps.pace,
                 start=self._dead[model],
             )
+            self.told()
         return self._known[asked]

@@ -1,10 +1,12 @@
 """By how much errors in the strongest part of a motion are enlarged before they are promised."""
 
+import io
 import logging
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 import archfem as af
 from archfem.dynamics.ladder import choose
@@ -50,18 +52,29 @@ def test_what_does_not_grow_evenly_with_the_motion_is_chance(yardstick):
     assert yardstick.by_chance("falling", STEPS) == np.inf
 
 
+@pytest.fixture
+def shown(monkeypatch):
+    """What is seen of progress, as on a terminal."""
+    out = io.StringIO()
+    seen = {"disable": False, "file": out, "mininterval": 0.0}
+    monkeypatch.setattr("archfem.dynamics.ladder.tqdm", lambda **given: tqdm(**given | seen))
+    return out
+
+
 def rigid(structure, asked):
     """As many models as are asked for, all the same: they agree, whatever they err by."""
     return plain(structure, replace(asked, fidelity="rigid"))
 
 
 @pytest.mark.parametrize(("pga", "rocks"), [(2.3, True), (0.5, False)])
-def test_models_that_agree_promise_no_more_than_impacts_leave(pga, rocks, caplog):
+def test_models_that_agree_promise_no_more_than_impacts_leave(pga, rocks, caplog, shown):
     """A slender block that rocks: a motion 1 % stronger makes another bounce the highest."""
     motion = af.Motion.synthetic(duration=2.5, pga=pga, seed=7)
     with caplog.at_level(logging.WARNING, "archfem"):
         model = choose(BLOCK, 0.002, motion, dt=0.005, builder=rigid)
     told = model.prediction
+    assert "choosing a model" in shown.getvalue()
+    assert "7/8" in shown.getvalue()  # two of steps, one model that others are compared with, four
     assert told.error == pytest.approx(told.in_time + told.of_chance)
     assert ("impacts decide" in caplog.text) is rocks
     assert any("impacts decide" in words for words in model.doubts) is rocks
