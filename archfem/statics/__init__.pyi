@@ -1,3 +1,4 @@
+from .ends import Stop as Stop
 from .equilibrium import Equilibrium as Equilibrium
 from .equilibrium import dead_load as dead_load
 from .equilibrium import equilibrium_under as equilibrium_under
@@ -7,7 +8,6 @@ from .freebody import forces_on as forces_on
 from .modes import Modes as Modes
 from .newton import Newton as Newton
 from .pushover import Pushover as Pushover
-from .pushover import Stop as Stop
 from .strength import joint_stress as joint_stress
 from .strength import strength_use as strength_use
 from .strength import strength_use_over as strength_use_over

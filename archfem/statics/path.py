@@ -8,13 +8,16 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem.arrays import Array
+from archfem.errors import DidNotConverge
 from archfem.masonry.actions import BodyForce, PointLoad
 from archfem.models.gauges import Gauges
 from archfem.models.model import Model
+from archfem.models.moving import Moving
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.lasting import ROUNDS, lasts, upset
 from archfem.statics.loading import Load
-from archfem.statics.newton import ROUGHLY, magnitude
+from archfem.statics.newton import ROUGHLY, Solver, magnitude
+from archfem.statics.search import found_or_crept
 
 TOLERANCE, ITERATIONS = 1e-9, 30
 """Force left out of balance, relative to the sum of all loads; Newton's iterations in a step."""
@@ -142,6 +145,32 @@ class LoadPath:
         x = np.append(self.states[-1], self.factors[-1])
         target = (row @ x)[0] + distance
         return self._reached(row, target, distance, 0.0, x + distance / length * step)
+
+    def creep(self, grown: float, farthest: float) -> bool:
+        """Add the equilibrium to which the structure creeps under a load that has grown.
+
+        Where many joints slide, full steps of Newton's method lead nowhere although the structure
+        bears more. Blocks that may turn far do not creep.
+
+        Args:
+            grown: growth of the factor [-].
+            farthest: displacement of the load beyond which it has given way [m].
+
+        Returns:
+            Whether there is one.
+        """
+        q, factor = self.states[-1], self.factors[-1] + grown
+        load = self.dead + factor * self.load.forces(q)
+        if isinstance(self.model, Moving):
+            return False
+        try:
+            model, solved = found_or_crept(Solver(len(q)), self.model, load, q)
+        except DidNotConverge:
+            return False
+        if self.load.moved(solved.q) - self.load.moved(self.states[0]) > farthest:
+            return False
+        self._add(model, np.append(solved.q, factor), solved.iterations)
+        return True
 
     def _reached(
         self,

@@ -8,19 +8,18 @@ import xarray as xr
 
 from archfem.arguments import instance
 from archfem.arrays import Array
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, flagged
 from archfem.joints.resultants import joint_dataset, one_joint
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
 from archfem.shown import Shown
+from archfem.statics.ends import Path, Stop, crept, finished, stuck
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
 from archfem.threads import on_one_thread
-
-Path = LoadPath | SupportPath
 
 CONTROLS = ("displacement", "arc length", "path", "force")
 
@@ -34,32 +33,6 @@ giving up."""
 
 FASTER, EASY = 1.4, 4
 """Growth of steps across the last one where Newton's method needs few iterations, and how many."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stop:
-    """When a pushover ends, whichever comes first.
-
-    Attributes:
-        slope: tangent of the curve relative to its initial tangent [-].
-        displacement: of the loaded point, relative to the structure's size [-].
-        hinges: number of hinged joints, or None not to count them.
-        steps: number of steps.
-    """
-
-    slope: float = 1e-6
-    displacement: float = 0.1
-    hinges: int | None = None
-    steps: int = 400
-
-    def __post_init__(self) -> None:
-        """Refuse what would stop at once, or never."""
-        if not 0.0 <= self.slope < 1.0:
-            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
-        if not (self.displacement > 0.0 and self.steps >= 1):
-            raise InvalidInput(
-                f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"
-            )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,7 +106,9 @@ def pushover(
     where d = f_live·q / |f_live| is the displacement of the load along itself: a = 0 is control by
     force, b = 0 by displacement, and for arc length (a, b) is the direction of the last step, in
     units of the first, so that it turns from one to the other as the curve bends (Riks). Steps
-    grow by a tenth each, and are halved where Newton's method fails.
+    grow by a tenth each, and are halved where Newton's method fails. Where it fails altogether
+    and joints slide, as those of fill in pieces do, the load grows on by itself as long as the
+    structure creeps to rest under it.
 
     Displacements are small and the joint law is the gradient of a convex energy: the curve never
     falls nor snaps back, but rises to the limit of rigid blocks as an asymptote. The thrust at a
@@ -212,40 +187,15 @@ def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
         if not found:
             distance /= 2.0
             if distance < SMALLEST:
-                return _stuck(path, control)
+                return crept(path, stop, criteria) or stuck(path, control, criteria)
             continue
         last = np.array([path.displacements[-2:], path.factors[-2:]])
         moved = np.diff(last)[:, 0] / np.array(path.unit)
         direction = moved / np.linalg.norm(moved)
-        if reason := _finished(path, stop, criteria, moved):
+        if reason := finished(path, stop, criteria, moved):
             return reason
         easy = control == "path" and path.iterations[-1] <= EASY
         distance *= FASTER if easy else GROWTH
-
-
-def _finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | None:
-    """The rule that is met, in words, or None."""
-    slope, reached = abs(float(moved[1] / moved[0])), float(path.displacements[-1])
-    if slope <= stop.slope:
-        return f"the slope fell to {slope:.2g} of the initial one"
-    if path.factors[-1] <= 0.0 and path.units == "1":
-        return "it bears no load any more"
-    if reached >= stop.displacement * path.model.structure.size:
-        return f"the {path.moving} moved by {reached:.3g} m"
-    if stop.hinges is not None:
-        joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
-        count = int((joints["hinge"] != 0).sum())
-        if count >= stop.hinges:
-            return f"{count} joints hinge"
-    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
-
-
-def _stuck(path: Path, control: str) -> str:
-    """Say that no further equilibrium was found; under force control that is the limit."""
-    if len(path.states) == 1:
-        raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
-    what = "the load cannot grow beyond" if control == "force" else "no equilibrium was found past"
-    return f"{what} a factor of {path.factors[-1]:.5g}"
 
 
 def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints.resultants import joint_dataset
 from archfem.statics.equilibrium import self_weight
 from archfem.statics.newton import Solver
+from archfem.statics.path import LoadPath
 from archfem.statics.relaxation import relaxed
 
 REST = 1e-10
@@ -90,3 +92,29 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
     assert found.outcome.startswith("the support moved by")
     assert at_most_coulomb(fill, found.joints, 10e3)
     assert found.factor < 0.9 * float(found.curve["factor"][0])
+
+
+def test_a_load_on_fill_in_pieces_goes_on_by_creep(bridge):
+    """Each state is in balance and none beyond Coulomb; what cannot be borne adds none."""
+    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    dead = af.dead_load(af.build(fill, fidelity="rigid", cells=(2, 1)))
+    path = LoadPath.of(dead.model, [af.BodyForce(1.0)], dead)
+    assert path.creep(0.1, farthest=0.5)
+    rest = path.dead + 0.1 * path.load.first - path.model.force(path.states[-1])
+    assert np.linalg.norm(rest) <= REST * np.abs(path.dead).sum()
+    joints = joint_dataset(fill, path.resisted[-1])
+    assert at_most_coulomb(fill, joints, 10e3)
+    assert not path.creep(0.01, farthest=1e-6)  # it moves farther than that
+    assert path.factors == [0.0, 0.1]
+
+
+@pytest.mark.slow
+def test_a_pushover_of_fill_in_pieces_goes_on_where_newton_fails(bridge):
+    """Steps by displacement alone end at 0.21, by force at 0.06, of what limit analysis gives."""
+    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
+    model, load = af.build(fill, fidelity="rigid", cells=(2, 1)), af.BodyForce(1.0)
+    most = af.collapse_factor(fill, live=load).factor
+    found = af.pushover(model, load, control="force")
+    assert 0.66 * most < found.factor < most
+    assert "the load cannot grow beyond a factor of" in found.outcome
+    assert "pieces of fill flow" in found.outcome
