@@ -86,7 +86,8 @@ def crept(path: Path, stop: Stop, criteria: Criteria) -> str | None:
         if not path.creep(share * path.factors[-1], farthest):
             share /= 2.0
             continue
-        moved = np.diff([path.displacements[-2:], path.factors[-2:]])[:, 0] / np.array(path.unit)
+        last = np.array([path.displacements[-2:], path.factors[-2:]])
+        moved = np.diff(last)[:, 0] / np.array(path.unit)
         if reason := finished(path, stop, criteria, moved):
             return reason
     return None

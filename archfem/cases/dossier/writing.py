@@ -75,6 +75,6 @@ def report_of(run: History, path: str | Path) -> Path:
     case = Case.of(tables_of(text))
     known = run if run.structure is not None else History(run.dataset, case.structure)
     pairs, motion = list((case.suite or {}).get("pairs", ())), run.dataset.attrs.get("motion")
-    name = motion if motion in pairs else "run"
+    name = str(motion) if motion in pairs else "run"
     missing = tuple(pair for pair in pairs if pair != name)
     return write_report(Results(case, {name: known}, missing=missing), path)
