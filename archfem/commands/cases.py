@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from archfem.cases.case import Case
-from archfem.cases.run import Rest, Result, Run, carried_out, expected_damping
+from archfem.cases.run import Rest, Result, Run, carried_out
 from archfem.commands.line import DOUBTFUL
 from archfem.dynamics.history import Ending, History
 from archfem.errors import DidNotConverge, InvalidInput
@@ -70,22 +70,17 @@ def motion(given: argparse.Namespace) -> None:
 
 
 def accuracy(given: argparse.Namespace) -> None:
-    """Run a case over rungs, meshes, rules and steps: table and picture.
+    """Run a case over rungs, meshes, rules and steps, or go on with it: table and picture.
 
     Args:
-        given: `case`, a file, `changes` to it, and the folder `out`.
+        given: `case`, a file, `changes` to it, the folder `out`, and `workers`.
     """
     from archfem.cases.report import write_accuracy
     from archfem.cases.summary import accuracy_words
-    from archfem.dynamics.tradeoff import accuracy as compared
+    from archfem.studies.tradeoff import case_accuracy
 
     case, folder = Case.read(given.case, given.changes), result_folder(given.out)
-    found = compared(
-        case.structure,
-        case.ground_motion(),
-        damping=expected_damping(case),
-        tolerance=case.tolerance,
-    )
+    found = case_accuracy(case, folder / "settings", workers=given.workers)
     text = accuracy_words(found)
     print(text)
     _tell_written(write_accuracy(found, text, folder))
