@@ -1,0 +1,190 @@
+"""The strategy for joints that slide: Newton's method on the whole structure, its tangent sparse.
+
+Where many points open or slide at once, the problem in those alone is as large as that of the
+structure, and dense. Here each pass solves
+
+    (K + μ M + ν R - Gᵀ λ' G) w = r + Gᵀ (λ - λ' z),
+
+as a narrow band, or in dense panels of which those that no joint touches, as inside a fill, are
+eliminated once. So a pass takes as long however many points slide.
+"""
+
+import itertools
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from numba.extending import overload
+from scipy import sparse
+
+from archfem.arrays import Array
+from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
+from archfem.dynamics.stepping.band_lu import banded, half_width
+from archfem.dynamics.stepping.banded import narrow
+from archfem.dynamics.stepping.elimination import Elimination, Indices
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.linear import Gaps, Linear, gaps_of, reordered, solve
+from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
+from archfem.dynamics.stepping.path_law import PathLaw
+from archfem.dynamics.stepping.sparse_rows import trimmed
+from archfem.dynamics.stepping.strategy import Reordered
+from archfem.dynamics.stepping.tangent_newton import Pairs, Room, sought
+
+WIDE = 40
+"""Half-width of a band from which panels take its place."""
+
+ENTRY = 2e-5
+"""What ordering and factorising take, for each entry of the mass matrix [s]."""
+
+
+class TangentSystem(NamedTuple):
+    """A structure's matrices in the order in which its tangent is eliminated.
+
+    Attributes:
+        linear: its matrices by rows.
+        half: half-width of the tangent's band, 0 where it is in panels.
+        closed: entries of the tangent with all joints closed, of the band row by row.
+        panels: layout of the entries where they are in panels.
+        pairs: rows of gaps of which one changes the force at another, and entries that this changes.
+        room: for what is found in a step.
+    """
+
+    linear: Linear
+    half: int
+    closed: Array
+    panels: Panels
+    pairs: Pairs
+    room: Room
+
+
+class Tangent(Reordered):
+    """Steps by Newton's method with the tangent of the whole structure.
+
+    Args:
+        equation: of motion, by the conserving scheme.
+    """
+
+    name: ClassVar[str] = "tangent"
+
+    def __init__(self, equation: Equation) -> None:
+        self._equation, self._elimination = equation, None
+        pattern = _pattern(equation)
+        order, _ = narrow(pattern)
+        if half_width(pattern[order][:, order]) >= WIDE:
+            self._elimination = Elimination.of(pattern)
+            order = self._elimination.order
+        super().__init__(order)
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """Return the strategy, or None where steps are not by the mean, or no joint can slide.
+
+        Args:
+            equation: of motion.
+        """
+        joints = equation.joints
+        fits = joints is not None and equation.conserving and joints.slides
+        return cls(equation) if fits else None
+
+    @property
+    def setup(self) -> float:
+        """Estimate of the time until the first step can be taken [s]."""
+        return ENTRY * float(self._equation.model.mass.nnz)
+
+    def system(self, dt: float) -> TangentSystem:
+        """Return all that steps of this length need.
+
+        Args:
+            dt: time step [s].
+        """
+        equation, order = self._equation, self.order
+        linear = reordered(equation, order, dt)
+        law, numbers = linear.law, linear.numbers
+        assert isinstance(law, PathLaw)
+        closed = (
+            trimmed(equation.model.closed())
+            + numbers.inertia * trimmed(equation.model.mass)
+            + numbers.rate * trimmed(equation.rest)
+        )[order][:, order].tocsr()
+        pairs, changed = _blocks(linear.opening, _pairs(law))
+        if self._elimination is None:
+            half = half_width(_pattern(equation)[order][:, order])
+            entries, panels = banded(closed, half).ravel(), _NO_PANELS
+            places = changed[0] * (3 * half + 1) + half + changed[1] - changed[0]
+        else:
+            half, panels = 0, panels_of(closed, self._elimination, changed)
+            entries, places = panels.base, panels.added
+        room, pairs = Room.of(law, len(order), len(entries), len(pairs.rows)), pairs._replace(places=places)
+        return TangentSystem(linear, half, entries, panels, pairs, room)
+
+
+_NO_PANELS = NO_PANELS._replace(added=np.zeros(0, np.int64))
+
+
+def _pairs(law: PathLaw) -> Indices:
+    """Rows of gaps at which λ changes, and by which: of stretches, then of slips (q, 2)."""
+    parts, found = law.stretches, []
+    for near, far in zip(parts["near"], parts["far"], strict=True):
+        found += [(near, near), (near, far), (far, near), (far, far)]
+    stretch, openings = law.points["stretch"], len(law.stiffness)
+    for group in range(len(law.along)):
+        row, last = openings + group, -1
+        found.append((row, row))
+        for point in law.members[law.first[group] : law.first[group + 1]]:
+            if stretch[point] != last:
+                last = stretch[point]
+                found += [(row, parts["near"][last]), (row, parts["far"][last])]
+    return np.array(found, np.int64)
+
+
+def _blocks(opening: Any, pairs: Indices) -> tuple[Pairs, Indices]:
+    """Pairs block by block, and rows and columns of the entries that these change (2, m)."""
+    indptr, indices, _ = opening
+    moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
+    found: dict[Any, list[int]] = {}
+    for number, (row, column) in enumerate(pairs):
+        found.setdefault((moved[row], moved[column]), []).append(number)
+    others = [np.unique(pairs[each, 1], return_inverse=True) for each in found.values()]
+    ends = [np.meshgrid(*key, indexing="ij") for key in found]
+
+    def starts(parts: Any) -> Indices:
+        return np.cumsum([0, *map(len, parts)])
+
+    changed = np.concatenate([np.stack([each.ravel() for each in end]) for end in ends], axis=1)
+    return Pairs(
+        pairs,
+        np.concatenate([*found.values()]),
+        starts(found.values()),
+        np.concatenate([each[0] for each in others]),
+        starts([each[0] for each in others]),
+        np.concatenate([each[1] for each in others]),
+        np.cumsum([0, *(end[0].size for end in ends)]),
+        np.zeros(0, np.int64),
+    ), changed.astype(np.int64)
+
+
+def _pattern(equation: Equation) -> sparse.csr_matrix:
+    """All entries that the tangent may have, as ones."""
+    model = equation.model
+    rows: Gaps = gaps_of(equation, 1.0)
+    assert isinstance(rows.law, PathLaw)
+    pairs, count = _pairs(rows.law), rows.gaps.shape[0]
+    coupled = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), (count, count))
+    touched = abs(trimmed(rows.gaps))
+    parts = [abs(trimmed(each)) for each in (model.mass, equation.rest, model.closed())]
+    pattern = sum(parts) + touched.T @ (coupled + coupled.T) @ touched
+    return sparse.csr_matrix((np.ones(pattern.nnz), pattern.indices, pattern.indptr))
+
+
+@overload(solve)
+def _solve(system, vector, gap, before, force):  # type: ignore
+    return _solved if getattr(system, "instance_class", None) is TangentSystem else None
+
+
+def _solved(system, vector, gap, before, force):  # type: ignore
+    """Solve a step: from its right side to the contact, in place; leaves gaps and λ.
+
+    Returns:
+        Passes; -1 if they do not settle.
+    """
+    before[:] = gap
+    return sought(system, vector, gap, force)
