@@ -24,7 +24,7 @@ from archfem.dynamics.stepping.elimination import Elimination, Indices
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Gaps, Linear, gaps_of, reordered, solve
 from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
-from archfem.dynamics.stepping.path_law import PathLaw
+from archfem.dynamics.stepping.path_law import PathLaw, pairs_of
 from archfem.dynamics.stepping.sparse_rows import trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 from archfem.dynamics.stepping.tangent_newton import Pairs, Room, sought
@@ -105,7 +105,7 @@ class Tangent(Reordered):
             + numbers.inertia * trimmed(equation.model.mass)
             + numbers.rate * trimmed(equation.rest)
         )[order][:, order].tocsr()
-        pairs, changed = _blocks(linear.opening, _pairs(law))
+        pairs, changed = _blocks(linear.opening, pairs_of(law)[0])
         if self._elimination is None:
             half = half_width(_pattern(equation)[order][:, order])
             entries, panels = banded(closed, half).ravel(), _NO_PANELS
@@ -118,22 +118,6 @@ class Tangent(Reordered):
 
 
 _NO_PANELS = NO_PANELS._replace(added=np.zeros(0, np.int64))
-
-
-def _pairs(law: PathLaw) -> Indices:
-    """Rows of gaps at which λ changes, and by which: of stretches, then of slips (q, 2)."""
-    parts, found = law.stretches, []
-    for near, far in zip(parts["near"], parts["far"], strict=True):
-        found += [(near, near), (near, far), (far, near), (far, far)]
-    stretch, openings = law.points["stretch"], len(law.stiffness)
-    for group in range(len(law.along)):
-        row, last = openings + group, -1
-        found.append((row, row))
-        for point in law.members[law.first[group] : law.first[group + 1]]:
-            if stretch[point] != last:
-                last = stretch[point]
-                found += [(row, parts["near"][last]), (row, parts["far"][last])]
-    return np.array(found, np.int64)
 
 
 def _blocks(opening: Any, pairs: Indices) -> tuple[Pairs, Indices]:
@@ -167,7 +151,7 @@ def _pattern(equation: Equation) -> sparse.csr_matrix:
     model = equation.model
     rows: Gaps = gaps_of(equation, 1.0)
     assert isinstance(rows.law, PathLaw)
-    pairs, count = _pairs(rows.law), rows.gaps.shape[0]
+    pairs, count = pairs_of(rows.law)[0], rows.gaps.shape[0]
     coupled = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), (count, count))
     touched = abs(trimmed(rows.gaps))
     parts = [abs(trimmed(each)) for each in (model.mass, equation.rest, model.closed())]

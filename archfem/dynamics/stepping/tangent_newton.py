@@ -17,7 +17,7 @@ from archfem.dynamics.stepping.newton_pass import taken_out
 from archfem.dynamics.stepping.panel_lu import back, eliminated
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
-from archfem.dynamics.stepping.sliding_points import FALLS, LEAST, TRIES, WHOLE
+from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE
 from archfem.dynamics.stepping.small_problem import ROUNDED, SETTLED, largest
 from archfem.dynamics.stepping.sparse_rows import row_times
 from archfem.joints.moving.compiled import computing
