@@ -48,8 +48,10 @@ class Chain(NamedTuple):
 
 _NONE = np.zeros(0, np.int64)
 
+_EMPTY = np.zeros((0, 1))
+
 NO_CHAIN = Chain(
-    0, _NONE, 3 * (_NONE,), *(3 * (np.zeros((0, 1)),)), np.zeros(0), np.zeros((4, 0))
+    0, _NONE, (_NONE, _NONE, _NONE), _EMPTY, _EMPTY, _EMPTY, np.zeros(0), np.zeros((4, 0))
 )
 """Where neighbours are not few."""
 
@@ -79,10 +81,16 @@ def chain_of(rows: sparse.csr_matrix, blocks: sparse.csr_matrix, rates: Any, par
     loose = sorted_rows @ splu(blocks.tocsc()).solve(sorted_rows.T.toarray())
     closed = np.eye(count) + loose @ rates[order][:, order].toarray()
     known = np.argsort(order), np.arange(parts[0]), np.arange(parts[1], count)
-    matrix = np.zeros((count + half, 2 * half + 1))
-    bands = (_band(each, half) for each in (loose, closed))
-    room = matrix, np.zeros(count + half), np.zeros((4, count))
-    return Chain(half, order.astype(np.int64), known, *bands, *room)
+    return Chain(
+        half,
+        order.astype(np.int64),
+        known,
+        _band(loose, half),
+        _band(closed, half),
+        np.zeros((count + half, 2 * half + 1)),
+        np.zeros(count + half),
+        np.zeros((4, count)),
+    )
 
 
 def _band(matrix: Array, half: int) -> Array:

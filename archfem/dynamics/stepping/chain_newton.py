@@ -6,7 +6,6 @@ rates say; each further one takes what λ lacks of what the gaps ask for.
 
 from typing import Any
 
-import numba
 import numpy as np
 
 from archfem.dynamics.stepping.newton_pass import rates, taken_out
@@ -119,9 +118,15 @@ def _summed(chain, entries, count):  # type: ignore
 
 
 def _solving(half: int | None) -> Any:
-    """Gauss's elimination in a band of rows that go beyond its end, without exchanges.
+    """Return what solves a system of a band in place, by Gauss's elimination without exchanges.
 
-    Where its half-width is known as it is compiled that takes half the time.
+    Rows go on beyond the end. If the half-width is known as this is compiled it takes half as long.
+
+    Args:
+        half: of the band, None where it is given with each system.
+
+    Returns:
+        A function of the band (r + h, 2 h + 1), the right side (r + h,) and the half-width.
     """
 
     def solve(matrix, right, given):  # type: ignore
@@ -160,13 +165,13 @@ def _went(law, careful):  # type: ignore
     """Go by the changes, or so far that λ errs less; returns the largest error of it [N]."""
     chain, share, gone = law.chain, 1.0, 0.0
     force, wanted, move, along = chain.rooms
-    before, order, guess = _left(force, wanted)[1], chain.order, law.guess
+    before, order, guess = lacking(force, wanted)[1], chain.order, law.guess
     while True:
         for k in range(len(order)):
             guess[order[k]] += (share - gone) * along[k]
             force[k] += (share - gone) * move[k]
         _asked(law, wanted)
-        off, total = _left(force, wanted)
+        off, total = lacking(force, wanted)
         if not careful or share <= LEAST or total <= (1.0 - FALLS * share) * before:
             return off
         share, gone = 0.5 * share, share
@@ -182,8 +187,13 @@ def _asked(law, wanted):  # type: ignore
 
 
 @computing
-def _left(force, wanted):  # type: ignore
-    """The largest error of λ, and the sum of their squares."""
+def lacking(force, wanted):  # type: ignore
+    """Return the largest error of λ, and the sum of their squares.
+
+    Args:
+        force: λ (r,) [N].
+        wanted: that the gaps ask for (r,) [N].
+    """
     most, total = 0.0, 0.0
     for k in range(len(force)):
         off = wanted[k] - force[k]

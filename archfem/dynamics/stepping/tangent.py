@@ -5,8 +5,9 @@ structure, and dense. Here each pass solves
 
     (K + μ M + ν R - Gᵀ λ' G) w = r + Gᵀ (λ - λ' z),
 
-as a narrow band, or in dense panels of which those that no joint touches, as inside a fill, are
-eliminated once. So a pass takes as long however many points slide.
+in dense panels, of which those that no joint touches, as inside a fill, are eliminated once. So a
+pass takes as long however many points slide; and its tangent serves the next ones while it does.
+Blocks that make a chain need none of this: their joints have a band of their own (`chain`).
 """
 
 import itertools
@@ -16,21 +17,15 @@ import numpy as np
 from numba.extending import overload
 from scipy import sparse
 
-from archfem.arrays import Array
 from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
-from archfem.dynamics.stepping.band_lu import banded, half_width
-from archfem.dynamics.stepping.banded import narrow
 from archfem.dynamics.stepping.elimination import Elimination, Indices
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Gaps, Linear, gaps_of, reordered, solve
-from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
+from archfem.dynamics.stepping.panel_lu import Panels, panels_of
 from archfem.dynamics.stepping.path_law import PathLaw, pairs_of
 from archfem.dynamics.stepping.sparse_rows import trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 from archfem.dynamics.stepping.tangent_newton import Pairs, Room, sought
-
-WIDE = 40
-"""Half-width of a band from which panels take its place."""
 
 ENTRY = 2e-5
 """What ordering and factorising take, for each entry of the mass matrix [s]."""
@@ -41,16 +36,12 @@ class TangentSystem(NamedTuple):
 
     Attributes:
         linear: its matrices by rows.
-        half: half-width of the tangent's band, 0 where it is in panels.
-        closed: entries of the tangent with all joints closed, of the band row by row.
-        panels: layout of the entries where they are in panels.
-        pairs: rows of gaps of which one changes the force at another, and entries that this changes.
+        panels: the tangent with all joints closed, to which they add.
+        pairs: rows of gaps of which one changes the force at another, and entries of the tangent.
         room: for what is found in a step.
     """
 
     linear: Linear
-    half: int
-    closed: Array
     panels: Panels
     pairs: Pairs
     room: Room
@@ -66,24 +57,21 @@ class Tangent(Reordered):
     name: ClassVar[str] = "tangent"
 
     def __init__(self, equation: Equation) -> None:
-        self._equation, self._elimination = equation, None
-        pattern = _pattern(equation)
-        order, _ = narrow(pattern)
-        if half_width(pattern[order][:, order]) >= WIDE:
-            self._elimination = Elimination.of(pattern)
-            order = self._elimination.order
-        super().__init__(order)
+        self._equation, self._elimination = equation, Elimination.of(_pattern(equation))
+        super().__init__(self._elimination.order)
 
     @classmethod
     def of(cls, equation: Equation) -> Self | None:
-        """Return the strategy, or None where steps are not by the mean, or no joint can slide.
+        """Return the strategy, or None where no joint can slide, or blocks make a chain.
 
         Args:
             equation: of motion.
         """
         joints = equation.joints
-        fits = joints is not None and equation.conserving and joints.slides
-        return cls(equation) if fits else None
+        if joints is None or not equation.conserving or not joints.slides:
+            return None
+        law = gaps_of(equation, 1.0).law
+        return None if isinstance(law, PathLaw) and law.chain.half > 0 else cls(equation)
 
     @property
     def setup(self) -> float:
@@ -106,18 +94,9 @@ class Tangent(Reordered):
             + numbers.rate * trimmed(equation.rest)
         )[order][:, order].tocsr()
         pairs, changed = _blocks(linear.opening, pairs_of(law)[0])
-        if self._elimination is None:
-            half = half_width(_pattern(equation)[order][:, order])
-            entries, panels = banded(closed, half).ravel(), _NO_PANELS
-            places = changed[0] * (3 * half + 1) + half + changed[1] - changed[0]
-        else:
-            half, panels = 0, panels_of(closed, self._elimination, changed)
-            entries, places = panels.base, panels.added
-        room, pairs = Room.of(law, len(order), len(entries), len(pairs.rows)), pairs._replace(places=places)
-        return TangentSystem(linear, half, entries, panels, pairs, room)
-
-
-_NO_PANELS = NO_PANELS._replace(added=np.zeros(0, np.int64))
+        panels = panels_of(closed, self._elimination, changed)
+        room = Room.of(law, len(order), len(panels.base), len(pairs.rows))
+        return TangentSystem(linear, panels, pairs._replace(places=panels.added), room)
 
 
 def _blocks(opening: Any, pairs: Indices) -> tuple[Pairs, Indices]:

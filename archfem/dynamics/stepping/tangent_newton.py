@@ -11,20 +11,18 @@ import numba
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.band_lu import eliminate
+from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE, lacking
 from archfem.dynamics.stepping.elimination import Indices
 from archfem.dynamics.stepping.newton_pass import taken_out
 from archfem.dynamics.stepping.panel_lu import back, eliminated
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
-from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE
 from archfem.dynamics.stepping.small_problem import ROUNDED, SETTLED, largest
 from archfem.dynamics.stepping.sparse_rows import row_times
 from archfem.joints.moving.compiled import computing
 
-
 SLOWLY = 0.1
-"""Part of the error of λ that a pass by a tangent of a pass before may leave; else it is renewed."""
+"""Part of the error of λ that a pass by an earlier tangent may leave; else that is renewed."""
 
 
 class Pairs(NamedTuple):
@@ -96,10 +94,22 @@ class Room(NamedTuple):
         """
         rows = np.arange(len(law.start))
         known = rows, np.arange(len(law.stretches)), rows[len(law.stiffness) :].copy()
-        vectors = [np.zeros(size) for _ in range(3)]
-        forces = [np.zeros(len(rows)) for _ in range(5)]
-        line = np.zeros(size)
-        return cls(np.zeros(entries), np.zeros(pairs), *vectors, *forces, line, known)
+        contact, change, image, line = np.zeros((4, size))
+        force, wanted, along, move, left = np.zeros((5, len(rows)))
+        return cls(
+            np.zeros(entries),
+            np.zeros(pairs),
+            contact,
+            change,
+            image,
+            force,
+            wanted,
+            along,
+            move,
+            left,
+            line,
+            known,
+        )
 
 
 @numba.njit(cache=True)
@@ -140,7 +150,7 @@ def _settled(system, right, gap, until, afresh):  # type: ignore
     _asked(law, system.room)
     if not _first(system, right, afresh):
         return -1
-    last, off = largest(law, law.guess), _left(system.room)[0]
+    last, off = largest(law, law.guess), lacking(system.room.force, system.room.wanted)[0]
     for passes in range(1, TRIES + 1):
         if off <= enough or last <= off <= ROUNDED * enough:
             return passes
@@ -153,10 +163,10 @@ def _settled(system, right, gap, until, afresh):  # type: ignore
 
 @computing
 def _first(system, right, renew):  # type: ignore
-    """Go from a guess of the gaps to contact in balance, λ as its rates say; whether it is found."""
+    """Go from a guess of the gaps to contact in balance, λ as its rates say; whether it is."""
     law, room, rows = system.linear.law, system.room, system.linear.opening
     wanted, force, guess, contact = room.wanted, room.force, law.guess, room.contact
-    if renew or system.half > 0:
+    if renew:
         _rated(law, room.rates)
     for row in range(len(force)):
         force[row], room.along[row] = wanted[row], law.offset[row] - guess[row]
@@ -179,7 +189,7 @@ def _first(system, right, renew):  # type: ignore
 def _direction(system, renew):  # type: ignore
     """Find changes of contact, gaps and λ in a pass; whether there are any."""
     room, rows = system.room, system.linear.opening
-    if renew or system.half > 0:
+    if renew:
         _rated(system.linear.law, room.rates)
     for row in range(len(room.force)):
         room.move[row] = room.wanted[row] - room.force[row]
@@ -198,7 +208,7 @@ def _direction(system, renew):  # type: ignore
 def _went(system, careful):  # type: ignore
     """Go by these changes, or so far that λ errs less; returns what it errs by [N]."""
     law, room = system.linear.law, system.room
-    before, share, gone = _left(room)[1], 1.0, 0.0
+    before, share, gone = lacking(room.force, room.wanted)[1], 1.0, 0.0
     while True:
         for row in range(len(room.force)):
             law.guess[row] += (share - gone) * room.along[row]
@@ -206,7 +216,7 @@ def _went(system, careful):  # type: ignore
         for k in range(len(room.contact)):
             room.contact[k] += (share - gone) * room.change[k]
         _asked(law, room)
-        off, total = _left(room)
+        off, total = lacking(room.force, room.wanted)
         if not careful or share <= LEAST or total <= (1.0 - FALLS * share) * before:
             return off
         share, gone = 0.5 * share, share
@@ -218,18 +228,6 @@ def _asked(law, room):  # type: ignore
     press(law, law.guess, room.all[1])
     slide(law, law.guess, room.all[2])
     taken_out(law, room.all, room.wanted)
-
-
-@computing
-def _left(room):  # type: ignore
-    """The largest error of λ, and the sum of their squares."""
-    most, total = 0.0, 0.0
-    for row in range(len(room.force)):
-        off = room.wanted[row] - room.force[row]
-        total += off**2
-        if not abs(off) <= most:
-            most = abs(off)
-    return most, total
 
 
 @computing
@@ -278,10 +276,7 @@ def _add_forces(rows, force, result):  # type: ignore
 @computing
 def _resolved(system, vector, renew):  # type: ignore
     """Solve with the tangent in place, or with one of a pass before; whether it is regular."""
-    room, half = system.room, system.half
-    if half > 0:
-        _summed(system)
-        return eliminate(room.entries.reshape((len(vector), 3 * half + 1)), vector)
+    room = system.room
     if renew:
         _summed(system)
         if not eliminated(system.panels, room.entries, room.image):
@@ -295,7 +290,7 @@ def _summed(system):  # type: ignore
     """Sum up the tangent, K + μ M + ν R - Gᵀ λ' G."""
     entries, rates, pairs = system.room.entries, system.room.rates, system.pairs
     for k in range(len(entries)):
-        entries[k] = system.closed[k]
+        entries[k] = system.panels.base[k]
     for block in range(len(pairs.begin) - 1):
         for member in range(pairs.first[block], pairs.first[block + 1]):
             if rates[pairs.sorted[member]] != 0.0:
@@ -306,11 +301,12 @@ def _summed(system):  # type: ignore
 @computing
 def _take_block(system, block):  # type: ignore
     """Take from the tangent what the pairs of a block change."""
-    entries, rates, pairs, left = system.room.entries, system.room.rates, system.pairs, system.room.left
+    room, pairs = system.room, system.pairs
+    entries, rates, left, line = room.entries, room.rates, room.left, room.line
     indptr, _, data = system.linear.opening
     first, last, place = pairs.first[block], pairs.first[block + 1], pairs.begin[block]
     others = pairs.others[pairs.other[block] : pairs.other[block + 1]]
-    row, line = pairs.rows[pairs.sorted[first], 0], system.room.line
+    row = pairs.rows[pairs.sorted[first], 0]
     width = indptr[others[0] + 1] - indptr[others[0]]
     for i in range(indptr[row + 1] - indptr[row]):
         for k in range(len(others)):
