@@ -130,12 +130,13 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         criteria: what makes a joint fail, and how many failed joints make a mechanism; the history
             carries them. By default those of the event, or else the usual ones.
         newton: settings of the solves.
-        method: "snes" solves each step through PETSc. Three compiled methods give the same history
-            many times faster: "contact" works in the modes of the closed structure, "chain" on
-            banded matrices, and "compliance", for large structures, with one sparse factor and
-            the open joint points alone. "auto" takes the fastest that applies; none does where
-            joints dilate or resist tension, and "snes" takes the run. A `Stepper` is taken as it
-            is, with its own damping, scheme and solves.
+        method: "snes" solves each step through PETSc. Compiled methods give the same history many
+            times faster: "contact" works in the modes of the closed structure, "chain" on banded
+            matrices, "compliance", for large structures, with one sparse factor and the open
+            joint points alone, and "tangent", where many of those slide, with a sparse tangent.
+            "auto" takes the fastest that applies; none does where joints dilate or resist tension,
+            and "snes" takes the run. A `Stepper` is taken as it is, with its own damping, scheme
+            and solves.
 
     Returns:
         The history; its `ended` and, in words, its `outcome` say how the run ended.

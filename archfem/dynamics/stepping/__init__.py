@@ -22,10 +22,14 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     open_points      its solution at an instant
     sliding_points   its solution over a step
     newton_pass      of which this is one pass
+    chain            joints of a chain of blocks, and the band that they make
+    chain_newton     the same solution in that band
     modal            the strategy in the modes of the closed structure
     banded           the strategy for chains of blocks, with a banded factor
     band             that factor
     sparse           the strategy for large structures, with one sparse factor
+    tangent          the strategy for large structures that slide, with their sparse tangent
+    tangent_newton   its passes
     panels           that factor, dense block by dense block
     turning          the strategy for blocks that move as far as they like
     turning_newton   Newton's method for a step of theirs

@@ -25,6 +25,7 @@ from archfem.dynamics.stepping.modal import LARGEST, Modal
 from archfem.dynamics.stepping.sparse import Sparse
 from archfem.dynamics.stepping.stepper import BATCH, Stepper
 from archfem.dynamics.stepping.strategy import Strategy
+from archfem.dynamics.stepping.tangent import Tangent
 from archfem.dynamics.stepping.turning import Turning
 from archfem.dynamics.steps import State
 from archfem.errors import InvalidInput
@@ -32,7 +33,7 @@ from archfem.models.model import Model
 from archfem.statics.newton import Newton
 from archfem.threads import on_one_thread
 
-STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal, Turning)
+STRATEGIES: tuple[type[Strategy], ...] = (Tangent, Sparse, Banded, Modal, Turning)
 """In the order in which they are tried; the first that applies takes runs too short for timing."""
 
 METHODS = ("auto", *sorted(each.name for each in STRATEGIES), "snes")

@@ -21,11 +21,12 @@ from scipy import sparse
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping import open_points  # noqa: F401  (solves the small problem)
+from archfem.dynamics.stepping.chain import Chain, chain_of
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.joint_law import Law, joint_resultants, law_of, pulls
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.newmark import Numbers, add_mixed, follow, mix
-from archfem.dynamics.stepping.path_law import PathLaw, path_law
+from archfem.dynamics.stepping.path_law import PathLaw, pairs_of, path_law
 from archfem.dynamics.stepping.small_problem import add_held, is_of
 from archfem.dynamics.stepping.sparse_rows import Rows, add_rows, rows_of, stored, times, trimmed
 
@@ -131,7 +132,21 @@ def gaps_of(equation: Equation, dt: float) -> Gaps:
     law, rows = path_law(joints, equation.numbers(dt), dt)
     if joints.offset is not None:
         weight = weight - joints.pushed(*joints.bonded(joints.offset))
-    return Gaps(rows, shear[:0] if joints.slides else shear, weight, law)
+    if joints.slides:
+        return Gaps(rows, shear[:0], weight, law._replace(chain=_chain(equation, law, rows, dt)))
+    return Gaps(rows, shear, weight, law)
+
+
+def _chain(equation: Equation, law: PathLaw, rows: sparse.csr_matrix, dt: float) -> Chain:
+    """The joints as those of a chain, damping on what they have if closed with them."""
+    model, damping, numbers = equation.model, equation.damping, equation.numbers(dt)
+    follows = damping is None or damping.joints == "closed"
+    held = 1.0 + (0.0 if damping is None or follows else numbers.rate * damping.stiffness)
+    blocks = trimmed(numbers.inertia * model.mass + held * model.blocks)
+    (pairs, values), size = pairs_of(law), rows.shape[0]
+    share = held if damping is not None and damping.joints == "initial" else 1.0
+    rates = sparse.csr_matrix((share * values, pairs.T), (size, size))
+    return chain_of(trimmed(rows), blocks, rates, (len(law.stretches), len(law.stiffness)))
 
 
 def solve(system: Any, vector: Any, gap: Any, before: Any, force: Any) -> Any:

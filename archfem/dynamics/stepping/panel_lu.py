@@ -193,7 +193,15 @@ def _passed_on(top, left, targets, room, entries):  # type: ignore
     for i in range(count):
         for j in range(count):
             room[j] = 0.0
-        for k in range(width):
+        done = 0
+        while done + 4 <= width:
+            a, b, c, d = left[done, i], left[done + 1, i], left[done + 2, i], left[done + 3, i]
+            p, q, r, s = top[done], top[done + 1], top[done + 2], top[done + 3]
+            p, q, r, s = p[width:], q[width:], r[width:], s[width:]
+            for j in range(count):
+                room[j] += a * p[j] + b * q[j] + c * r[j] + d * s[j]
+            done += 4
+        for k in range(done, width):
             factor, row = left[k, i], top[k, width:]
             for j in range(count):
                 room[j] += factor * row[j]

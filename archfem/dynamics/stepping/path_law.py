@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archfem.arrays import Array
+from archfem.dynamics.stepping.chain import NO_CHAIN, Chain
 from archfem.dynamics.stepping.gap_rows import GapRows, gap_rows
 from archfem.dynamics.stepping.joint_law import Law, law_of
 from archfem.dynamics.stepping.newmark import Numbers
@@ -116,6 +117,7 @@ class PathLaw(NamedTuple):
         speed: change of the gaps per step at their rates there (r,) [m].
         guess: of z at all rows (r,) [m].
         stored: energy of joints before anything moves, if they held tension [J].
+        chain: of the joints, where blocks make one.
         work: room for what joints do over it.
     """
 
@@ -133,6 +135,7 @@ class PathLaw(NamedTuple):
     speed: Array
     guess: Array
     stored: float
+    chain: Chain
     work: Work
 
 
@@ -166,6 +169,7 @@ def path_law(joints: JointOperator, numbers: Numbers, dt: float) -> tuple[PathLa
         np.zeros(rows),
         np.zeros(rows),
         0.5 * float(np.sum(offset * joints.bonded(offset))),
+        NO_CHAIN,
         _room(count, len(gaps.near), len(gaps.sizes)),
     )
     return law, gaps.rows
@@ -233,3 +237,35 @@ def _room(points: int, stretches: int, slips: int) -> Work:
         np.zeros((most, 2), np.int64),
         np.zeros(most),
     )
+
+
+def pairs_of(law: PathLaw) -> tuple[Any, Array]:
+    """Return rows of gaps at which λ changes, and by which: of stretches, then of slips.
+
+    Args:
+        law: of the joints.
+
+    Returns:
+        Their numbers (q, 2), and the derivatives where joints are open and slide (q,) [N/m].
+    """
+    parts, points, found = law.stretches, law.points, []
+    opens = np.zeros((len(parts), 4))
+    for number, (begin, end, near, far) in enumerate(parts.tolist()):
+        own = points[begin:end]
+        first, last = (own["near"], own["far"])
+        opens[number] = 0.0
+        opens[number, 0] = (1 - own["share"]) @ first
+        opens[number, 1:3] = (1 - own["share"]) @ last
+        opens[number, 3] = own["share"] @ last
+        found += [(near, near), (near, far), (far, near), (far, far)]
+    values, stretch, openings = [*opens.ravel()], points["stretch"], len(law.stiffness)
+    for group, along in enumerate(law.along):
+        row, last = openings + group, -1
+        found.append((row, row))
+        values.append(along)
+        for point in law.members[law.first[group] : law.first[group + 1]]:
+            if stretch[point] != last:
+                last = stretch[point]
+                found += [(row, parts["near"][last]), (row, parts["far"][last])]
+                values += [0.0, 0.0]
+    return np.array(found, np.int64), np.array(values)

@@ -15,6 +15,7 @@ and where those are not, λ is led from where it is known to where it is sought.
 import numba
 import numpy as np
 
+from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE, along_chain
 from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.newton_pass import (
     FEW,
@@ -42,18 +43,6 @@ from archfem.dynamics.stepping.small_problem import (
 )
 from archfem.dynamics.stepping.sparse_rows import add_rows
 from archfem.joints.moving.compiled import computing
-
-WHOLE = 4
-"""Passes that take whole steps anyhow."""
-
-TRIES = 16
-"""Passes after which λ is led to where it is sought."""
-
-LEAST = 1.0 / 32.0
-"""Share of a step that is taken even if λ errs more after it."""
-
-FALLS = 0.1
-"""Part by which the square of the error of λ has to fall with a whole step."""
 
 FIRST, LAST = 0.25, 1e-4
 """Shares of its way that λ is led at first, and at least."""
@@ -95,11 +84,15 @@ def _largest(law, gap):  # type: ignore
 def _foreseen(law, gap, before, force):  # type: ignore
     """Return which rows are at work, or will be soon if they go on as they did (r,)."""
     works, near, openings = force != 0.0, force != 0.0, len(law.stiffness)
+    if law.chain.half > 0:
+        near[:] = True
     guess, start, speed, points = law.guess, law.start, law.speed, law.points
     for row in range(len(gap)):
         guess[row] = start[row] + speed[row] / law.gain
         if row < openings and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
             works[row] = True
+    if law.chain.half > 0:
+        return near
     for part in law.stretches:
         if works[part.near] or works[part.far]:
             near[part.near] = near[part.far] = True
@@ -184,6 +177,14 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     Returns:
         Passes; -1 if it does not settle.
     """
+    if law.chain.half > 0:
+        found = along_chain(law, start, (enough, ROUNDED))
+        if found > 0:
+            for k in range(len(force)):
+                force[law.chain.order[k]] = law.chain.rooms[0, k]
+            return found
+        for row in range(len(start)):
+            law.guess[row] = law.start[row] + law.speed[row] / law.gain
     local = np.full(len(start), -1)
     for k in range(len(rows)):
         local[rows[k]] = k
