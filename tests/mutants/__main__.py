@@ -36,7 +36,7 @@ TESTS.append("tests/test_doctests.py")
 FIRST, FILES = 4.0, 8
 """CPU time [s] and number of files of the tests that run first: most changes go no further."""
 
-LIMIT = 90.0
+LIMIT = 25.0
 """CPU time [s] of the tests that run then, as they take on what is not changed."""
 
 SLOWER, READING, COMPILING = 10.0, 20.0, 400.0
@@ -68,7 +68,9 @@ def main() -> None:
                 test = _noticed(place, path, number, change, tests)
                 came, why = ("killed", f"by {test}") if test else ("SURVIVED", "")
             tally[came] += 1
-            print(f"{came:8} {key} (line {change.line}, {_spent() - start:.0f} s) {why}", flush=True)
+            print(
+                f"{came:8} {key} (line {change.line}, {_spent() - start:.0f} s) {why}", flush=True
+            )
     counted = tally["killed"] + tally["SURVIVED"]
     print(
         f"{tally['killed']} of {counted} changes were noticed, {tally['killed'] / counted:.0%}; "
@@ -156,7 +158,9 @@ def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
             then.append(test)
         spent += taken
     # Those of one file together: they share what is made once for all of them.
-    rank = {file: number for number, file in enumerate(dict.fromkeys(_file(test) for test in meant))}
+    rank = {
+        file: number for number, file in enumerate(dict.fromkeys(_file(test) for test in meant))
+    }
     return [sorted(each, key=lambda test: rank[_file(test)]) for each in (first, then) if each]
 
 

@@ -55,7 +55,9 @@ class Change:
     @property
     def statement(self) -> ast.stmt | None:
         """Statement of a function that it stands in; None for what runs as the module is read."""
-        depth = max((i for i, e in enumerate(self.around) if isinstance(e, ast.FunctionDef)), default=-1)
+        depth = max(
+            (i for i, e in enumerate(self.around) if isinstance(e, ast.FunctionDef)), default=-1
+        )
         inner = [*self.around[depth + 1 :], self.node]
         statements = [each for each in inner if isinstance(each, ast.stmt)]
         body = self.around[depth].body if depth >= 0 else []
@@ -65,7 +67,8 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return what may be changed in a module.
 
-    Words of errors and of the log, annotations, imports and what a function that only refuses does are left out.
+    Words of errors and of the log, annotations, imports and what a function that only refuses does
+    are left out.
 
     Args:
         source: of the module.

@@ -23,6 +23,9 @@ BEFOREHAND = (
 )
 """Packages that tests need, imported once: each run of tests is a fork of this process."""
 
+KEEPS = "archfem.compiled"
+"""Module of archfem whose caches are of no physics: it chooses a place on disk once."""
+
 Reached = dict[str, tuple[float, list[list[str | int]]]]
 """Of each test that passes: CPU time [s], and modules and lines that it comes to."""
 
@@ -122,7 +125,7 @@ def _forget(module: ModuleType) -> None:
     own = [each for name, each in sys.modules.items() if name.startswith("archfem.") and each]
     for each in (*own, module):
         for value in list(vars(each).values()):
-            if isinstance(value, functools._lru_cache_wrapper) and each.__name__ != "archfem.compiled":
+            if isinstance(value, functools._lru_cache_wrapper) and each.__name__ != KEEPS:
                 value.cache_clear()
 
 
