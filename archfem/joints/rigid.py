@@ -6,7 +6,7 @@ from scipy import sparse
 from archfem.arrays import Array
 from archfem.joints.integration import law_of
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import JointPoints
+from archfem.joints.points import JointPoints, Numbers
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
@@ -69,7 +69,10 @@ def _frames(structure: Structure, points: JointPoints) -> tuple[Array, Array, Ar
     return places, structure.normals[points.joint], tangents
 
 
-def _jump(structure: Structure, points: JointPoints, places: Array) -> tuple[Array, ...]:
+Jump = tuple[Numbers, Numbers, Array]
+
+
+def _jump(structure: Structure, points: JointPoints, places: Array) -> Jump:
     """Displacement of the higher block less that of the lower: its entries that are not zero.
 
     Returns:
@@ -86,7 +89,7 @@ def _jump(structure: Structure, points: JointPoints, places: Array) -> tuple[Arr
     return rows % count, start[own], sign[:, None, None] * motion
 
 
-def _along(directions: Array, jump: tuple[Array, ...], size: int) -> sparse.csr_matrix:
+def _along(directions: Array, jump: Jump, size: int) -> sparse.csr_matrix:
     """Component of the jump at each point along a direction (p, 2)."""
     rows, start, motion = jump
     values = directions[rows, 0, None] * motion[:, 0] + directions[rows, 1, None] * motion[:, 1]

@@ -176,7 +176,7 @@ class LoadPath:
         row, target, distance = ahead
         for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
             tangent, rate = model.tangent(x[:-1]), self.load.rate(x[:-1])
-            if sparse.issparse(rate):
+            if rate is not None:
                 tangent = tangent - x[-1] * rate
             rest, missing = self._rest(model, x), target - row @ x
             if abs(missing) <= TOLERANCE * distance and self._fits(rest, x, tangent):
@@ -207,8 +207,8 @@ class LoadPath:
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.load.forces(x[:-1]))
         off = magnitude(rest)
         if off <= TOLERANCE * load or off > ROUGHLY * load:
-            return off <= TOLERANCE * load
-        return off <= 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
+            return bool(off <= TOLERANCE * load)
+        return bool(off <= 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1])))
 
 
 def _solved(tangent: sparse.csr_matrix, load: Array, row: Array, right: Array) -> Array | None:

@@ -148,11 +148,11 @@ def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
         (test for test in tests if _own(test, path) or _comes(test, tests[test][1], path, change)),
         key=lambda test: (not _own(test, path), tests[test][0]),
     )
-    first, then, files, spent = [], [], set(), 0.0
+    first, then, early, spent = [], [], set(), 0.0
     for test in meant:
-        file, taken = test.split("::")[0], tests[test][0]
-        if spent + taken < FIRST and len(files | {file}) <= FILES:
-            files.add(file)
+        file, taken = _file(test), tests[test][0]
+        if spent + taken < FIRST and len(early | {file}) <= FILES:
+            early.add(file)
             first.append(test)
         elif spent + taken < LIMIT:
             then.append(test)

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 COMPARISONS = {ast.Lt: ast.GtE, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.GtE: ast.Lt}
@@ -55,13 +56,13 @@ class Change:
     @property
     def statement(self) -> ast.stmt | None:
         """Statement of a function that it stands in; None for what runs as the module is read."""
-        depth = max(
-            (i for i, e in enumerate(self.around) if isinstance(e, ast.FunctionDef)), default=-1
-        )
-        inner = [*self.around[depth + 1 :], self.node]
-        statements = [each for each in inner if isinstance(each, ast.stmt)]
-        body = self.around[depth].body if depth >= 0 else []
-        return statements[-1] if statements and statements[0] in body else None
+        found, within = None, False
+        for each, inside in pairwise([*self.around, self.node]):
+            if isinstance(each, ast.FunctionDef | ast.ClassDef):
+                found, within = None, isinstance(each, ast.FunctionDef) and inside in each.body
+            if within and isinstance(inside, ast.stmt):
+                found = inside
+        return found
 
 
 def changes(source: str) -> list[Change]:
