@@ -13,8 +13,8 @@ from pathlib import Path
 from fuzz.trial import FOREIGN, HUNG, Came
 
 PATIENCE = 20.0
-"""CPU time after which a trial counts as hung [s]; the machine may be shared. A campaign has its own
-`PATIENCE` whose trials show how far they are.
+"""CPU time after which a trial counts as hung [s]; the machine may be shared. A campaign has its
+own `PATIENCE` whose trials show how far they are.
 """
 
 WAIT = 4.5
