@@ -12,6 +12,9 @@ APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# What is imported is compiled once, for all workers and the processes that tests start.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Where `make test-debian13` makes its Debian, and finds it again.
 DEBIAN13 := /var/tmp/archfem-debian13
 

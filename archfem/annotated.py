@@ -88,7 +88,9 @@ def fits(value: Any, hint: Any) -> bool:
         value: what was given.
         hint: the annotation.
     """
-    origin, inner = get_origin(hint), get_args(hint)
+    if type(value) is hint:
+        return True
+    origin, inner = _parts(hint)
     if origin in (Union, UnionType):
         return any(fits(value, each) for each in inner)
     if origin is Literal:
@@ -102,6 +104,12 @@ def fits(value: Any, hint: Any) -> bool:
     if isinstance(origin, type) and issubclass(origin, Iterable):
         return _is_row(value, origin, inner)
     return _is_plain(value, hint)
+
+
+@cache
+def _parts(hint: Hashable) -> tuple[Any, tuple[Any, ...]]:
+    """What an annotation is of, and what it holds."""
+    return get_origin(hint), get_args(hint)
 
 
 _CALLABLE = get_origin(Callable[[], None])

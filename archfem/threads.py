@@ -5,12 +5,13 @@ a joint all but opens, the last bit decides. So what computes takes one thread, 
 environment says, and gives back what it found.
 """
 
+import sys
 import threading
 from collections.abc import Callable
-from functools import wraps
+from functools import lru_cache, wraps
 from typing import Any, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -31,7 +32,7 @@ def on_one_thread(function: Function) -> Function:
     def alone(*args: Any, **given: Any) -> Any:
         if getattr(_here, "alone", False):
             return function(*args, **given)
-        with threadpool_limits(limits=1, user_api="blas"):
+        with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
             _here.alone = True
             try:
                 return function(*args, **given)
@@ -39,3 +40,9 @@ def on_one_thread(function: Function) -> Function:
                 _here.alone = False
 
     return alone  # type: ignore[return-value]
+
+
+@lru_cache(maxsize=1)
+def _libraries(_: int) -> ThreadpoolController:
+    """Linear algebra that is loaded; looked for anew, in a millisecond, as modules are imported."""
+    return ThreadpoolController()

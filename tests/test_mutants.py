@@ -1,6 +1,13 @@
-"""What `make mutants` changes in a module, and what it leaves alone."""
+"""What `make mutants` changes in a module, what it leaves alone, and which tests it runs."""
 
-from mutants.changes import changed, changes
+import builtins
+import tomllib
+from pathlib import Path
+
+from mutants.__main__ import KNOWN, _chosen
+from mutants.changes import changed, changes, marked
+
+ROOT = Path(__file__).parents[1]
 
 SOURCE = '''
 """A module of 3 words."""
@@ -14,17 +21,49 @@ def f(x: float = 2) -> float:
 
 
 def test_every_number_and_operator_of_the_physics_is_changed_once():
-    words = [words for _, words in changes(SOURCE)]
+    words = [f"{each.function}: {each.words}" for each in changes(SOURCE)]
     assert sorted(words) == [
-        "-LIMIT → LIMIT",
-        "0.5 → 0.55",
-        "2 → 3",
-        "3 → 4",
-        "max → min",
-        "max(x, -LIMIT) * 3 → max(x, -LIMIT) / 3",
+        ": LIMIT = 0.5 → LIMIT = 0.55",
+        "f: 2 → 3",
+        "f: return max(x, -LIMIT) * 3 → return max(x, -LIMIT) * 4",
+        "f: return max(x, -LIMIT) * 3 → return max(x, -LIMIT) / 3",
+        "f: return max(x, -LIMIT) * 3 → return max(x, LIMIT) * 3",
+        "f: return max(x, -LIMIT) * 3 → return min(x, -LIMIT) * 3",
     ]
     for number in range(len(words)):
         text = changed(SOURCE, number)
         assert text != changed(SOURCE, number - 1)
         compile(text, "changed", "exec")
         assert text.count("raise ValueError") == 1
+
+
+def test_a_marked_module_tells_to_which_changes_it_comes(monkeypatch):
+    space, came = {}, []
+    monkeypatch.setattr(builtins, "_reached", came.append, raising=False)
+    exec(marked(SOURCE, "own.py"), space)
+    assert came == []
+    assert space["f"](1.0) == 3.0
+    assert came == [("own.py", 8)]
+    assert {each.statement and each.statement.lineno for each in changes(SOURCE)} == {None, 8}
+
+
+def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_first():
+    path = Path("archfem/joints/law.py")
+    change = changes("def f(x):\n    return 2 * x\n")[0]
+    here, elsewhere = ["archfem/joints/law.py", 2], ["archfem/joints/law.py", 9]
+    tests = {
+        "tests/a/test_any.py::long": (9.0, [here]),
+        "tests/a/test_any.py::short": (0.2, [here]),
+        "tests/a/test_any.py::idle": (0.1, [elsewhere]),
+        "tests/joints/test_law.py::own": (0.3, []),
+    }
+    first = ["tests/joints/test_law.py::own", "tests/a/test_any.py::short"]
+    assert _chosen(path, change, tests) == [first, ["tests/a/test_any.py::long"]]
+
+
+def test_what_changes_no_number_is_still_there_and_has_a_reason():
+    for entry in tomllib.loads(KNOWN.read_text(encoding="utf-8"))["change"]:
+        path, function, words = entry["what"].split(": ", 2)
+        source = (ROOT / path).read_text(encoding="utf-8")
+        assert any((c.function, c.words) == (function, words) for c in changes(source)), words
+        assert entry["why"]

@@ -6,7 +6,7 @@ from scipy import sparse
 from archfem.arrays import Array
 from archfem.joints.integration import law_of
 from archfem.joints.operator import JointOperator
-from archfem.joints.points import JointPoints
+from archfem.joints.points import JointPoints, Numbers
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.rigid_motion import motion_of
 from archfem.masonry.structure import Structure
@@ -37,8 +37,9 @@ def rigid_joints(structure: Structure, cells: int, rule: Quadrature) -> JointOpe
     points = JointPoints.on(structure, rules)
     size = 3 * len(structure.free)
     places, normals, tangents = _frames(structure, points)
-    jump = _jump(structure, points, places, size)
-    return JointOperator(law_of(rule, points), _along(normals, jump), _along(tangents, jump))
+    jump = _jump(structure, points, places)
+    opening, slip = (_along(each, jump, size) for each in (normals, tangents))
+    return JointOperator(law_of(rule, points), opening, slip)
 
 
 def gaps_of(structure: Structure, points: JointPoints, motion: Array) -> Array:
@@ -68,27 +69,31 @@ def _frames(structure: Structure, points: JointPoints) -> tuple[Array, Array, Ar
     return places, structure.normals[points.joint], tangents
 
 
-def _jump(structure: Structure, points: JointPoints, places: Array, size: int) -> list[Array]:
-    """Displacement of the higher block less that of the lower, x and y: two (p, n) matrices."""
+Jump = tuple[Numbers, Numbers, Array]
+
+
+def _jump(structure: Structure, points: JointPoints, places: Array) -> Jump:
+    """Displacement of the higher block less that of the lower: its entries that are not zero.
+
+    Returns:
+        Points (m,), first coordinates of a block (m,), and by each of its three x and y (m, 2, 3).
+    """
     start = np.full(len(structure.blocks), -1)
     start[list(structure.free)] = 3 * np.arange(len(structure.free))
     centroids = np.array([block.centroid for block in structure.blocks])
-    jump = [sparse.csr_matrix((len(places), size)) for _ in range(2)]
-    for side, sign in enumerate((-1.0, 1.0)):
-        block = structure.pairs[points.joint, side]
-        rows = np.flatnonzero(start[block] >= 0)
-        motion = sign * motion_of(places[rows], centroids[block[rows]])
-        columns = start[block[rows], None] + np.arange(3)
-        where = (np.repeat(rows, 3), columns.ravel())
-        for axis in range(2):
-            values = motion[:, axis].ravel()
-            jump[axis] = jump[axis] + sparse.csr_matrix((values, where), jump[axis].shape)
-    return jump
+    block = structure.pairs[points.joint].T.ravel()
+    rows = np.flatnonzero(start[block] >= 0)
+    own, count = block[rows], len(places)
+    motion = motion_of(places[rows % count], centroids[own])
+    sign = np.where(rows < count, -1.0, 1.0)
+    return rows % count, start[own], sign[:, None, None] * motion
 
 
-def _along(directions: Array, jump: list[Array]) -> sparse.csr_matrix:
+def _along(directions: Array, jump: Jump, size: int) -> sparse.csr_matrix:
     """Component of the jump at each point along a direction (p, 2)."""
-    component = sum(sparse.diags(directions[:, axis]) @ jump[axis] for axis in range(2))
-    component = component.tocsr()
+    rows, start, motion = jump
+    values = directions[rows, 0, None] * motion[:, 0] + directions[rows, 1, None] * motion[:, 1]
+    where = np.repeat(rows, 3), (start[:, None] + np.arange(3)).ravel()
+    component = sparse.csr_matrix((values.ravel(), where), (len(directions), size))
     component.eliminate_zeros()
     return component

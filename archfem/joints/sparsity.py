@@ -1,6 +1,8 @@
 """One sparsity pattern for a family of matrices, so that sums are sums of their data."""
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +60,16 @@ class Pattern:
         Args:
             data: its entries, which it shares (nnz,).
         """
-        result = sparse.csr_matrix((self.size, self.size))
-        result.indptr, result.indices, result.data = self.indptr, self.indices, data
+        result = copy(self._bare)
+        result.data = data
         return result
+
+    @cached_property
+    def _bare(self) -> sparse.csr_matrix:
+        """A matrix without data; a copy of it is had without the checks of a new one."""
+        bare = sparse.csr_matrix((self.size, self.size))
+        bare.indptr, bare.indices = self.indptr, self.indices
+        return bare
 
     def spread(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
         """Return the same matrix stored on this pattern.

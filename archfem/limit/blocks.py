@@ -99,15 +99,16 @@ class RigidBlocks:
         Returns:
             (3, n_joints) [m].
         """
-        gaps = np.zeros((3, len(self.structure.joints)))
-        for number, joint in enumerate(self.structure.joints):
-            jump = np.zeros((2, 2))
-            for block, sign in ((joint.higher, 1.0), (joint.lower, -1.0)):
-                points = motion_of(joint.ends, self.structure.blocks[block].centroid)
-                jump += sign * points @ motion[block]
-            gaps[:2, number] = jump @ self.structure.normals[number]
-            gaps[2, number] = jump[0] @ joint.tangent
-        return gaps
+        structure, jump = self.structure, np.zeros((len(self.structure.joints), 2, 2))
+        centroids = np.array([block.centroid for block in structure.blocks])
+        for side, sign in enumerate((-1.0, 1.0)):
+            block = structure.pairs[:, side]
+            x, y = np.moveaxis(structure.ends - centroids[block, None], -1, 0)
+            u, v, turn = motion[block].T[:, :, None]
+            jump += sign * np.stack([u - turn * y, v + turn * x], axis=-1)
+        intrados, extrados = np.einsum("kei,ki->ek", jump, structure.normals)
+        slip = np.einsum("ki,ki->k", jump[:, 0], structure.tangents)
+        return np.stack([intrados, extrados, slip])
 
     @cached_property
     def balance(self) -> sparse.csr_matrix:

@@ -95,7 +95,14 @@ class Block:
         """
         if self.centre is None:
             return self.points
-        return np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+        if pieces not in self._drawn:
+            self._drawn[pieces] = np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+        return self._drawn[pieces]
+
+    @cached_property
+    def _drawn(self) -> dict[int, Array]:
+        """Outlines of so many chords an arc, as far as they were asked for."""
+        return {}
 
     def top(self, x: float) -> float | None:
         """Return the largest y at which a vertical meets the outline, arcs as arcs [m].

@@ -1,6 +1,8 @@
 """Outlines in the plane: area, centroid and polar moment, and on which side of a line they lie."""
 
 from collections.abc import Sequence
+from itertools import pairwise
+from math import hypot
 
 import numpy as np
 
@@ -107,15 +109,19 @@ def side_of_line(points: Array, line: Array, near: float, arcs: Sequence[int] = 
     Returns:
         1 for left, -1 for right, 0 where the edges do not cover the line.
     """
-    length = float(np.linalg.norm(line[1] - line[0]))
-    tangent = (line[1] - line[0]) / length
-    along = (points - line[0]) @ tangent
-    off = (points - line[0]) @ np.array([-tangent[1], tangent[0]])
-    low, high = np.minimum(along, np.roll(along, -1)), np.maximum(along, np.roll(along, -1))
-    on_line = (np.abs(off) <= near) & (np.abs(np.roll(off, -1)) <= near) & (high - low > near)
-    on_line[list(arcs)] = False
-    covered = np.where(on_line, np.minimum(high, length) - np.maximum(low, 0.0), 0.0).clip(0.0)
-    if abs(np.sum(covered) - length) > 4.0 * near:
-        return 0
-    edge = int(np.flatnonzero(on_line & (low < length - near) & (high > near))[0])
-    return 1 if np.roll(along, -1)[edge] > along[edge] else -1
+    (x, y), (x_end, y_end) = line.tolist()  # a few numbers: faster without arrays
+    length = hypot(x_end - x, y_end - y)
+    t_x, t_y = (x_end - x) / length, (y_end - y) / length
+    moved = [(p_x - x, p_y - y) for p_x, p_y in points.tolist()]
+    along = [d_x * t_x + d_y * t_y for d_x, d_y in moved]
+    near_line = [abs(d_y * t_x - d_x * t_y) <= near for d_x, d_y in moved]
+    covered, side = 0.0, 0
+    for edge, (start, end) in enumerate(pairwise([*along, along[0]])):
+        low, high = min(start, end), max(start, end)
+        straight = edge not in arcs and near_line[edge] and near_line[edge + 1 - len(along)]
+        if not straight or high - low <= near:
+            continue
+        covered += max(min(high, length) - max(low, 0.0), 0.0)
+        if side == 0 and low < length - near and high > near:
+            side = 1 if end > start else -1
+    return side if abs(covered - length) <= 4.0 * near else 0

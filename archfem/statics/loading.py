@@ -58,14 +58,14 @@ class Load:
         forces: Array = np.sum([self.model.load(action, q) for action in self.actions], axis=0)
         return forces
 
-    def rate(self, q: Array) -> sparse.csr_matrix | float:
-        """Return the derivative of `forces` (n, n); 0 where it does not depend on q.
+    def rate(self, q: Array) -> sparse.csr_matrix | None:
+        """Return the derivative of `forces` (n, n); None where it does not depend on q.
 
         Args:
             q: coordinates (n,).
         """
         if not isinstance(self.model, Moving):
-            return 0.0
+            return None
         return sum(self.model.load_rate(action, q) for action in self.actions)
 
     def moved(self, q: Array) -> float:

@@ -115,9 +115,9 @@ class LoadPath:
         """
         along, up = border / np.array(self.unit)
         probe = self.load.forces(self.states[-1]) / self.load.size
-        row = sparse.csr_matrix(np.append(along * probe, up))
+        row = np.append(along * probe, up)
         x = np.append(self.states[-1], self.factors[-1])
-        target = (row @ x)[0] + distance
+        target = float(row @ x) + distance
         return any(self._reached(row, target, distance, share) for share in (0.0, FIRM))
 
     def onward(self, distance: float) -> bool:
@@ -141,9 +141,9 @@ class LoadPath:
         )
         step = np.append(moved, grown)
         length = np.sqrt(across @ step)
-        row = sparse.csr_matrix(across / length)
+        row = across / length
         x = np.append(self.states[-1], self.factors[-1])
-        target = (row @ x)[0] + distance
+        target = float(row @ x) + distance
         return self._reached(row, target, distance, 0.0, x + distance / length * step)
 
     def creep(self, grown: float, farthest: float) -> bool:
@@ -174,7 +174,7 @@ class LoadPath:
 
     def _reached(
         self,
-        row: sparse.csr_matrix,
+        row: Array,
         target: float,
         distance: float,
         share: float,
@@ -199,20 +199,20 @@ class LoadPath:
         return False
 
     def _balanced(
-        self, model: Model, x: Array, ahead: tuple[sparse.csr_matrix, float, float], share: float
+        self, model: Model, x: Array, ahead: tuple[Array, float, float], share: float
     ) -> tuple[Array, int] | None:
         """Find (q, λ) in one (n + 1,) and its iterations; tangents share the closed one."""
         row, target, distance = ahead
         for iteration in range(ITERATIONS if share == 0.0 else 2 * ITERATIONS):
-            tangent = model.tangent(x[:-1]) - x[-1] * self.load.rate(x[:-1])
+            tangent, rate = model.tangent(x[:-1]), self.load.rate(x[:-1])
+            if rate is not None:
+                tangent = tangent - x[-1] * rate
             rest, missing = self._rest(model, x), target - row @ x
             if abs(missing) <= TOLERANCE * distance and self._fits(rest, x, tangent):
                 return x, iteration
             if share > 0.0:
                 tangent = (1.0 - share) * tangent + share * model.closed()
-            column = sparse.csr_matrix(-self.load.forces(x[:-1])[:, None])
-            matrix = sparse.vstack([sparse.hstack([tangent, column]), row], "csc")
-            step = _solved(matrix, np.append(rest, missing))
+            step = _solved(tangent, self.load.forces(x[:-1]), row, np.append(rest, missing))
             if step is None:
                 return None
             x = x + step
@@ -234,15 +234,23 @@ class LoadPath:
     def _fits(self, rest: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
         """Whether forces are in balance, or off by no more than round-off of large motions."""
         load = magnitude(self.dead) + abs(x[-1]) * magnitude(self.load.forces(x[:-1]))
-        rounding = 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1]))
-        return bool(magnitude(rest) <= min(max(TOLERANCE * load, rounding), ROUGHLY * load))
+        off = magnitude(rest)
+        if off <= TOLERANCE * load or off > ROUGHLY * load:
+            return bool(off <= TOLERANCE * load)
+        return bool(off <= 8.0 * np.finfo(float).eps * magnitude(abs(tangent) @ abs(x[:-1])))
 
 
-def _solved(matrix: sparse.csc_matrix, right: Array) -> Array | None:
-    """Solve a system; None where the matrix is exactly singular."""
+def _solved(tangent: sparse.csr_matrix, load: Array, row: Array, right: Array) -> Array | None:
+    """Solve for steps of q and λ; None where their matrix is exactly singular."""
+    size = len(load)
     try:
-        if matrix.shape[0] <= DENSE:
-            return np.asarray(np.linalg.solve(matrix.toarray(), right))
-        return np.asarray(splu(matrix).solve(right))
+        if size < DENSE:
+            matrix = np.empty((size + 1, size + 1))
+            matrix[:size, :size] = tangent.toarray()
+            matrix[:size, size], matrix[size] = -load, row
+            return np.asarray(np.linalg.solve(matrix, right))
+        column = sparse.csr_matrix(-load[:, None])
+        bordered = sparse.vstack([sparse.hstack([tangent, column]), sparse.csr_matrix(row)], "csc")
+        return np.asarray(splu(bordered).solve(right))
     except (RuntimeError, np.linalg.LinAlgError):  # SuperLU's, LAPACK's
         return None

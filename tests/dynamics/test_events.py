@@ -142,7 +142,9 @@ def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
     assert "by each definition" in watch(moving, STEP)
     assert told(event, structure, moving) is None  # a fresh watch: never four in the ring
     assert "by each definition" in told(EveryMechanism(), ring(), state(ring(), ALTERNATING))
-    assert possible_counts(af.column(breadth=1.0, heights=[1.0])) == ()
+    alone = af.column(breadth=1.0, heights=[1.0])
+    assert possible_counts(alone) == ()
+    assert "by each definition" in told(EveryMechanism(), alone, state(alone, {0: 0.5}))
 
 
 def test_events_wait_for_as_long_as_a_mechanism_lasts():

@@ -85,6 +85,7 @@ def test_xdmf_and_its_numbers(run, tmp_path):
     expected = (model.cells.stress @ q).reshape(-1, 3)[:, 1]
     assert np.concatenate(in_cells["stress_yy"])[: len(expected)] == pytest.approx(expected)
     assert sum(len(block) for block in cells) == len(model.cells.polygons) + 2
+    assert {block.type for block in cells} == {"quad"}
 
 
 @pytest.mark.parametrize(

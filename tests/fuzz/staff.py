@@ -13,10 +13,12 @@ from pathlib import Path
 from fuzz.trial import FOREIGN, HUNG, Came
 
 PATIENCE = 20.0
-"""CPU time after which a trial counts as hung [s]; the machine may be shared."""
+"""CPU time after which a trial counts as hung [s]; the machine may be shared. A campaign has its
+own `PATIENCE` whose trials show how far they are.
+"""
 
-WAIT = 90.0
-"""Time after which a trial counts as hung even if it does nothing at all [s]."""
+WAIT = 4.5
+"""Time after which a trial counts as hung even if it does nothing at all, of that CPU time [-]."""
 
 MEMORY = 3 * 2**30
 """What trials may take beyond what a process has after its imports [bytes]."""
@@ -56,16 +58,17 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.ended = False
-        self.pipe.recv()  # it has imported what it needs
+        self.patience = self.pipe.recv()  # once it has imported what it needs
 
     def asked(self, number: int) -> Came:
         """Carry out one trial."""
         self.pipe.send(number)
         spent, begun = self._cpu(), time.monotonic()
         while not self.pipe.poll(0.5):
-            if self._cpu() - spent > PATIENCE or time.monotonic() - begun > WAIT:
+            waited = self._cpu() - spent, (time.monotonic() - begun) / WAIT
+            if max(waited) > self.patience:
                 self.end()
-                return Came(HUNG, f"no answer after {PATIENCE:g} s of CPU or {WAIT:g} s")
+                return Came(HUNG, f"no answer after {self.patience:g} s of CPU, or {WAIT:g} times")
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
@@ -97,7 +100,7 @@ def _serve(pipe: Connection, campaign: str, seed: int) -> None:
     now = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (now + MEMORY, now + MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    pipe.send("ready")
+    pipe.send(getattr(module, "PATIENCE", PATIENCE))
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         while True:

@@ -38,6 +38,7 @@ def test_the_first_of_what_lasts_is_found(up, least, expected):
 
 def test_a_single_record_is_a_state_that_stays():
     assert first_lasting([0], np.array([1.0]), 1e-3, lambda instant: instant) == 0
+    assert first_lasting([1], np.array([0.0, 1e-3]), 2e-3, lambda instant: instant) is None
 
 
 def test_steps_as_long_as_the_least_count_whatever_the_round_off():

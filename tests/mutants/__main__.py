@@ -1,29 +1,48 @@
-"""Change physics in a copy of the package, one place at a time, and let the tests of its room run.
+"""Change physics in a copy of the package, one place at a time, and let tests run that come to it.
 
     python -m mutants [--count 60] [--seed 0] [--only dynamics/damping]
 
-Prints a line for each change that no test has noticed, and the share that was. Modules that numba
-compiles are left out: each change of theirs would take minutes to compile.
+A line for each change: the test that noticed it, or that none did. First all default tests run
+once, in some minutes, and say which statements they come to; that is kept in `out/reached.json`
+until a source or a test changes. A change is then met by the tests that come to its statement
+alone, those of its own module and the shortest first, until one fails.
+
+What no test can notice, for it changes no number, is listed with its reason in `known.toml`, and
+does not count. Modules that numba compiles are left out unless `--only` names their folder: each
+change of theirs takes a minute to compile.
 """
 
 import argparse
-import os
+import json
 import random
 import resource
 import shutil
-import subprocess
-import sys
 import tempfile
+import tomllib
 from collections import Counter
-from functools import cache
 from pathlib import Path
 
-from mutants.changes import changed, changes
+from mutants.changes import Change, changed, changes, marked
+from mutants.noticing import Reached, failing, get_ready, reached
 
 ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "out" / "reached.json"
+KNOWN = Path(__file__).with_name("known.toml")
 ROOMS = ("motion", "masonry", "joints", "limit", "models", "statics", "dynamics")
-LIMIT = 300
-"""CPU time of one run of tests [s]: a change that makes them so slow is noticed."""
+COMPILED = ("joints/moving", "dynamics/stepping", "dynamics/falling")
+TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification", "cases", "studies")]
+TESTS.append("tests/test_doctests.py")
+
+FIRST, FILES = 4.0, 8
+"""CPU time [s] and number of files of the tests that run first: most changes go no further."""
+
+LIMIT = 25.0
+"""CPU time [s] of the tests that run then, as they take on what is not changed."""
+
+SLOWER, READING, COMPILING = 10.0, 20.0, 400.0
+"""A change that makes tests so many times slower is noticed, beyond the CPU time [s] of reading all
+that they import, and of compiling.
+"""
 
 
 def main() -> None:
@@ -32,77 +51,140 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="modules whose path contains this")
     given = parser.parse_args()
-    rng, tally = random.Random(given.seed), Counter[str]()
-    modules = [path for path in _modules() if given.only in str(path)]
-    with tempfile.TemporaryDirectory() as place:
+    drawn = _draw(given.count, given.seed, given.only)
+    get_ready()
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
         for name in ("archfem", "tests", "meshes"):
-            shutil.copytree(ROOT / name, Path(place) / name)
+            shutil.copytree(ROOT / name, place / name)
         shutil.copy(ROOT / "pyproject.toml", place)
-        for _ in range(given.count):
-            path = rng.choice(modules)
-            for tests in _tests_of(Path(place), path):
-                _failing(Path(place), tests)
-            source = (Path(place) / path).read_text(encoding="utf-8")
-            number, (line, words) = rng.choice(list(enumerate(changes(source))))
-            (Path(place) / path).write_text(changed(source, number), encoding="utf-8")
-            came = "killed" if _noticed(Path(place), path) else "SURVIVED"
-            (Path(place) / path).write_text(source, encoding="utf-8")
+        known, tests, tally = _known(), _reached(place), Counter[str]()
+        for path, number, change in drawn:
+            key = f"{path}: {change.function}: {change.words}"
+            start = _spent()
+            if key in known:
+                came, why = "known", known[key]
+            else:
+                test = _noticed(place, path, number, change, tests)
+                came, why = ("killed", f"by {test}") if test else ("SURVIVED", "")
             tally[came] += 1
-            print(f"{came:8} {path}:{line}: {words}", flush=True)
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    share = tally["killed"] / tally.total()
+            print(
+                f"{came:8} {key} (line {change.line}, {_spent() - start:.0f} s) {why}", flush=True
+            )
+    counted = tally["killed"] + tally["SURVIVED"]
     print(
-        f"{tally['killed']} of {tally.total()} changes were noticed, {share:.0%}; "
-        f"{spent.ru_utime + spent.ru_stime:.0f} s of CPU time"
+        f"{tally['killed']} of {counted} changes were noticed, {tally['killed'] / counted:.0%}; "
+        f"{tally['known']} more change no number; {_spent():.0f} s of CPU time"
     )
 
 
-def _modules() -> list[Path]:
-    """Modules of physics that can be changed without compiling."""
-    paths = [path for room in ROOMS for path in (ROOT / "archfem" / room).glob("*.py")]
-    return [
-        path.relative_to(ROOT)
-        for path in sorted(paths)
-        if "numba" not in (text := path.read_text(encoding="utf-8")) and changes(text)
-    ]
+def _draw(count: int, seed: int, only: str) -> list[tuple[Path, int, Change]]:
+    """Changes by chance: each module is as likely as any other."""
+    rng, found = random.Random(seed), []
+    modules = {path: changes((ROOT / path).read_text(encoding="utf-8")) for path in _modules(only)}
+    modules = {path: each for path, each in modules.items() if each}
+    for _ in range(count):
+        path = rng.choice(list(modules))
+        number, change = rng.choice(list(enumerate(modules[path])))
+        found.append((path, number, change))
+    return found
 
 
-def _tests_of(place: Path, path: Path) -> list[Path]:
-    """Tests that should notice: first those named after the module, then those of its room."""
-    room = Path("tests") / path.parts[1]
-    own = room / f"test_{path.stem}.py"
-    return [own, room] if (place / own).exists() else [room]
+def _modules(only: str) -> list[Path]:
+    """Modules of physics; those that are compiled only where they are named."""
+    paths = sorted(path for room in ROOMS for path in (ROOT / "archfem" / room).rglob("*.py"))
+    own = [path.relative_to(ROOT) for path in paths]
+    return [path for path in own if only in str(path) and (not _compiled(path) or only)]
 
 
-def _noticed(place: Path, path: Path) -> bool:
-    """Whether a test fails that passes on what is not changed."""
-    return any(
-        _run(place, tests, "-x", *_failing(place, tests)).returncode
-        for tests in _tests_of(place, path)
+def _compiled(path: Path) -> bool:
+    return any(f"archfem/{folder}/" in path.as_posix() for folder in COMPILED)
+
+
+def _known() -> dict[str, str]:
+    """Changes that change no number, each with its reason."""
+    entries = tomllib.loads(KNOWN.read_text(encoding="utf-8"))["change"]
+    return {entry["what"]: entry["why"] for entry in entries}
+
+
+def _reached(place: Path) -> Reached:
+    """What each test comes to, found now or kept from before."""
+    sources = [path for name in ("archfem", "tests") for path in (ROOT / name).rglob("*.py")]
+    sources = [path for path in sources if path.parent != KNOWN.parent]
+    if KEPT.exists() and KEPT.stat().st_mtime > max(path.stat().st_mtime for path in sources):
+        return json.loads(KEPT.read_text())
+    print("all default tests run once, and say what they come to", flush=True)
+    for path in _modules(""):
+        source = (ROOT / path).read_text(encoding="utf-8")
+        (place / path).write_text(marked(source, path.as_posix()), encoding="utf-8")
+    reached(place, TESTS)
+    for path in _modules(""):
+        shutil.copy2(ROOT / path, place / path)
+    KEPT.parent.mkdir(exist_ok=True)
+    shutil.copy(place / "reached.json", KEPT)
+    return json.loads(KEPT.read_text())
+
+
+def _noticed(place: Path, path: Path, number: int, change: Change, tests: Reached) -> str | None:
+    """Name of a test that fails with a change and passes without; None where there is none."""
+    source = (ROOT / path).read_text(encoding="utf-8")
+    (place / path).write_text(changed(source, number), encoding="utf-8")
+    if _compiled(path):  # numba looks at the source of each function alone
+        for kept in place.rglob("*.nb?"):
+            kept.unlink()
+    try:
+        for chosen in _chosen(path, change, tests):
+            limit = SLOWER * sum(tests[test][0] for test in chosen)
+            if found := failing(place, chosen, limit + (COMPILING if _compiled(path) else READING)):
+                return found
+        return None
+    finally:
+        shutil.copy2(ROOT / path, place / path)
+
+
+def _chosen(path: Path, change: Change, tests: Reached) -> list[list[str]]:
+    """Tests that come to a change: those that run first, and those that run then."""
+    meant = sorted(
+        (test for test in tests if _own(test, path) or _comes(test, tests[test][1], path, change)),
+        key=lambda test: (not _own(test, path), tests[test][0]),
     )
+    first, then, early, spent = [], [], set(), 0.0
+    for test in meant:
+        file, taken = _file(test), tests[test][0]
+        if spent + taken < FIRST and len(early | {file}) <= FILES:
+            early.add(file)
+            first.append(test)
+        elif spent + taken < LIMIT:
+            then.append(test)
+        spent += taken
+    # Those of one file together: they share what is made once for all of them.
+    rank = {
+        file: number for number, file in enumerate(dict.fromkeys(_file(test) for test in meant))
+    }
+    return [sorted(each, key=lambda test: rank[_file(test)]) for each in (first, then) if each]
 
 
-@cache
-def _failing(place: Path, tests: Path) -> list[str]:
-    """Options that leave out what fails before anything is changed: it would notice whatever is."""
-    said = _run(place, tests, "-rfE").stdout.splitlines()
-    failed = [line.split()[1] for line in said if line.startswith(("FAILED", "ERROR"))]
-    if failed:
-        print(f"left out, for they fail as it is: {', '.join(failed)}", flush=True)
-    return [f"--deselect={name}" for name in failed]
+def _comes(test: str, places: list[list[str | int]], path: Path, change: Change) -> bool:
+    """Whether a test comes to a change, as far as that is known."""
+    if _compiled(path):
+        return test.startswith((f"tests/{path.parts[1]}/", "tests/verification"))
+    if change.statement is None:
+        return any(place[0] == path.as_posix() for place in places)
+    return [path.as_posix(), change.statement.lineno] in places
 
 
-def _run(place: Path, tests: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Run tests on the copy."""
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *options],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": str(place)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT)),
-    )
+def _own(test: str, path: Path) -> bool:
+    return _file(test).endswith(f"/test_{path.stem}.py")
+
+
+def _file(test: str) -> str:
+    return test.split("::")[0]
+
+
+def _spent() -> float:
+    """CPU time of all tests so far [s]."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 import ast
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
 
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 COMPARISONS = {ast.Lt: ast.GtE, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.GtE: ast.Lt}
@@ -10,19 +12,69 @@ NAMES |= {"minimum": "maximum", "argmax": "argmin", "argmin": "argmax"}
 FACTOR = 1.1
 """By which a number is multiplied; a whole number grows by one."""
 
+SHOWN = 90
+"""Letters of what stands around a change, by which it is told from others of its module."""
 
-def changes(source: str) -> list[tuple[int, str]]:
-    """Return what may be changed in a module: in which line, and what becomes of it.
+SIMPLE = ast.expr | ast.keyword | ast.Return | ast.Assign | ast.AnnAssign | ast.AugAssign | ast.Expr
 
-    Words of errors, annotations, imports and what a function that only refuses does are left out.
+
+@dataclass
+class Change:
+    """What may be changed: the expression, what becomes of it, and what it stands in."""
+
+    node: ast.AST
+    other: ast.expr
+    around: list[ast.AST]
+    """From the module down to what the expression stands in directly."""
+
+    @property
+    def line(self) -> int:
+        return self.node.lineno
+
+    @property
+    def function(self) -> str:
+        """Name of the function or class that it stands in; empty for the module itself."""
+        kinds = ast.FunctionDef | ast.ClassDef
+        return ".".join(each.name for each in self.around if isinstance(each, kinds))
+
+    @property
+    def words(self) -> str:
+        """The shortest piece of source around it that says enough, before and after."""
+        outer = self.node
+        for each in reversed(self.around):
+            if not isinstance(each, SIMPLE) or len(ast.unparse(each)) > SHOWN:
+                break
+            outer = each
+        before = ast.unparse(outer)
+        if outer is self.node:
+            return f"{before} → {ast.unparse(self.other)}"
+        _put(self.around[-1], self.node, self.other)
+        after = ast.unparse(outer)
+        _put(self.around[-1], self.other, self.node)
+        return f"{before} → {after}"
+
+    @property
+    def statement(self) -> ast.stmt | None:
+        """Statement of a function that it stands in; None for what runs as the module is read."""
+        found, within = None, False
+        for each, inside in pairwise([*self.around, self.node]):
+            if isinstance(each, ast.FunctionDef | ast.ClassDef):
+                found, within = None, isinstance(each, ast.FunctionDef) and inside in each.body
+            if within and isinstance(inside, ast.stmt):
+                found = inside
+        return found
+
+
+def changes(source: str) -> list[Change]:
+    """Return what may be changed in a module.
+
+    Words of errors and of the log, annotations, imports and what a function that only refuses does
+    are left out.
 
     Args:
         source: of the module.
     """
-    return [
-        (node.lineno, f"{ast.unparse(node)} → {ast.unparse(other)}")
-        for node, _, other in _found(ast.parse(source))
-    ]
+    return _found(ast.parse(source))
 
 
 def changed(source: str, number: int) -> str:
@@ -33,19 +85,47 @@ def changed(source: str, number: int) -> str:
         number: of the change, among those that `changes` gives.
     """
     tree = ast.parse(source)
-    node, parent, other = _found(tree)[number]
-    _put(parent, node, other)
+    change = _found(tree)[number]
+    _put(change.around[-1], change.node, change.other)
     return ast.unparse(ast.fix_missing_locations(tree))
 
 
-def _found(tree: ast.AST) -> list[tuple[ast.AST, ast.AST, ast.expr]]:
+def marked(source: str, name: str) -> str:
+    """Return a module that says which statements with changes it comes to.
+
+    Each is told to the function `_reached` among the built-in names, where there is one, as the
+    module's name and the statement's line.
+
+    Args:
+        source: of the module.
+        name: of the module.
+    """
+    tree = ast.parse(source)
+    marks = {id(found): found for each in _found(tree) if (found := each.statement) is not None}
+    for node in list(ast.walk(tree)):
+        for field in ("body", "orelse", "finalbody"):
+            block = getattr(node, field, None)
+            if not isinstance(block, list) or not any(id(each) in marks for each in block):
+                continue
+            said = ((ast.parse(f"_reached(({name!r}, {s.lineno}))").body, s) for s in block)
+            setattr(node, field, [e for m, s in said for e in ([*m, s] if id(s) in marks else [s])])
+    first = 0
+    while first < len(tree.body) and isinstance(tree.body[first], ast.Expr):
+        first += 1
+    start = "import builtins; _reached = getattr(builtins, '_reached', bool)"
+    tree.body[first:first] = ast.parse(start).body
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _found(tree: ast.AST) -> list[Change]:
     """Expressions that may be changed, each with what it stands in and what becomes of it."""
-    places = ((node, parent, _changed(node)) for node, parent in _places(tree))
-    return [(node, parent, other) for node, parent, other in places if other is not None]
+    places = ((node, around, _changed(node)) for node, around in _places(tree, []))
+    return [Change(node, other, around) for node, around, other in places if other is not None]
 
 
-def _places(tree: ast.AST) -> Iterator[tuple[ast.AST, ast.AST]]:
+def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list[ast.AST]]]:
     """Expressions that compute, each with what it stands in."""
+    around = [*above, tree]
     for field, value in ast.iter_fields(tree):
         if field in ("annotation", "returns", "decorator_list"):
             continue
@@ -56,15 +136,18 @@ def _places(tree: ast.AST) -> Iterator[tuple[ast.AST, ast.AST]]:
                 continue
             if isinstance(node, ast.If) and isinstance(node.body[-1], ast.Raise):
                 continue
-            yield node, tree
-            yield from _places(node)
+            if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("logger."):
+                continue
+            yield node, around
+            yield from _places(node, around)
 
 
 def _changed(node: ast.AST) -> ast.expr | None:
     """What becomes of an expression; None where nothing is changed."""
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        grown = node.value + 1 if isinstance(node.value, int) else FACTOR * node.value or 0.1
-        return ast.Constant(grown)
+        if isinstance(node.value, int):
+            return ast.Constant(node.value + 1)
+        return ast.Constant(float(f"{FACTOR * node.value or 0.1:.12g}"))
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
         return ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right)
     if isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:

@@ -47,6 +47,11 @@ def test_point_load_is_carried_whole(ring):
         assert up == pytest.approx(weight + 5e3, rel=1e-9)
 
 
+def test_joints_that_stay_closed_take_one_step_and_one_iteration(stack):
+    found = dead_load(af.build(stack, fidelity="rigid"))
+    assert (found.iterations, found.steps) == (1, 1)
+
+
 def test_point_load_off_the_structure(ring):
     with pytest.raises(af.InvalidInput, match=r"x = 9 m misses the structure"):
         af.PointLoad(x=9.0, force=(0.0, -1.0)).place(ring)

@@ -5,8 +5,6 @@ sin(i α_j), i = 1..n, and α_j = (2j - 1) π / (2n + 1) (Clough and Penzien, 19
 """
 
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -166,18 +164,6 @@ def test_a_mechanism_does_not_vibrate():
     with pytest.raises(af.DidNotConverge, match=r"about the given state: .* a mechanism") as caught:
         modes(model, 1, about=lifted)
     assert caught.value.last is lifted
-
-
-def test_slepc_is_needed_for_modes_only():
-    script = """
-import sys
-sys.modules["slepc4py"] = None
-import archfem as af
-from archfem.cases import run as analysis
-model = af.build(af.column(breadth=1.0, heights=[1.0, 1.0]), fidelity="rigid")
-assert af.dead_load(model).iterations > 0
-"""
-    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_what_cannot_be_asked_for():

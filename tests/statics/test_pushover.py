@@ -1,5 +1,6 @@
 """Pushover: it rises to the limit of rigid blocks, whichever way it is controlled."""
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -35,6 +36,18 @@ def limit_of(load):
     return af.collapse_factor(RING, live=load, friction="nonassociated").factor
 
 
+@cache
+def pushed(load, control):
+    """The ring's rigid blocks pushed over, which many tests look at."""
+    return pushover(rigid(RING), LOADS[load], control=control)
+
+
+@cache
+def spread(motion):
+    """The ring's rigid blocks on a support that moves."""
+    return pushover(rigid(RING), af.Settlement("left abutment", motion))
+
+
 REACHED = 5e-3
 """Relative: how near a pushover must come to the limit of the polygon it models."""
 
@@ -52,7 +65,7 @@ QUICK = [("force", "sideways"), ("displacement", "eccentric"), ("arc length", "t
 )
 def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     limit = limit_of(LOADS[load])
-    found = pushover(rigid(RING), LOADS[load], control=control)
+    found = pushed(load, control)
     if (control, load) == ("force", "sideways"):
         assert "cannot grow beyond a factor of 0.457" in found.outcome
     assert found.factor == pytest.approx(limit, rel=REACHED)
@@ -101,7 +114,7 @@ def test_a_rule_without_points_at_the_faces_cannot_reach_it():
 
 def test_hinges_are_those_of_the_mechanism():
     collapse = af.collapse_factor(RING, live=af.BodyForce(1.0), friction=None)
-    found = pushover(rigid(RING), af.BodyForce(1.0))
+    found = pushed("sideways", "displacement")
     assert set(collapse.hinges) <= set(found.hinges)
     assert found.hinges[0] == (6, "extrados")
 
@@ -137,7 +150,7 @@ def test_curve_of_a_rocking_block_follows_the_joint_section():
 
 
 def test_curve_starts_at_the_dead_load_and_never_falls():
-    found = pushover(rigid(RING), LOADS["eccentric"])
+    found = pushed("eccentric", "displacement")
     assert float(found.curve["factor"][0]) == 0.0
     assert float(found.curve["displacement"][0]) == 0.0
     assert float(found.curve["displacement"].diff("step").min()) > 0.0
@@ -221,12 +234,12 @@ def test_what_moved_is_named():
         assert f"the {what} moved by" in pushover(rigid(RING), load, stop=stop).outcome
 
 
-@pytest.mark.parametrize("spread", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
-def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(spread):
+@pytest.mark.parametrize("motion", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
+def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(motion):
     """Out: the least thrust; in: the greatest; down: the least share of the weight."""
-    settlement = af.Settlement("left abutment", spread)
+    settlement = af.Settlement("left abutment", motion)
     limit = af.collapse_factor(RING, live=settlement, friction=None).factor
-    found = pushover(rigid(RING), settlement)
+    found = spread(motion)
     assert found.factor == pytest.approx(limit, rel=REACHED)
     assert found.limit == pytest.approx(limit, rel=REACHED)
     factor = found.curve["factor"]
@@ -261,9 +274,8 @@ def test_work_on_a_settlement_is_the_thrust_on_the_support():
 
 def test_joints_turn_as_the_mechanism_of_limit_analysis():
     """Far along, what the joints turn from step to step is its motion, and only its hinges turn."""
-    load = LOADS["sideways"]
-    found = pushover(rigid(RING), load)
-    mechanism = af.collapse_factor(RING, live=load, friction=None)
+    found = pushed("sideways", "displacement")
+    mechanism = af.collapse_factor(RING, live=LOADS["sideways"], friction=None)
     intrados, extrados, _ = RigidBlocks(RING).gaps(mechanism.motion)
     expected = (intrados - extrados) / RING.depths
     turned = found.joints["rotation"].isel(step=[-2, -1]).diff("step").values[0]
@@ -277,8 +289,7 @@ def test_joints_turn_as_the_mechanism_of_limit_analysis():
 
 def test_openings_over_a_settlement_are_those_of_its_equilibria():
     """Of each step, and of the dead load on a support moved so far at once."""
-    model = rigid(RING)
-    found = pushover(model, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))
+    model, found = rigid(RING), spread((-1.0, 0.0, 0.0))
     step = int(np.argmin(np.abs(found.curve["displacement"].values - 2e-3)))
     far = float(found.curve["displacement"][step])
     direct = af.dead_load(model.settled(af.Settlement("left abutment", (-far, 0.0, 0.0))))

@@ -46,6 +46,24 @@ def test_where_nothing_slides_creep_ends_where_newton_does(stack):
     assert not after.memory.any()
 
 
+def test_a_block_that_flows_down_a_plane_is_given_up_soon():
+    """On 0.3 rad with μ = 0.2: W (sin φ - μ cos φ) = 1.04 kN drives it on, whatever the step.
+
+    Twelve steps after the first, which took up what friction can hold, nothing is nearer to rest.
+    """
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+
+    def box(low, high, **given):
+        corners = np.array([[-0.5, low], [0.5, low], [0.5, high], [-0.5, high]]) @ turn
+        return af.Block(tuple(map(tuple, corners.tolist())), af.STONE, role="pier", **given)
+
+    plane, block = box(-0.2, 0.0, name="plane", fixed=True), box(0.0, 0.5, name="block")
+    bed = af.Joint((0, 1), *block.outline[:2], af.Contact(1e10, 4e9, 0.2), "bed", role="pier")
+    model = af.build(af.Structure((plane, block), (bed,)), fidelity="rigid")
+    with pytest.raises(af.DidNotConverge, match=r"in 13 steps of creep: 1\.08e\+03 of 1\.00e\+04"):
+        relaxed(Solver(model.size), model, self_weight(model), np.zeros(model.size))
+
+
 @pytest.mark.parametrize("fidelity", ["faces", "full"])
 def test_soil_joints_slide_and_newton_finds_the_dead_load(bridge, fidelity):
     model = af.build(bridge, fidelity={"backfill": "full", "rest": fidelity}, cells=(2, 2))

@@ -46,11 +46,11 @@ def lawful(ring, request):
 def test_converges_under_refinement(lawful, rule):
     ring, converged = lawful
     errors = []
-    for cells in (4, 8, 16):
+    for cells in (4, 16):
         found = af.dead_load(af.build(ring, cells=(cells, cells), quadrature=rule)).joints
         errors.append(abs(float(found["eccentricity"][8]) - converged))
     assert errors[-1] < 8e-4
-    assert errors[2] < 0.5 * errors[0]
+    assert errors[1] < 0.5 * errors[0]
 
 
 def test_dead_load_values(lawful, verified):

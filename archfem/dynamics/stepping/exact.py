@@ -1,6 +1,7 @@
 """Every scheme, each step one equilibrium solve by SNES: what all strategies must equal."""
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import replace
 from functools import partial
 
@@ -184,7 +185,7 @@ class Exact:
         """Tangent of a step; the same object as before while stiffness and step stay."""
         stiffness, kept = self.equation.model.tangent(contact), self._kept
         if kept is None or kept[0] is not stiffness or kept[1] is not linear:
-            matrix = stiffness.copy()
+            matrix = copy(stiffness)
             matrix.data = (stiffness.data + linear.data) / gain
             self._kept = kept = (stiffness, linear, matrix)
         return kept[2]

@@ -1,8 +1,5 @@
 """Films and stills: as many frames as asked, of the right size, that show what moves."""
 
-import subprocess
-import sys
-
 import imageio.v2 as imageio
 import numpy as np
 import pytest
@@ -183,16 +180,3 @@ def test_runs_without_fields_or_of_another_model_are_refused(model, coarse, run,
         film(coarse, run, tmp_path / "film.mp4")
     with pytest.raises(af.InvalidInput, match=r"3 coordinates, and the model has 51"):
         picture(model, np.zeros(3))
-
-
-def test_pictures_on_paper_load_nothing_that_films_need():
-    script = """
-import sys
-import archfem as af
-for name in af.view.__all__:
-    if not name.startswith(("film", "picture", "viewer", "Viewer")):
-        getattr(af.view, name)
-print(*({"pyvista", "imageio", "vtk"} & set(sys.modules)))
-"""
-    ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    assert ran.stdout.split() == []
