@@ -98,7 +98,8 @@ def two_joints(shapes, friction, facets, rng, fill=False):
         np.array([False, shapes > 0]),
     )
     whole = np.arange(2)
-    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2), whole, np.zeros(2), 2)
+    angles, built = rng.uniform(-3, 3, 2), 0.03 * rng.normal(size=(2, 4))
+    return Moved(sides, faces, angles, np.ones(2), whole, np.zeros(2), 2, built)
 
 
 def gathered(joints, before, after, late, slid):

@@ -31,6 +31,8 @@ class Moved(NamedTuple):
             of its mesh divide it (j,).
         aside: how far its middle lies from that of the whole, toward the extrados (j,) [m].
         wholes: number of joints of the structure.
+        built: opening, slip, turn and stretch of each before anything moved, where blocks were
+            placed on others that had been displaced (j, 4) [m, m, -, m].
     """
 
     sides: Sides
@@ -40,6 +42,7 @@ class Moved(NamedTuple):
     whole: Any
     aside: Array
     wholes: int
+    built: Array
 
 
 class Answer(NamedTuple):
@@ -95,7 +98,18 @@ def find_measures(joints, joint, q):  # type: ignore
         q: coordinates (n,).
     """
     lower, higher = pose(joints.sides, joint, 0, q), pose(joints.sides, joint, 1, q)
-    return measures(lower, higher, joints.angle[joint])
+    return _since(joints, joint, measures(lower, higher, joints.angle[joint]))
+
+
+@inlined
+def _since(joints, joint, found):  # type: ignore
+    """Opening, slip and turn since the joint was built stress-free."""
+    built = joints.built
+    return (
+        found[0] + built[joint, 0],
+        found[1] + built[joint, 1],
+        found[2] + built[joint, 2],
+    )
 
 
 @numba.njit(cache=True)
@@ -168,7 +182,7 @@ def joint_energy(joints, q, slid):  # type: ignore
     total, faces = 0.0, joints.faces
     for joint in range(len(joints.angle)):
         found = find_measures(joints, joint, q)
-        longer = stretched(joints.sides, joint, q)
+        longer = joints.built[joint, 3] + stretched(joints.sides, joint, q)
         length = lap(faces, joint, found[1])[0]
         phi = stored(faces, joint, length, found[0], found[2])[0]
         total += faces.normal[joint] * length * phi
@@ -197,16 +211,18 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
 
 
 @inlined
-def _pass(joints, joint, states, late, slid, longer, found):  # type: ignore
+def _pass(joints, joint, states, late, slid, room, found):  # type: ignore
     """Find what a joint does over a step."""
     sides, faces, (before, after) = joints.sides, joints.faces, states
     first, swings, ways = swing(sides, joint, 0, before, after)
     second, others, more = swing(sides, joint, 1, before, after)
     start, end, rates, now, step = follow(first, second, joints.angle[joint])
-    stretch = stretched(sides, joint, before), stretched(sides, joint, after)
+    longer = joints.built[joint, 3]
+    stretch = longer + stretched(sides, joint, before), longer + stretched(sides, joint, after)
+    ends = _since(joints, joint, start), _since(joints, joint, end), stretch
     memory = slid, found.slid, found.ways
     force, law, lengthens, (shear, found.lost[joint], missing) = carry(
-        faces, joint, (start, end, stretch), late, memory
+        faces, joint, ends, late, memory
     )
     whole, hand = joints.whole[joint], joints.hand[joint]
     found.resultants[whole, 0] -= force[0]
@@ -225,8 +241,8 @@ def _pass(joints, joint, states, late, slid, longer, found):  # type: ignore
         swing_bend(sides, joint, 1, others, (x, y, high), found.rate)
     if sides.stretch.shape[2] > 0:
         by_all, of_all = seen(now, law[3]), pushed(rates, (0.0, lengthens[0], 0.0))
-        _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), longer)
-        _stretch(sides, joint, (force[3], missing[1], lengthens[1]), longer, found)
+        _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), room)
+        _stretch(sides, joint, (force[3], missing[1], lengthens[1]), room, found)
 
 
 @computing
