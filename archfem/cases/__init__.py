@@ -2,6 +2,7 @@
 
     toml        tables of a file, no deeper and no larger than anybody means
     settings    tables of a case file and changes to them
+    based       tables of a file over those of another that it is based on
     structures  [structure], [materials], [contacts] as a `Structure`
     motions     [motion], [suite] as a `Motion`, a `Suite`
     limits      [limit] as loads and friction for limit analysis

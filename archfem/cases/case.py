@@ -13,14 +13,13 @@ from typing import Any
 import tomli_w
 
 from archfem.annotated import as_annotated
-from archfem.arguments import said
 from archfem.cases import motions as ground
+from archfem.cases.based import based_tables
 from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
-from archfem.cases.settings import Table, change, checked, merged, refuse_unknown, remove
+from archfem.cases.settings import Table, change, checked, refuse_unknown
 from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
 from archfem.cases.structures import planned
-from archfem.cases.toml import tables_in
 from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
 from archfem.dynamics.time_history import LEAST_STEP
 from archfem.errors import ArchfemError, InvalidInput
@@ -78,8 +77,6 @@ SECTIONS = (
     "dead_load",
     "output",
 )
-MOST_BASES = 20
-"""Most files that are based one on the other."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +130,7 @@ class Case:
             InvalidStructure: lengths that do not make a structure.
         """
         path = Path(path)
-        settings = _tables(path, ())
+        settings = based_tables(path)
         for text in changes:
             change(settings, text)
         try:
@@ -196,6 +193,11 @@ class Case:
     def stages(self) -> Sequence[Stage] | None:
         """In which the structure is built; None where it is in one go."""
         return stages_asked(self.settings.get("dead_load", {}), self.structure)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the ground moves, under one motion or a suite."""
+        return self.motion is not None or self.suite is not None
 
     @property
     def chooses(self) -> bool:
@@ -294,32 +296,3 @@ class Case:
 def _titled(structure: Structure, settings: Table) -> Structure:
     """Return a structure that pictures call by the title of its case, where it has one."""
     return replace(structure, name=str(settings.get("title", structure.name)))
-
-
-def _tables(path: Path, above: Sequence[Path]) -> dict[str, Any]:
-    """Return the tables of a case file over those of its base.
-
-    Args:
-        path: the file.
-        above: files that are based on it, one on the other.
-
-    Raises:
-        InvalidInput: there is no such file, it is not TOML, or its base cannot be meant.
-    """
-    settings = tables_in(path, "case file")
-    if path.resolve() in above:
-        raise InvalidInput(f"{path} is its own base: base must name another file")
-    if len(above) >= MOST_BASES:
-        raise InvalidInput(f"{path} is the base of {MOST_BASES} files, one on another: merge them")
-    base = settings.pop("base", None)
-    if base is None:
-        return settings
-    if not isinstance(base, str):
-        raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
-    below = _tables(path.parent / base, (*above, path.resolve()))
-    without = settings.pop("without", [])
-    if not isinstance(without, list) or not all(isinstance(key, str) for key in without):
-        raise InvalidInput(f'{path}: without = {said(without)}: write ["section.key", …]')
-    for key in without:
-        remove(below, key)
-    return merged(below, settings)

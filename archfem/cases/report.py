@@ -24,7 +24,6 @@ from archfem.view.dead import draw_dead_load
 from archfem.view.displaced import draw_during
 from archfem.view.envelopes import draw_envelope
 from archfem.view.falls import draw_fall
-from archfem.view.films.modes import film_modes
 from archfem.view.freebody import draw_free_body
 from archfem.view.joints import draw_joints, telling_joints
 from archfem.view.modes import draw_modes
@@ -176,7 +175,7 @@ def write_pairs(runs: Mapping[str, History], rest: Rest, text: str, folder: Path
 
 
 def write_modes(found: Modes, text: str, folder: Path) -> list[Path]:
-    """Write the table of modes, draw their shapes, and film the first two.
+    """Write the table of modes, and draw their shapes.
 
     Args:
         found: the modes.
@@ -186,12 +185,7 @@ def write_modes(found: Modes, text: str, folder: Path) -> list[Path]:
     Returns:
         The files.
     """
-    first = range(1, min(len(found.frequencies), 2) + 1)
-    return [
-        _write(text, folder / "modes.txt"),
-        save(draw_modes(found), folder / "modes.png"),
-        film_modes(found, folder / "modes.gif", first),
-    ]
+    return [_write(text, folder / "modes.txt"), save(draw_modes(found), folder / "modes.png")]
 
 
 def write_accuracy(found: Accuracy, text: str, folder: Path) -> list[Path]:

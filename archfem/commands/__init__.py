@@ -2,6 +2,7 @@
 
     line      words as a command, and its exit code
     cases     commands for one case, and for records
+    telling   what is said of a case as its results come
     films     the command for films
     studies   the command for studies
     examples  cases that archfem brings

@@ -148,6 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     mesh.set_defaults(command=_later("cases", "mesh"))
     accuracy = case_command("accuracy", "speed against error over rungs, meshes, rules and steps")
     accuracy.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    accuracy.add_argument("--workers", type=int, default=1, help="processes for settings (1)")
     accuracy.set_defaults(command=_later("cases", "accuracy"))
     report = chosen.add_parser("report", help="one HTML page of a result folder, to print")
     report.description = "Write one self-contained HTML page of what a result folder holds."

@@ -67,9 +67,18 @@ def exact(structure: Structure, rung: str, cells: tuple[int, int]) -> Discretisa
         rung: of the stones.
         cells: through the thickness and along each block.
     """
+    return Discretisation(stones(structure, rung), cells, quadrature="exact")
+
+
+def stones(structure: Structure, rung: str) -> str | dict[str, str]:
+    """Return a rung for all blocks but the soft ones, which keep all their nodes.
+
+    Args:
+        structure: what stands.
+        rung: of the stones.
+    """
     soft = [structure.blocks[number].name for number in soft_blocks(structure)]
-    fidelity = {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
-    return Discretisation(fidelity, cells, quadrature="exact")
+    return {**dict.fromkeys(soft, "full"), "rest": rung} if soft else rung
 
 
 def label(asked: Discretisation) -> str:

@@ -2,22 +2,25 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from tqdm import tqdm
 
 from archfem.arrays import Array
-from archfem.dynamics.candidates import LEVELS, best, label
+from archfem.dynamics.candidates import LEVELS, best, label, stones
+from archfem.dynamics.history import Ending
 from archfem.dynamics.ladder import Damping, damping_for
-from archfem.dynamics.probe import largest_difference, peaks
+from archfem.dynamics.probe import largest_difference, peaks_of
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.masonry.structure import Structure
 from archfem.models.build import build
 from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
 from archfem.tables import aligned
 
 RUNGS = ("rigid", "faces", "condensed")
@@ -48,13 +51,28 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Run:
+    """What a run of one setting came to.
+
+    Attributes:
+        size: coordinates.
+        seconds: of the processor, to step through the motion once the model is built [s].
+        peaks: largest |e| of each judged joint (n,) [-]; None where the run failed.
+    """
+
+    size: int
+    seconds: float
+    peaks: Array | None
+
+
+@dataclass(frozen=True)
 class Trial:
     """One setting, and what came of it.
 
     Attributes:
         setting: the model and the time step.
         size: coordinates.
-        seconds: to step through the motion, once the model is built [s].
+        seconds: of the processor, to step through the motion once the model is built [s].
         error: in the largest |e| of the worst joint, against the reference [-]; infinite where
             the run failed.
     """
@@ -148,48 +166,121 @@ def accuracy(
         InvalidInput: a rung, rule or step is not known.
         DidNotConverge: the reference itself failed.
     """
-    settings = list(_settings(rungs, cells, rules, steps))
-    finest = best(structure, LEVELS[-1])
-    model = build(structure, finest)
-    damping = damping_for(model, damping)
-    reference = peaks(model, motion, damping, FINE)
-    halved = replace(finest, cells=(finest.through // 2, finest.along // 2))
-    doubt = _trial(Setting(halved, 2.0 * FINE), structure, motion, damping, reference).error
-    trials = [
-        _trial(setting, structure, motion, damping, reference)
-        for setting in tqdm(settings, unit="setting", disable=None, leave=False)
+    references = references_of(structure)
+    damping = damping_for(build(structure, references[0].discretisation), damping)
+    asked = [*references, *settings_of(structure, rungs, cells, rules, steps)]
+    runs = [
+        timed(build(structure, each.discretisation), motion, damping, each.dt)
+        for each in tqdm(asked, unit="setting", disable=None, leave=False)
     ]
-    return Accuracy(tuple(trials), Setting(finest, FINE), doubt, motion.duration, tolerance)
+    return compared(asked, runs, motion.duration, tolerance)
 
 
-def _settings(
-    rungs: Sequence[str],
-    cells: Sequence[tuple[int, int]],
-    rules: Sequence[tuple[str, int | None]],
-    steps: Sequence[float],
+def references_of(structure: Structure) -> tuple[Setting, Setting]:
+    """Return the setting that all others are compared with, and one that tells of its own error.
+
+    Args:
+        structure: what stands.
+
+    Returns:
+        The finest, and the same at twice the time step and half the cells.
+    """
+    finest = best(structure, LEVELS[-1])
+    halved = replace(finest, cells=(finest.through // 2, finest.along // 2))
+    return Setting(finest, FINE), Setting(halved, 2.0 * FINE)
+
+
+def settings_of(
+    structure: Structure,
+    rungs: Sequence[str] = RUNGS,
+    cells: Sequence[tuple[int, int]] = CELLS,
+    rules: Sequence[tuple[str, int | None]] = RULES,
+    steps: Sequence[float] = STEPS,
 ) -> Iterator[Setting]:
-    """All combinations, each scene once: rigid joints with exact facets have no mesh."""
+    """Yield all combinations, each scene once: rigid joints with exact facets have no mesh.
+
+    Args:
+        structure: what stands; its soft blocks, such as backfill, keep all their nodes.
+        rungs: fidelities of the stones.
+        cells: meshes.
+        rules: quadratures, each with its points on a facet.
+        steps: time steps [s].
+
+    Yields:
+        Each setting.
+
+    Raises:
+        InvalidInput: a rung or rule is not known.
+    """
     for rung in rungs:
+        fidelity = stones(structure, rung)
         for rule, points in rules:
-            meshless = rung == "rigid" and rule == "exact"
+            meshless = fidelity == "rigid" and rule == "exact"
             for mesh in [(1, 1)] if meshless else cells:
-                asked = Discretisation(rung, mesh, quadrature=rule, points=points)
+                asked = Discretisation(fidelity, mesh, quadrature=rule, points=points)
                 yield from (Setting(asked, dt) for dt in steps)
 
 
-def _trial(
-    setting: Setting,
-    structure: Structure,
+def timed(
+    model: Model,
     motion: Motion,
     damping: Viscous | None,
-    reference: Array,
-) -> Trial:
-    """Build, run and compare one setting; what is compiled on first use is not counted."""
-    model = build(structure, setting.discretisation)
-    time_history(model, motion.cut(0.0, 2.0 * setting.dt), damping=damping, dt=setting.dt)
-    start = perf_counter()
+    dt: float,
+    start: Equilibrium | None = None,
+) -> Run:
+    """Run a model and say how long that took; what is compiled on first use is not counted.
+
+    Args:
+        model: of one setting.
+        motion: of the ground.
+        damping: None is undamped.
+        dt: time step [s].
+        start: the dead load, found first where it is not given.
+
+    Returns:
+        Size, time, and what the joints came to.
+
+    Raises:
+        KeyboardInterrupt: on Ctrl-C.
+    """
+    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
+    begun = process_time()
     try:
-        error = largest_difference(peaks(model, motion, damping, setting.dt), reference)
+        run = time_history(model, motion, damping=damping, dt=dt, start=start)
     except DidNotConverge:
-        error = np.inf
-    return Trial(setting, model.size, perf_counter() - start, error)
+        return Run(model.size, process_time() - begun, None)
+    if run.ended is Ending.INTERRUPTED:
+        raise KeyboardInterrupt
+    return Run(model.size, process_time() - begun, peaks_of(run))
+
+
+def compared(
+    settings: Sequence[Setting], runs: Sequence[Run], duration: float, tolerance: float
+) -> Accuracy:
+    """Return what runs of settings tell, by the first of them, the reference.
+
+    Args:
+        settings: as by `references_of`, then all others.
+        runs: one for each.
+        duration: of the motion [s].
+        tolerance: by which one is chosen [-].
+
+    Raises:
+        DidNotConverge: the reference failed.
+    """
+    reference = runs[0].peaks
+    if reference is None:
+        raise DidNotConverge(
+            f"the reference, {settings[0].label}, did not reach the end of the motion: there is "
+            "nothing to compare with; take a weaker motion (motion.scale) or a shorter one"
+        )
+    trials = [
+        Trial(
+            setting,
+            run.size,
+            run.seconds,
+            np.inf if run.peaks is None else largest_difference(run.peaks, reference),
+        )
+        for setting, run in zip(settings, runs, strict=True)
+    ]
+    return Accuracy(tuple(trials[2:]), settings[0], trials[1].error, duration, tolerance)

@@ -35,7 +35,7 @@ def ratios(resultants: Array, depth: Array) -> tuple[Array, Array]:
         M / (N h) and |V| / N (…, n_joints) [-].
     """
     normal, shear, moment = np.moveaxis(resultants, -1, 0)
-    pressed = np.where(normal > 0.0, normal, np.nan)
+    pressed = np.where(normal * depth > 0.0, normal, np.nan)  # the least of numbers, halved, is 0
     return moment / (pressed * depth), np.abs(shear) / pressed
 
 

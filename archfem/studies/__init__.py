@@ -22,6 +22,7 @@
     ida         incremental dynamic analysis
     fragility   the probability of a limit state over intensity
     convergence what findings hang on besides the structure: mesh, step, quadrature, rung
+    tradeoff    speed against error of a case, a point a setting
     stiffness   of dry joints, and what hangs on it
     pairs       pairs of a suite on processes
     slurm       the file of a job for SLURM

@@ -22,3 +22,4 @@ from .stiffness import JointStiffness as JointStiffness
 from .stiffness import stiffness_report as stiffness_report
 from .study import Study as Study
 from .table import read_table as read_table
+from .tradeoff import case_accuracy as case_accuracy

@@ -170,8 +170,7 @@ def mesh_sensitivity(  # noqa: PLR0913  (what differs, each with its usual value
     Raises:
         InvalidInput: there is no such finding, or a point of the mesh or the steps failed.
     """
-    moves = case.motion is not None or case.suite is not None
-    find = find or ("history" if moves else "dead load")
+    find = find or ("history" if case.moves else "dead load")
     timed = find != "dead load"
     base: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
     base |= {"analysis.dt": steps[-1]} if timed else {}

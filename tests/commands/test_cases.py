@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.commands.cases import DOUBTFUL, tell
+from archfem.commands.line import DOUBTFUL
+from archfem.commands.telling import tell
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
@@ -22,6 +23,8 @@ def test_run_command(tmp_path, capsys):
         "case.toml",
         "dead.png",
         "names.png",
+        "modes.txt",
+        "modes.png",
         "history.nc",
         "summary.txt",
         "gravest.png",
@@ -31,7 +34,21 @@ def test_run_command(tmp_path, capsys):
     run = af.History.read(tmp_path / "out" / "history.nc")
     assert run.time[-1] == pytest.approx(2.0)
     assert af.Case.of(tomllib.loads(run.dataset.attrs["case"])).model["fidelity"] == "rigid"
-    assert "joint 17" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "joint 17" in said
+    assert (tmp_path / "out" / "modes.txt").read_text(encoding="utf-8") in said
+    assert "damping: 5 % at 8.00 and 16.00 Hz" in said
+
+
+def test_a_rest_without_modes_is_shaken_all_the_same(tmp_path, undrawn, monkeypatch, capsys):
+    def none(model, count, about):
+        raise af.DidNotConverge("no modes")
+
+    monkeypatch.setattr("archfem.statics.modes.modes", none)
+    changes = ["model.fidelity=rigid", "motion.end=0.1", "output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 0
+    assert "no modes about dead load: no modes\ndamping: 5 %" in capsys.readouterr().out
 
 
 def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):

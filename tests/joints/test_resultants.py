@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints.resultants import ratios
 
 DEPTH = 0.55
 
@@ -26,3 +27,12 @@ def test_thrust_line_passes_the_faces_at_half(ring):
     assert radii[:5] == pytest.approx(2.95 + DEPTH / 2)
     assert radii[9:] == pytest.approx(2.95 - DEPTH / 2)
     assert np.isnan(line[5]).all()
+
+
+def test_a_joint_pressed_by_the_least_of_numbers_has_no_eccentricity():
+    """Its N times a depth below one half rounds to nothing, which nothing is divided by."""
+    resultants = np.array([[5e-324, 0.0, 1e-3], [1e3, 100.0, 50.0]])
+    with np.errstate(divide="raise", over="raise", invalid="raise"):
+        eccentricity, friction = ratios(resultants, np.array([0.4, 0.5]))
+    assert np.isnan([eccentricity[0], friction[0]]).all()
+    assert (eccentricity[1], friction[1]) == (0.1, 0.1)

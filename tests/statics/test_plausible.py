@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import archfem as af
-from archfem.commands.cases import DOUBTFUL
+from archfem.commands.line import DOUBTFUL
 from archfem.statics.plausible import dead_load_doubts
 
 

@@ -20,7 +20,7 @@ def ground_section(results: Results) -> Section:
     """
     motions = list(results.grounds.values())
     if not motions:
-        asks = results.case.motion is not None or results.case.suite is not None
+        asks = results.case.moves
         remedy = "The case asks for none." if not asks else "`archfem run` shakes the structure."
         return Section("Ground motion", [not_held("a motion of the ground", remedy)])
     pieces: list[Any] = [Grid(*motion_rows(motions), AT)]
