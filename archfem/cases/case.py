@@ -183,11 +183,6 @@ class Case:
         _ = self.stages
         displacements = self.discretisation.displacements
         check_scheme(self.analysis, self.structure, displacements)
-        if displacements == "large" and self.stages is not None:
-            raise InvalidInput(
-                "displacements = 'large' and [dead_load] in stages: blocks that move far cannot be "
-                "built in stages; leave out one of both"
-            )
         step = self.analysis.get("dt", 0.005)
         if not LEAST_STEP <= step <= 0.1:
             raise InvalidInput(f"analysis.dt = {step:g} s is not between {LEAST_STEP:g} and 0.1 s")

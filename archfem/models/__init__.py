@@ -11,6 +11,7 @@
     reduced         faces and condensed, by a Galerkin basis
     moving          blocks whose displacements may be large
     moving_passage  a step of such a model
+    turning_stages  such a model built in stages
     turning_blocks  its blocks in coordinates of their own
     turning_joints  the joints between them, whole or in pieces as meshed
     turning_places  how points of its blocks move

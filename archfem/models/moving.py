@@ -28,7 +28,7 @@ from archfem.models.model import Model, Passage, Prediction
 from archfem.models.moving_passage import MovingPassage
 from archfem.models.reduced import projected
 from archfem.models.turning_blocks import OwnCoordinates, jointed, slots_of
-from archfem.models.turning_joints import Pieces, joints_of
+from archfem.models.turning_joints import Pieces, built_measures, joints_of
 from archfem.models.turning_places import StillPoint, TurningCells, TurningPoint
 
 
@@ -44,6 +44,7 @@ class Moving:
         turning: whether each of those blocks has a frame that turns; a fill has none.
         centres: about which blocks turn (n_blocks, 2) [m].
         pieces: of the joints.
+        built: as of `Jointed.begun`; None where all was built in one go.
 
     Raises:
         InvalidInput: the joints obey a law that is not known for large motion, or faces bend
@@ -73,6 +74,7 @@ class Moving:
         self.body = self.at_rest.body
         self.cells: Cells = TurningCells.of(self.at_rest.cells, blocks.blocks)
         self.supports = self.at_rest.supports
+        self.built: Array | None = None
         self.prediction: Prediction | None = None
         self.doubts: tuple[str, ...] = ()
         self._points: dict[PointLoad, TurningPoint] = {}
@@ -97,6 +99,18 @@ class Moving:
         sides = self.joints.sides
         held = self.pieces.held(supports)
         other.joints = self.joints._replace(sides=sides._replace(held=held))
+        return other
+
+    def begun(self, built: Array) -> Self:
+        """Return the same model, whose blocks were placed one after the other.
+
+        Args:
+            built: opening and slip at which joint points began, as of `Jointed.begun` (2, p) [m].
+        """
+        other = copy(self)
+        other.built = built
+        began = built_measures(self.at_rest, self.pieces, built)
+        other.joints = self.joints._replace(built=np.ascontiguousarray(began))
         return other
 
     def predicted(self, prediction: Prediction) -> Self:

@@ -151,12 +151,29 @@ def joints_of(
         pieces.joint,
         pieces.aside,
         len(structure.joints),
+        np.zeros((len(pieces.joint), 4)),
     )
 
 
 def _moves(model: Jointed, pieces: Pieces) -> list[sparse.csr_matrix]:
     """From coordinates to opening, slip, turn and stretch of the pieces, to the left (j, n)."""
-    operator, points = model.operator, model.operator.points
+    return _measured(model, pieces, model.operator.opening, model.operator.slip)
+
+
+def built_measures(model: Jointed, pieces: Pieces, built: Array) -> Array:
+    """Return opening, slip, turn and stretch at which pieces began, to the left (j, 4).
+
+    Args:
+        model: in coordinates of the blocks.
+        pieces: of its joints.
+        built: opening and slip at which its points began (2, p) [m].
+    """
+    return np.column_stack(_measured(model, pieces, *built))
+
+
+def _measured(model: Jointed, pieces: Pieces, opening: Any, slip: Any) -> list[Any]:
+    """Opening, slip, turn and stretch of the pieces from what points open and slip (p, …)."""
+    points = model.operator.points
     piece = np.repeat(np.arange(len(pieces.joint)), np.diff(pieces.first))
     hand = hands(model.structure)[pieces.joint]
     off = hand[piece] * (points.arm - pieces.aside[piece])
@@ -166,9 +183,9 @@ def _moves(model: Jointed, pieces: Pieces) -> list[sparse.csr_matrix]:
     mean = sparse.csr_matrix((share, place), shape)
     spread = np.bincount(piece, share * off**2)[piece]
     slope = sparse.csr_matrix((share * off / spread, place), shape)
-    along = sparse.diags(hand[piece]) @ operator.slip
-    stretch = sparse.diags(pieces.depth) @ slope @ along
-    return [mean @ operator.opening, mean @ along, -slope @ operator.opening, stretch]
+    along = sparse.diags(hand[piece]) @ slip
+    stretch = sparse.diags(pieces.depth) @ (slope @ along)
+    return [mean @ opening, mean @ along, -(slope @ opening), stretch]
 
 
 def _sides(

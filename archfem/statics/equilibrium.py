@@ -18,6 +18,7 @@ from archfem.models.gauges import Gauges
 from archfem.models.jointed import Jointed
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
+from archfem.models.turning_stages import on_site, taken_over
 from archfem.models.unfinished import Unfinished
 from archfem.shown import Shown
 from archfem.statics.newton import Newton, Solver
@@ -63,8 +64,8 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
                 f"the state is of another structure, '{self.model.structure.name}', whose blocks "
                 f"are elsewhere than those of '{model.structure.name}': give the same model's"
             )
-        built = self.model.built if isinstance(self.model, Jointed) else None
-        if built is not None and isinstance(model, Jointed):
+        built = self.model.built if isinstance(self.model, Jointed | Moving) else None
+        if built is not None and isinstance(model, Jointed | Moving):
             model = model.begun(built)
         return model.remembering(self.model.memory)
 
@@ -119,8 +120,10 @@ def dead_load(
 
     Built in one go, the structure gets its weight as a whole. Built in stages, blocks come
     without stress onto what has been displaced already, and centring holds some until it is
-    struck. Joints of the result's `model` know how they began; whatever takes the result as its
-    start goes on with them, and a run that goes on from a `last_state` needs that model.
+    struck. Where displacements may be large, building is by small ones, and balance is then found
+    in the shape that it has given. Joints of the result's `model` know how they began; whatever
+    takes the result as its start goes on with them, and a run that goes on from a `last_state`
+    needs that model.
 
     Args:
         model: any rung of the ladder; in stages not "monolithic".
@@ -145,10 +148,7 @@ def dead_load(
     if stages is None:
         return equilibrium_under(model, self_weight(model), newton)
     if isinstance(model, Moving):
-        raise InvalidInput(
-            "blocks that move far cannot be built in stages: take displacements='small', or leave "
-            "stages out"
-        )
+        return _built_to_move(model, newton, stages)
     if not isinstance(model, Jointed):
         raise InvalidInput(
             f"a model '{model.fidelity}' cannot be built in stages: use 'full', which is the same"
@@ -216,7 +216,18 @@ def _built(solver: Solver, whole: Jointed, stages: Sequence[Stage]) -> Equilibri
     return replace(found, model=site.remembering(found.model.memory).finished())
 
 
-def _brought_on(solver: Solver, found: Equilibrium, site: Unfinished, what: str) -> Equilibrium:
+def _built_to_move(model: Moving, newton: Newton | None, stages: Sequence[Stage]) -> Equilibrium:
+    """Build blocks by small displacements, and find their balance where that has taken them."""
+    small = on_site(model)
+    built = _built(_solver(small, newton), small, stages)
+    assert isinstance(built.model, Jointed)
+    whole = taken_over(model.moved(small.supports), built.model)
+    solver = _solver(whole, newton)
+    found = _brought_on(solver, replace(built, model=whole), whole, "what was built")
+    return _on_moved_supports(solver, found, self_weight(model), model.supports)
+
+
+def _brought_on(solver: Solver, found: Equilibrium, site: Model, what: str) -> Equilibrium:
     """Bring on, little by little, all weight that is not in balance yet."""
     carried = site.force(found.q)
     rest = self_weight(site) - carried

@@ -43,7 +43,6 @@ def test_displacements_reach_the_model(path):
         ("model.fidelity=monolithic", "the rung 'monolithic' does not know: use 'full'"),
         ("model.displacements=far", "displacements 'far' are not known"),
         ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),
-        ("dead_load.stages=usual", r"'large' and \[dead_load\] in stages: .* leave out one"),
         ("model.quadrature=exact", None),
         ("model.quadrature=nodal", None),
     ],
@@ -61,8 +60,6 @@ def test_schemes_without_memory_are_refused_in_python_too(path):
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
     with pytest.raises(af.InvalidInput, match="blocks that turn far"):
         af.time_history(model, motion, scheme=af.dynamics.Newmark())
-    with pytest.raises(af.InvalidInput, match="cannot be built in stages"):
-        af.dead_load(model, stages=[])
 
 
 def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):

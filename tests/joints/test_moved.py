@@ -98,7 +98,8 @@ def two_joints(shapes, friction, facets, rng, fill=False):
         np.array([False, shapes > 0]),
     )
     whole = np.arange(2)
-    return Moved(sides, faces, rng.uniform(-3, 3, 2), np.ones(2), whole, np.zeros(2), 2)
+    angles, built = rng.uniform(-3, 3, 2), 0.03 * rng.normal(size=(2, 4))
+    return Moved(sides, faces, angles, np.ones(2), whole, np.zeros(2), 2, built)
 
 
 def gathered(joints, before, after, late, slid):
@@ -178,3 +179,29 @@ def test_the_pose_follows_its_discrete_derivative(seed, turns):
         gather(sides, 0, 1, mean, tuple(way), row)
     change = np.subtract(ends[1], ends[0])
     assert np.abs(moves @ (after - before)[6:] - change).max() < 1e-14
+
+
+@pytest.mark.parametrize("facets", [True, False])
+@pytest.mark.parametrize(("shapes", "fill"), KINDS)
+def test_what_has_turned_round_is_to_hold_as_if_nothing_slid(shapes, fill, facets):
+    """Force and what it lacks, and the rate, are then those of joints that never slide."""
+    rng = np.random.default_rng(shapes + 7)
+    joints, size = two_joints(shapes, 0.3, facets, rng, fill), 2 * (3 + shapes)
+    still = joints._replace(faces=joints.faces._replace(friction=np.full(2, np.inf)))
+    before = 0.05 * rng.normal(size=size)
+    after = before + 0.01 * rng.normal(size=size)
+    slid = 0.01 * rng.normal(size=len(joints.faces.place))
+    sliding, holding, late = answer(joints), answer(joints), 0.3
+    pass_joints(joints, before, after, late, slid, sliding)
+    slides, force, lost = sliding.ways != 0.0, sliding.force.copy(), sliding.lost.copy()
+    assert slides.any()
+    assert not sliding.held.any()
+    sliding.ways[:] = -sliding.ways
+    pass_joints(joints, before, after, late, slid, sliding)
+    pass_joints(still, before, after, late, slid, holding)
+    assert np.array_equal(sliding.force, force)
+    assert np.array_equal(sliding.lost, lost)
+    assert not sliding.ways[slides].any()
+    scale = abs(holding.force).max()
+    assert sliding.force + sliding.held == pytest.approx(holding.force, abs=1e-12 * scale)
+    assert sliding.rate == pytest.approx(holding.rate, abs=1e-12 * abs(holding.rate).max())

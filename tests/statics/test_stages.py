@@ -71,12 +71,14 @@ def test_stresses_of_an_elastic_column_do_not_depend_on_the_order(fidelity):
     assert not np.allclose(staged.q, direct.q, rtol=0.1)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-def test_a_ring_that_leaves_its_centring_stands_as_if_built_at_once(fidelity):
+@pytest.mark.parametrize(
+    ("fidelity", "displacements"), [("rigid", "small"), ("faces", "small"), ("rigid", "large")]
+)
+def test_a_ring_that_leaves_its_centring_stands_as_if_built_at_once(fidelity, displacements):
     """Stones on centring bear nothing; nothing slides, so the way does not matter."""
     glued = af.Contact(1.48e9, 0.30e9, None)
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, contact=glued)
-    model = af.build(ring, fidelity=fidelity, cells=(2, 2))
+    model = af.build(ring, fidelity=fidelity, cells=(2, 2), displacements=displacements)
     staged = af.dead_load(model, stages=usual_stages(ring))
     direct = af.dead_load(model)
     assert staged.q == pytest.approx(direct.q, abs=1e-7 * np.abs(direct.q).max())
@@ -112,12 +114,52 @@ def test_runs_and_modes_go_on_from_what_was_built(column):
     assert sides.limit == pytest.approx(1.0 / 3.0, rel=2e-2)  # of breadth to height
 
 
-def test_supports_that_moved_do_so_after_building(column):
-    model = af.build(column, fidelity="rigid").settled(af.Settlement(0, (0.0, -0.01, 0.0)))
+@pytest.mark.parametrize("displacements", ["small", "large"])
+def test_supports_that_moved_do_so_after_building(column, displacements):
+    model = af.build(column, fidelity="rigid", displacements=displacements)
+    model = model.settled(af.Settlement(0, (0.0, -0.01, 0.0)))
     staged = af.dead_load(model, stages=one_by_one(column))
     sink = 20e3 / 1.48e9
     expected = np.array([-3 * sink, -4 * sink, -3 * sink]) - 0.01
     assert upward(column, staged.q) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("fidelity", "cells"), [("rigid", (2, 1)), ("full", (1, 1))])
+def test_blocks_that_move_far_go_on_from_where_they_were_built(fidelity, cells):
+    """Courses sink as if displacements were small, and then stay at rest."""
+    column = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0], material=af.Material(30e9, 0.0, 20e3))
+    given = {"fidelity": fidelity, "cells": cells}
+    small, large = (
+        af.dead_load(af.build(column, displacements=each, **given), stages=one_by_one(column))
+        for each in ("small", "large")
+    )
+    for name in ("N", "opening"):
+        scale = abs(small.joints[name].values).max()
+        assert large.joints[name].values == pytest.approx(
+            small.joints[name].values, abs=1e-8 * scale
+        )
+    still = af.Motion.synthetic(duration=0.25, pga=1e-9, seed=1).cut(0.0, 0.05)
+    for method in ("turning", "snes"):
+        model = af.build(column, displacements="large", **given)
+        run = af.time_history(model, still, start=large, method=method, dt=0.005)
+        assert run.joints["N"].values[-1] == pytest.approx([60e3, 40e3, 20e3], rel=1e-6)
+
+
+def test_a_bridge_built_in_stages_is_in_balance_where_it_has_moved(bridge):
+    """Its joints carry what they do by small displacements, to what those change of its shape."""
+    small, large = (
+        af.build(bridge, fidelity="rigid", cells=(2, 1), displacements=each, quadrature="exact")
+        for each in ("small", "large")
+    )
+    stages = usual_stages(bridge, layers=3)
+    near, far = af.dead_load(small, stages=stages), af.dead_load(large, stages=stages)
+    rest = np.linalg.norm(far.model.force(far.q) - self_weight(far.model))
+    assert rest <= 1e-9 * bridge.weight
+    direct = af.dead_load(large)
+    apart, told = (
+        np.abs(each.joints["N"].values - far.joints["N"].values).max() for each in (near, direct)
+    )
+    assert apart < 0.05 * told
 
 
 def test_usual_stages_of_a_bridge(bridge):

@@ -7,7 +7,8 @@ q + ½ Δt v,
 
 |P_T| <= μ P_N, and P_T opposes u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and
 Applications, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235). Solved by projected
-Gauss and Seidel, contact by contact, from the impulses of the step before.
+Gauss and Seidel, contact by contact, from the impulses of the step before. Impulses that do no work
+need not have settled; those that do are swept on.
 """
 
 from typing import NamedTuple
@@ -17,6 +18,9 @@ import numba
 from archfem.arrays import Array
 from archfem.dynamics.falling.carried import Carried, keep, recall
 from archfem.dynamics.falling.contact import Contacts, World, find, place
+
+PATIENCE = 40
+"""How many times as many sweeps a step may have whose impulses would add energy."""
 
 
 class Laws(NamedTuple):
@@ -91,7 +95,11 @@ def step(bodies, laws, room, q, v, ground):  # type: ignore
         if bodies.inverse[b, 0] > 0.0:
             moving[b, 0] -= laws.dt * ground[0]
             moving[b, 1] -= laws.dt * (laws.gravity + ground[1])
-    sweeps = _impulses(bodies, laws, room, touching)
+    _carry_on(bodies, room, touching)
+    for _ in range(PATIENCE):
+        sweeps = _impulses(bodies, laws, room, touching)
+        if sweeps <= laws.sweeps or not _gains(bodies, laws, v, moving, ground):
+            break
     keep(bodies, middle, found, touching, carried)
     q += half * (v + moving[:count])
     v[:] = moving[:count]
@@ -159,8 +167,24 @@ def _push(bodies, moving, pair, way, arms, impulse):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _impulses(bodies, laws, room, touching):  # type: ignore
-    """Sweep over the contacts until impulses hardly change; the number of sweeps."""
+def _gains(bodies, laws, before, after, ground):  # type: ignore
+    """Whether the impulses of a step have done work, but for what rounds."""
+    work = kinetic = 0.0
+    for b in range(len(before)):
+        m, inertia = bodies.mass[b]
+        if bodies.inverse[b, 0] == 0.0:
+            continue
+        (x0, y0, w0), (x1, y1, w1) = before[b], after[b]
+        along = x1 - x0 + laws.dt * ground[0]
+        up = y1 - y0 + laws.dt * (laws.gravity + ground[1])
+        work += 0.5 * m * (along * (x0 + x1) + up * (y0 + y1)) + 0.5 * inertia * (w1**2 - w0**2)
+        kinetic += 0.5 * m * (x1**2 + y1**2) + 0.5 * inertia * w1**2
+    return work > laws.settled * kinetic
+
+
+@numba.njit(cache=True)
+def _carry_on(bodies, room, touching):  # type: ignore
+    """Begin with the impulses that the contacts have."""
     found, moving = room.found, room.moving
     for k in range(touching):
         a, b = found.bodies[k]
@@ -168,6 +192,12 @@ def _impulses(bodies, laws, room, touching):  # type: ignore
         na, nb, ta, tb = room.rows[k, :4]
         _push(bodies, moving, (a, b), (nx, ny), (na, nb), found.impulse[k, 0])
         _push(bodies, moving, (a, b), (-ny, nx), (ta, tb), found.impulse[k, 1])
+
+
+@numba.njit(cache=True)
+def _impulses(bodies, laws, room, touching):  # type: ignore
+    """Sweep over the contacts until impulses hardly change; the number of sweeps."""
+    found, moving = room.found, room.moving
     for sweep in range(1, laws.sweeps + 1):
         change, largest = 0.0, 0.0
         for k in range(touching):

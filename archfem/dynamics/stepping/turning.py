@@ -22,7 +22,7 @@ from archfem.dynamics.stepping.elimination import Elimination, Indices
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.loop import begin, measure, settle
 from archfem.dynamics.stepping.panel_lu import NO_PANELS, Panels, panels_of
-from archfem.dynamics.stepping.sparse_rows import Rows, row_times, rows_of, stored
+from archfem.dynamics.stepping.sparse_rows import Rows, row_times, rows_of, stored, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
 from archfem.dynamics.stepping.turning_newton import sought
 from archfem.joints.moving.compiled import computing
@@ -142,9 +142,9 @@ class Turning(Reordered):
             model.joints._replace(sides=sides),
             room,
             np.zeros_like(room.slid),
-            rows_of(mass),
-            rows_of(blocks),
-            rows_of(viscous),
+            rows_of(trimmed(mass)),
+            rows_of(trimmed(blocks)),
+            rows_of(trimmed(viscous)),
             rows_of(effective),
             band,
             panels,
@@ -188,6 +188,7 @@ class Turned(NamedTuple):
         band: of a pass, destroyed by it (n, 3 b + 1).
         rest: forces out of balance, destroyed by a pass (n,).
         image: room (n,).
+        pulled: K q at the start of the step (n,).
         constant: what of the forces does not depend on the end of the step (n,).
         move: Δq (n,).
         along: the correction (n,).
@@ -198,6 +199,7 @@ class Turned(NamedTuple):
     band: Array
     rest: Array
     image: Array
+    pulled: Array
     constant: Array
     move: Array
     along: Array
@@ -235,6 +237,7 @@ def _started(system, state, memory):  # type: ignore
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),
+        np.zeros(size),
         np.empty_like(system.panels.base),
         np.zeros(1, dtype=np.bool_),
     )
@@ -261,25 +264,27 @@ def _settled(system, kept, step, states, ground):  # type: ignore
 def _load(system, kept, old, ground):  # type: ignore
     """Forces that do not depend on the end of the step."""
     constant, body, blocks = kept.constant, system.body, stored(system.blocks) > 0
+    pulled = kept.pulled
     for k in range(len(constant)):
         inertia = 2.0 / system.step[0] * row_times(system.mass, k, old[1])
         constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
         if blocks:
-            constant[k] -= row_times(system.blocks, k, old[0])
+            pulled[k] = row_times(system.blocks, k, old[0])
+            constant[k] -= pulled[k]
 
 
 def _measured(system, kept, step, states, ground, results, memory):  # type: ignore
     """Mean resultants and energies of a step, and what joints remember at its end."""
     (resultants, energy), room, new = results, system.room, states[1]
     resultants[:] = room.resultants
-    _energies(system, kept.move, new, ground, energy)
+    _energies(system, kept, new, ground, energy)
     memory[:] = system.slid[: len(memory)]
 
 
 @computing
-def _energies(system, move, new, ground, energy):  # type: ignore
+def _energies(system, kept, new, ground, energy):  # type: ignore
     """Find energies of a step; what joints remember from now on is what they do at its end."""
-    (dt, late), room = system.step, system.room
+    (dt, late), room, move = system.step, system.room, kept.move
     energy[0] = energy[1] = energy[2] = energy[3] = 0.0
     for k in range(len(room.slid)):
         system.slid[k] = room.slid[k]
@@ -289,7 +294,8 @@ def _energies(system, move, new, ground, energy):  # type: ignore
         energy[0] += 0.5 * new[1, k] * row_times(system.mass, k, new[1])
         energy[1] -= system.weight[k] * new[0, k]
         energy[2] -= move[k] * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
-        energy[1] += 0.5 * new[0, k] * row_times(system.blocks, k, new[0])
-        energy[3] += late * move[k] * row_times(system.blocks, k, move)
+        more = row_times(system.blocks, k, move)
+        energy[1] += 0.5 * new[0, k] * (kept.pulled[k] + more)
+        energy[3] += late * move[k] * more
         energy[3] += move[k] * row_times(system.viscous, k, move) / dt
     energy[1] += joint_energy(system.turning, new[0], system.slid)

@@ -2,6 +2,10 @@
 
 Where faces stretch, points slide by s + x η, η how much longer the higher face has become than the
 lower, and the forces that do the work on η are Σ x_i τ̄_i.
+
+A point that slides one way when it is looked at, and the other way when next it is, has gone past
+where it holds. Newton's method would go to and fro between both; so the rates of such a point are
+those of one that holds, and what it would then carry more is told apart.
 """
 
 import numpy as np
@@ -12,7 +16,7 @@ from archfem.joints.moving.rubbing import limits, rubbed
 
 
 @inlined
-def carry(faces, joint, ends, late, slid, left):  # type: ignore
+def carry(faces, joint, ends, late, memory):  # type: ignore
     """Return what a joint carries over a step.
 
     Args:
@@ -20,20 +24,21 @@ def carry(faces, joint, ends, late, slid, left):  # type: ignore
         joint: its number.
         ends: opening, slip and turn at the start, the same at the end, and the stretch at both.
         late: lag of damping over the length of the step [-].
-        slid: how far each point has slid for good before (p,) [m].
-        left: the same at the end, filled for this joint (p,) [m].
+        memory: how far each point has slid for good before; the same at the end, filled for this
+            joint (p,) [m]; and which way each slid when last looked at, brought up to date (p,).
 
     Returns:
         Mean forces on opening, slip, turn and stretch [N, N, N m, N]; their derivatives by opening,
         slip and turn at the end, row by row; those of slip and of stretch by the stretch; the shear
-        [N]; and the energy that friction and the lag take [J].
+        [N]; the energy that friction and the lag take [J]; and what of the forces on slip and on
+        stretch is missing if points held that have turned round [N].
     """
     laps = lap(faces, joint, ends[0][1]), lap(faces, joint, ends[1][1])
     (l0, _), (l1, shrinks) = laps
     mean, half, tilts = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * ends[1][2]
     bounds = ends[0][0], ends[1][0], l0 * ends[0][2], l1 * ends[1][2]
     (total, moment, gap, place, square, lag), rubs = _summed(
-        faces, joint, (bounds, ends), (mean, half, tilts, l1), late, (slid, left)
+        faces, joint, (bounds, ends), (mean, half, tilts, l1), late, memory
     )
     leans = place, -tilts * square, -l1 * square  # of the moment by the measures
     stiff = faces.normal[joint]
@@ -48,7 +53,8 @@ def carry(faces, joint, ends, late, slid, left):  # type: ignore
     force = scale * total, push + rubs[0], -scale * mean * moment, rubs[1]
     slides = slides[0] + rubs[3], slides[1] + rubs[4], slides[2] + rubs[5]
     rates = opens, slides, turns, (rubs[6], rubs[7], rubs[8])
-    return force, rates, (rubs[9], rubs[10]), rubs[0], rubs[2] + scale * lag
+    told = rubs[0], rubs[2] + scale * lag, (rubs[11], rubs[12])
+    return force, rates, (rubs[9], rubs[10]), told
 
 
 @inlined
@@ -75,7 +81,7 @@ def _summed(faces, joint, ends, leaning, late, memory):  # type: ignore
     """Sums over the points of a joint: of what they press and its rates, and of what they rub."""
     (g0, g1, r0, r1), measures = ends
     total = moment = by_gap = by_place = by_square = lost = 0.0
-    rubs = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    rubs = 13 * (0.0,)
     stride = 2 if faces.facets else 1
     for point in range(faces.first[joint], faces.first[joint + 1], stride):
         x0, x1 = faces.place[point], faces.place[point + stride - 1]
@@ -104,8 +110,8 @@ def _summed(faces, joint, ends, leaning, late, memory):  # type: ignore
 
 @inlined
 def _rub(faces, point, step, known, memory, sums):  # type: ignore
-    """Add the shear of a point to the sums of a joint, and remember how far it has slid."""
-    (((_, s0, _), (_, s1, _), (e0, e1)), late), (slid, left) = step, memory
+    """Add the shear of a point to the sums of a joint; remember how far it slid, and which way."""
+    (((_, s0, _), (_, s1, _), (e0, e1)), late), (slid, left, ways) = step, memory
     (limit, by_gap, by_place), (mean, half, tilts, length) = known
     stiff, place = faces.shear[point], faces.place[point]
     begin, now = s0 + place * e0, s1 + place * e1
@@ -113,6 +119,11 @@ def _rub(faces, point, step, known, memory, sums):  # type: ignore
     most = mean * limit if limit < np.inf else limit
     shear, over, by_change, by_limit, rubbing = rubbed(first, change, late, most)
     left[point] = slid[point] + over / stiff
+    way, more = np.sign(over), 0.0
+    if way * ways[point] < 0.0:
+        by_change, by_limit, way = 0.5 + late, 0.0, 0.0
+        more = first + by_change * change - shear
+    ways[point] = way
     along = stiff * by_change
     a = b = c = 0.0
     if by_limit != 0.0:
@@ -130,4 +141,6 @@ def _rub(faces, point, step, known, memory, sums):  # type: ignore
         sums[8] + place * c,
         sums[9] + place * along,
         sums[10] + place * place * along,
+        sums[11] + more,
+        sums[12] + place * more,
     )

@@ -31,6 +31,8 @@ class Moved(NamedTuple):
             of its mesh divide it (j,).
         aside: how far its middle lies from that of the whole, toward the extrados (j,) [m].
         wholes: number of joints of the structure.
+        built: opening, slip, turn and stretch of each before anything moved, where blocks were
+            placed on others that had been displaced (j, 4) [m, m, -, m].
     """
 
     sides: Sides
@@ -40,6 +42,7 @@ class Moved(NamedTuple):
     whole: Any
     aside: Array
     wholes: int
+    built: Array
 
 
 class Answer(NamedTuple):
@@ -52,6 +55,10 @@ class Answer(NamedTuple):
         resultants: mean N, V, M of the joints of the structure (n_joints, 3) [N, N, N m].
         slid: how far each point has slid for good at the end (p,) [m].
         lost: energy that friction and the lag take (j,) [J].
+        ways: which way each point slid when last looked at, 1 or -1; 0 where it held, or nobody has
+            looked (p,).
+        held: what `force` lacks if points held that slide the other way now (j, 2, s); `rate` is
+            that of points that hold there.
     """
 
     force: Array
@@ -59,6 +66,8 @@ class Answer(NamedTuple):
     resultants: Array
     slid: Array
     lost: Array
+    ways: Array
+    held: Array
 
 
 def answer(joints: Moved) -> Answer:
@@ -74,6 +83,8 @@ def answer(joints: Moved) -> Answer:
         np.zeros((joints.wholes, 3)),
         np.zeros(len(joints.faces.place)),
         np.zeros(count),
+        np.zeros(len(joints.faces.place)),
+        np.zeros((count, 2, size)),
     )
 
 
@@ -87,7 +98,18 @@ def find_measures(joints, joint, q):  # type: ignore
         q: coordinates (n,).
     """
     lower, higher = pose(joints.sides, joint, 0, q), pose(joints.sides, joint, 1, q)
-    return measures(lower, higher, joints.angle[joint])
+    return _since(joints, joint, measures(lower, higher, joints.angle[joint]))
+
+
+@inlined
+def _since(joints, joint, found):  # type: ignore
+    """Opening, slip and turn since the joint was built stress-free."""
+    built = joints.built
+    return (
+        found[0] + built[joint, 0],
+        found[1] + built[joint, 1],
+        found[2] + built[joint, 2],
+    )
 
 
 @numba.njit(cache=True)
@@ -160,7 +182,7 @@ def joint_energy(joints, q, slid):  # type: ignore
     total, faces = 0.0, joints.faces
     for joint in range(len(joints.angle)):
         found = find_measures(joints, joint, q)
-        longer = stretched(joints.sides, joint, q)
+        longer = joints.built[joint, 3] + stretched(joints.sides, joint, q)
         length = lap(faces, joint, found[1])[0]
         phi = stored(faces, joint, length, found[0], found[2])[0]
         total += faces.normal[joint] * length * phi
@@ -189,34 +211,46 @@ def pass_joints(joints, before, after, late, slid, found):  # type: ignore
 
 
 @inlined
-def _pass(joints, joint, states, late, slid, longer, found):  # type: ignore
+def _pass(joints, joint, states, late, slid, room, found):  # type: ignore
     """Find what a joint does over a step."""
     sides, faces, (before, after) = joints.sides, joints.faces, states
     first, swings, ways = swing(sides, joint, 0, before, after)
     second, others, more = swing(sides, joint, 1, before, after)
     start, end, rates, now, step = follow(first, second, joints.angle[joint])
-    stretch = stretched(sides, joint, before), stretched(sides, joint, after)
-    force, law, lengthens, shear, lost = carry(
-        faces, joint, (start, end, stretch), late, slid, found.slid
+    longer = joints.built[joint, 3]
+    stretch = longer + stretched(sides, joint, before), longer + stretched(sides, joint, after)
+    ends = _since(joints, joint, start), _since(joints, joint, end), stretch
+    memory = slid, found.slid, found.ways
+    force, law, lengthens, (shear, found.lost[joint], missing) = carry(
+        faces, joint, ends, late, memory
     )
-    found.lost[joint] = lost
     whole, hand = joints.whole[joint], joints.hand[joint]
     found.resultants[whole, 0] -= force[0]
     found.resultants[whole, 1] += hand * shear
     found.resultants[whole, 2] += hand * force[2] - joints.aside[joint] * force[0]
     x, y, low, high = pushed(rates, force)
-    lower, higher = (-x, -y, low), (x, y, high)
-    gather(sides, joint, 0, ways[0], lower, found.force[joint, 0])
-    gather(sides, joint, 1, more[0], higher, found.force[joint, 1])
+    gather(sides, joint, 0, ways[0], (-x, -y, low), found.force[joint, 0])
+    gather(sides, joint, 1, more[0], (x, y, high), found.force[joint, 1])
+    _hold(sides, joint, (ways[0], more[0]), pushed(rates, (0.0, missing[0], 0.0)), found.held)
+    force = force[0], force[1] + missing[0], force[2], force[3]
+    x, y, low, high = pushed(rates, force)
     _spread(sides, joint, (ways, more), curved(step, rates, now, force, law), found.rate)
     if sides.turns[joint, 0]:
-        swing_bend(sides, joint, 0, swings, lower, found.rate)
+        swing_bend(sides, joint, 0, swings, (-x, -y, low), found.rate)
     if sides.turns[joint, 1]:
-        swing_bend(sides, joint, 1, others, higher, found.rate)
+        swing_bend(sides, joint, 1, others, (x, y, high), found.rate)
     if sides.stretch.shape[2] > 0:
         by_all, of_all = seen(now, law[3]), pushed(rates, (0.0, lengthens[0], 0.0))
-        _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), longer)
-        _stretch(sides, joint, (force[3], lengthens[1]), longer, found)
+        _pulls(sides, joint, ((ways[1], more[1]), (ways[0], more[0])), (by_all, of_all), room)
+        _stretch(sides, joint, (force[3], missing[1], lengthens[1]), room, found)
+
+
+@computing
+def _hold(sides, joint, ways, push, held):  # type: ignore
+    """Write down what the forces lack of points that should hold."""
+    x, y, low, high = push
+    gather(sides, joint, 0, ways[0], (-x, -y, low), held[joint, 0])
+    gather(sides, joint, 1, ways[1], (x, y, high), held[joint, 1])
 
 
 @inlined
@@ -269,8 +303,9 @@ def _stretch(sides, joint, law, longer, found):  # type: ignore
         for k in range(sides.size[joint, side]):
             pulled = sign * sides.stretch[joint, side, k]
             found.force[joint, side, k] += law[0] * pulled
+            found.held[joint, side, k] += law[1] * pulled
             for other, against in ((0, -1.0), (1, 1.0)):
                 for m in range(sides.size[joint, other]):
                     more = against * sides.stretch[joint, other, m]
-                    value = pulled * (longer[0, other, m] + law[1] * more)
+                    value = pulled * (longer[0, other, m] + law[2] * more)
                     found.rate[joint, side, k, other, m] += value + longer[1, side, k] * more
