@@ -11,10 +11,17 @@ import numpy as np
 import archfem as af
 from archfem.dynamics.guard import DOUBTFUL
 from archfem.dynamics.history import Ending
+from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.steps import State
 from archfem.masonry.materials import STONE_TO_STONE
+from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.newton import magnitude
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 DT = 0.005
+IN_BALANCE = 1e-9
+"""What a step may lack to balance, of the weight, and N, V, M may err by, of the largest. Found
+1.5e-12 and 7e-11; motion, damping or friction that is off by a millionth makes 4e-9 or more."""
 logger = logging.getLogger("archfem")
 
 
@@ -173,6 +180,32 @@ def off(run: af.History, other: af.History) -> float:
     for key in ("N", "V", "M"):
         first, second = run.joints[key].values, other.joints[key].values
         worst = max(worst, float(np.abs(first - second).max() / np.abs(second).max()))
+    return worst
+
+
+def unbalanced_steps(run: af.History, dead: Equilibrium, motion: af.Motion, damping) -> float:
+    """What any step lacks to balance, of the weight, or its N, V and M err by, of the largest.
+
+    From the displacements that a run by the default scheme has stored at every step: these alone
+    give speeds, by the midpoint rule, and what joints remember. Other than a history by SNES this
+    is one yardstick for every step, also for one that SNES only finds in halves: those are other
+    equations, whose solution differs by far more than rounding, and so does all that follows.
+    """
+    equation, dt = Equation(dead.model, motion, damping), float(run.time[1] - run.time[0])
+    stored = np.stack([run.joints[key].values for key in ("N", "V", "M")], axis=-1)
+    largest, scale = np.abs(stored).max(axis=(0, 1)), magnitude(equation.weight)
+    before, worst = equation.at_rest(dead.q, memory=dead.model.memory), 0.0
+    grounds, frames = equation.ground(run.time[1:], dt)[0], run.dataset["q"].values
+    for time, ground, q, given in zip(run.time[1:], grounds, frames[1:], stored[1:], strict=True):
+        passage = equation.remembering(before).passage(before.q, equation.lag / dt)
+        speed = 2.0 * (q - before.q) / dt - before.velocity
+        change, drag = (speed - before.velocity) / dt, 0.5 * (speed + before.velocity)
+        load = equation.weight - equation.model.body @ ground
+        moving = equation.model.mass @ change + equation.viscous @ drag
+        lacks = float(np.linalg.norm(moving + passage.force(q) - load)) / scale
+        errs = float((np.abs(passage.resultants(q) - given) / largest).max())
+        worst = max(worst, lacks, errs)
+        before = State(float(time), q, speed, change, passage.remembered(q))
     return worst
 
 

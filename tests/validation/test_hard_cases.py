@@ -16,7 +16,7 @@ LONG = (
     "0.98 × least thickness, rigid",
     "filled span at 0.8 g, 0.4 s",
     "filled span, rungs by part",
-    "filled span, damping 'none', average acceleration",
+    "filled span, damping 'none', conserving",
     "sidewalls retained",
     "piers of 20 m, 50 courses",
     "contact stepper, faces, exact",
