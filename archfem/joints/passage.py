@@ -194,8 +194,8 @@ class Passage:
         first, change, limit = self._before[1], self._sheared(q), self._over(q)[2]
         start = held(first, limit)
         over = excess(start + change, limit)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slid = np.where(over != 0.0, over / change, 0.0)
+        with np.errstate(all="ignore"):  # sums round by more than the least of changes
+            slid = np.where(over != 0.0, np.clip(over / change, 0.0, 1.0), 0.0)
         lost = np.where(np.abs(first) > limit, np.sign(first), 0.0)
         mean = shear_over_step(first, change, 0.0, limit)[0] + self.late * change
         rubs = np.abs(mean) > limit

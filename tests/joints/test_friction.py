@@ -3,11 +3,13 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints.passage import Passage
 
 RULES = ("lobatto", "exact")
 
@@ -223,6 +225,23 @@ def test_the_tangent_of_a_step_of_facets_is_that_of_gauss_rule(late, seed):
     """The rule's places move with the openings, which its derivative leaves out: about 1e-3."""
     model, first, last = places(mixed(rule="exact"), seed)
     assert misfit(model, first, last, late) < 1e-2
+
+
+def test_the_rates_of_a_step_shorter_than_rounding_are_those_of_a_slide():
+    """What is held of a force beyond its limit rounds to more than the limit; no point slides more
+    than it moves."""
+    random = np.random.default_rng(0)
+    first, limit = 1e4 * random.standard_normal(2000), 1e4 * random.random(2000)
+    for change in (0.0, 1e-320, 1e-13):
+        step = SimpleNamespace(
+            _before=(None, first),
+            _sheared=lambda q, change=change: np.full(2000, change),
+            _over=lambda q: (None, None, limit, None),
+            late=0.0,
+        )
+        by_change, by_limit = Passage._shear_rates(step, None)
+        assert ((by_change >= 0.0) & (by_change <= 0.5)).all()
+        assert (np.abs(by_limit) <= 1.0).all()
 
 
 def misfit(model, first, last, late):
