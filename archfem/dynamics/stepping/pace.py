@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.steps import Batch, State
 
@@ -124,7 +123,7 @@ class Pace:
         return batch.cut(good), float(errors[:good].max())
 
     def _taken(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
-        """Steps by the strategy, or one by SNES; None where a shorter step may be easier."""
+        """Steps by the strategy, or one it does not settle; None where a shorter may be easier."""
         stepper = self.stepper
         if stepper.strategy is not None:
             batch = stepper.taken(state, dt, ends)
@@ -132,11 +131,9 @@ class Pace:
                 return batch
             if not last:
                 return None
+            return replace(stepper.unsettled(state, dt), times=ends[:1])
         (batch,) = stepper.exact.batches(state, dt, state.time + dt)
-        batch = replace(batch, times=ends[:1])
-        if stepper.strategy is None:
-            return batch
-        return replace(batch, iterations=batch.iterations + ITERATIONS, fallback=True)
+        return replace(batch, times=ends[:1])
 
     def _scaled(self, resultants: Array) -> Array:
         """M / (N h) of the joints that are judged (steps, joints)."""

@@ -1,4 +1,9 @@
-"""The stepper: many steps at a time by a strategy, and SNES for the one that does not settle."""
+"""The stepper: many steps at a time by a strategy, and one that does not settle in parts.
+
+A step in which many points hold and slide in turn may have no solution that Newton's method finds,
+SNES's no more than a strategy's, while its halves have. So those are tried before SNES, which would
+take most of its iterations in vain.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,20 +18,24 @@ from archfem.dynamics.stepping import loop
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.exact import Exact
 from archfem.dynamics.stepping.strategy import Reordered, Strategy, in_own_terms
-from archfem.dynamics.steps import Batch, State
+from archfem.dynamics.steps import Batch, State, Step
 from archfem.models.gauges import Gauges, MovedGauges
 
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""
 
+HALVINGS = 3
+"""Times that a step is halved by the strategy before it is left to SNES."""
+
 
 class Stepper:
-    """Steps an equation of motion by a strategy, and by SNES what that gives up.
+    """Steps an equation of motion by a strategy, and by SNES what that gives up even in parts.
 
     Args:
         equation: of motion.
         strategy: takes the steps; without one SNES takes them all.
-        exact: takes those that the strategy gives up; by default `Exact` of the equation.
+        exact: takes those that the strategy gives up even in parts; by default `Exact` of the
+            equation.
         advance: the loop over steps that a strategy settles.
     """
 
@@ -73,11 +82,52 @@ class Stepper:
                 done += len(batch.times)
                 state = batch.state(len(batch.times) - 1)
             if len(batch.times) < len(times):
-                (fallback,) = self.exact.batches(state, dt, state.time + dt)
-                passes = fallback.iterations + loop.ITERATIONS  # those in vain count too
-                yield replace(fallback, iterations=passes, fallback=True)
+                batch = self.unsettled(state, dt)
+                yield batch
                 done += 1
-                state = fallback.state(0)
+                state = batch.state(0)
+
+    def unsettled(self, state: State, dt: float) -> Batch:
+        """Return a step that does not settle at once, in parts, or by SNES where those do neither.
+
+        Args:
+            state: from which to go.
+            dt: time step [s].
+
+        Raises:
+            DidNotConverge: SNES failed as well; `last` is the state before.
+        """
+        step, end = self._in_parts(state, dt, HALVINGS), state.time + dt
+        if step is None:
+            (batch,) = self.exact.batches(state, dt, end)
+            passes = batch.iterations + loop.ITERATIONS  # those in vain count too
+            return replace(batch, iterations=passes, fallback=True)
+        last = replace(step.state, time=end)
+        return Batch(
+            np.array([end]),
+            step.resultants[None],
+            np.array([step.iterations + loop.ITERATIONS]),
+            np.array([step.smallest]),
+            step.energy[None],
+            lambda _: last,
+        )
+
+    def _in_parts(self, state: State, dt: float, halvings: int) -> Step | None:
+        """Take a step in two halves, or shorter parts of them; None if the shortest fail."""
+        first = self._part(state, dt / 2.0, halvings - 1)
+        if first is None:
+            return None
+        second = self._part(first.state, dt / 2.0, halvings - 1)
+        return None if second is None else second.after(first)
+
+    def _part(self, state: State, dt: float, halvings: int) -> Step | None:
+        """Take a step at once, else in halves as often as they may be halved."""
+        batch = self.taken(state, dt, np.array([state.time + dt]))
+        if len(batch.times):
+            passes, end = int(batch.iterations[0]), batch.state(0)
+            return Step(end, batch.resultants[0], passes, dt, batch.energy[0])
+        step = self._in_parts(state, dt, halvings) if halvings else None
+        return step and replace(step, iterations=step.iterations + loop.ITERATIONS)
 
     def taken(self, state: State, dt: float, times: Array) -> Batch:
         """Return the steps by the strategy up to these times, or up to one that does not settle.
