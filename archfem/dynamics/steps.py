@@ -130,14 +130,30 @@ class Step:
     smallest: float
     energy: Array
 
-    def after(self, first: "Step") -> "Step":
+    @property
+    def batch(self) -> "Batch":
+        """The step as a batch of one."""
+        return Batch(
+            np.array([self.state.time]),
+            self.resultants[None],
+            np.array([self.iterations]),
+            np.array([self.smallest]),
+            self.energy[None],
+            lambda _: self.state,
+        )
+
+    def after(self, first: "Step", *, mean: bool) -> "Step":
         """Return this step as the second half of a longer one.
 
         Args:
             first: its first half, whose effort, work and loss count too.
+            mean: whether resultants are means over a step, as of the conserving scheme; else they
+                are those at its end.
         """
+        resultants = 0.5 * (first.resultants + self.resultants) if mean else self.resultants
         return replace(
             self,
+            resultants=resultants,
             iterations=first.iterations + self.iterations,
             smallest=min(first.smallest, self.smallest),
             energy=self.energy + np.append(np.zeros(2), first.energy[2:]),

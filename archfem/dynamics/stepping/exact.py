@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -77,14 +76,19 @@ class Exact:
             DidNotConverge: a step failed even when halved; `last` is the state before it.
         """
         for step in self.steps(start, dt, end):
-            yield Batch(
-                np.array([step.state.time]),
-                step.resultants[None],
-                np.array([step.iterations]),
-                np.array([step.smallest]),
-                step.energy[None],
-                partial(_given, step.state),
-            )
+            yield step.batch
+
+    def whole(self, state: State, dt: float) -> Step:
+        """Return one step, not halved.
+
+        Args:
+            state: from which it goes.
+            dt: its length [s].
+
+        Raises:
+            DidNotConverge: there was no equilibrium to be found.
+        """
+        return self._attempts(state, dt)
 
     def attempt(self, state: State, dt: float) -> Step:
         """Try a step of Newmark's method or HHT in one.
@@ -203,7 +207,8 @@ class Exact:
                     last=state,
                 ) from error
             first = self._advance(state, state.time + dt / 2.0, halvings + 1)
-            return self._advance(first.state, target, halvings + 1).after(first)
+            second = self._advance(first.state, target, halvings + 1)
+            return second.after(first, mean=self.equation.conserving)
         return replace(step, state=replace(step.state, time=target))
 
 
@@ -226,8 +231,3 @@ def _written(start: State, end: State, share: float) -> State:
     """State where the equation of a step is written, but with the acceleration at its end."""
     between = start.velocity + share * (end.velocity - start.velocity)
     return replace(end, q=start.q + share * (end.q - start.q), velocity=between)
-
-
-def _given(state: State, _: int) -> State:
-    """The state of a batch of one."""
-    return state

@@ -1,8 +1,8 @@
-"""The stepper: many steps at a time by a strategy, and one that does not settle in parts.
+"""The stepper: many steps at a time by a strategy, and SNES or parts for one that does not settle.
 
-A step in which many points hold and slide in turn may have no solution that Newton's method finds,
-SNES's no more than a strategy's, while its halves have. So those are tried before SNES, which would
-take most of its iterations in vain.
+A step that a strategy gives up is SNES's, so that all strategies give one history. Where many
+points hold and slide in turn SNES may find no solution either, while halves of the step have one:
+those are the strategy's again, which is by far faster.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,23 +19,23 @@ from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.exact import Exact
 from archfem.dynamics.stepping.strategy import Reordered, Strategy, in_own_terms
 from archfem.dynamics.steps import Batch, State, Step
+from archfem.errors import DidNotConverge
 from archfem.models.gauges import Gauges, MovedGauges
 
 BATCH = 128
 """Steps between two looks at events, Ctrl-C and the progress bar."""
 
 HALVINGS = 3
-"""Times that a step is halved by the strategy before it is left to SNES."""
+"""Times that a step which neither settles whole is halved by the strategy, before SNES does it."""
 
 
 class Stepper:
-    """Steps an equation of motion by a strategy, and by SNES what that gives up even in parts.
+    """Steps an equation of motion by a strategy, and by SNES what that gives up.
 
     Args:
         equation: of motion.
         strategy: takes the steps; without one SNES takes them all.
-        exact: takes those that the strategy gives up even in parts; by default `Exact` of the
-            equation.
+        exact: takes those that the strategy gives up; by default `Exact` of the equation.
         advance: the loop over steps that a strategy settles.
     """
 
@@ -88,29 +88,26 @@ class Stepper:
                 state = batch.state(0)
 
     def unsettled(self, state: State, dt: float) -> Batch:
-        """Return a step that does not settle at once, in parts, or by SNES where those do neither.
+        """Return a step that does not settle: whole by SNES, else in parts, else in parts by SNES.
 
         Args:
             state: from which to go.
             dt: time step [s].
 
         Raises:
-            DidNotConverge: SNES failed as well; `last` is the state before.
+            DidNotConverge: SNES failed in parts as well; `last` is the state before.
         """
-        step, end = self._in_parts(state, dt, HALVINGS), state.time + dt
+        end, whole = state.time + dt, True
+        try:
+            step: Step | None = self.exact.whole(state, dt)
+        except DidNotConverge:
+            step, whole = self._in_parts(state, dt, HALVINGS), False
         if step is None:
             (batch,) = self.exact.batches(state, dt, end)
-            passes = batch.iterations + loop.ITERATIONS  # those in vain count too
-            return replace(batch, iterations=passes, fallback=True)
-        last = replace(step.state, time=end)
-        return Batch(
-            np.array([end]),
-            step.resultants[None],
-            np.array([step.iterations + loop.ITERATIONS]),
-            np.array([step.smallest]),
-            step.energy[None],
-            lambda _: last,
-        )
+        else:
+            batch = replace(step, state=replace(step.state, time=end)).batch
+        passes = batch.iterations + loop.ITERATIONS  # those in vain count too
+        return replace(batch, iterations=passes, fallback=whole or step is None)
 
     def _in_parts(self, state: State, dt: float, halvings: int) -> Step | None:
         """Take a step in two halves, or shorter parts of them; None if the shortest fail."""
@@ -118,7 +115,7 @@ class Stepper:
         if first is None:
             return None
         second = self._part(first.state, dt / 2.0, halvings - 1)
-        return None if second is None else second.after(first)
+        return second and second.after(first, mean=self.equation.conserving)
 
     def _part(self, state: State, dt: float, halvings: int) -> Step | None:
         """Take a step at once, else in halves as often as they may be halved."""
