@@ -30,7 +30,7 @@ MODEL = ("structure", "materials", "contacts", "model", "dead_load")
 GROUND = ("motion", "suite")
 ANALYSIS = ("analysis", "criteria")
 
-METHODS = ("tangent", "compliance", "turning", "contact", "snes")
+METHODS = ("compliance", "turning", "contact", "tangent", "snes")
 """Ways to step, of which the first that applies is taken: a choice by timing may differ."""
 
 _kept: dict[str, OrderedDict[str, Any]] = {}

@@ -33,7 +33,7 @@ from archfem.models.model import Model
 from archfem.statics.newton import Newton
 from archfem.threads import on_one_thread
 
-STRATEGIES: tuple[type[Strategy], ...] = (Tangent, Sparse, Banded, Modal, Turning)
+STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal, Turning, Tangent)
 """In the order in which they are tried; the first that applies takes runs too short for timing."""
 
 METHODS = ("auto", *sorted(each.name for each in STRATEGIES), "snes")
