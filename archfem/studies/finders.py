@@ -1,6 +1,7 @@
 """What can be found of a case, by name: each a function from a case to a flat table."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import judged
 from archfem.motion.motion import Motion
 from archfem.statics.modes import modes
-from archfem.studies.memory import ground_motion, method_for, resting
+from archfem.studies.memory import ground_motion, resting, stepper_of
 
 Found = dict[str, Any]
 
@@ -74,8 +75,8 @@ def run_of(rest: Rest, motion: Motion) -> History:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    method = method_for(rest, motion)
-    run = shaken(rest.case, motion, rest.dead, rest.damping[0], method=method)
+    stepper = stepper_of(rest, motion)
+    run = shaken(rest.case, motion, rest.dead, rest.damping[0], method=stepper)
     if run.ended is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return run
@@ -154,7 +155,7 @@ def of_scales(rest: Rest, motion: Motion, **options: Any) -> Found:
             damping=rest.damping[0],
             dt=rest.case.analysis.get("dt"),
             criteria=rest.case.criteria,
-            method=method_for(rest, motion),
+            method=partial(stepper_of, rest),
             **options,
         )
     if found.interrupted:
