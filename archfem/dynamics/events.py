@@ -18,7 +18,7 @@ from archfem.joints.criteria import Criteria, chosen
 from archfem.joints.duration import Unbroken
 from archfem.joints.resultants import joint_dataset
 from archfem.limit.counted import KINDS, Mechanism, counted_mechanism, counted_mechanisms
-from archfem.limit.verified import Verifier
+from archfem.limit.verified import verifier_of
 from archfem.masonry.naming import listed_joints
 from archfem.masonry.structure import Structure
 
@@ -90,7 +90,7 @@ class CountedMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
+        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
 
         def found(joints: xr.Dataset) -> Mechanism | None:
             return counted_mechanism(joints, kinds=self.kinds)
@@ -145,7 +145,7 @@ class MovingMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
+        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
 
         def moves(joints: xr.Dataset) -> frozenset[str]:
             found = verifier.moving(joints)
@@ -195,7 +195,7 @@ class EveryMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier = Verifier(structure)
+        verifier = verifier_of(structure)
         concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
         wanted = {"verified", *possible_counts(structure, criteria)}
         times = {name: Unbroken(criteria.duration) for name in wanted}

@@ -13,6 +13,7 @@ from archfem.dynamics.history import Ending, History
 from archfem.dynamics.scales import mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.errors import InvalidInput
+from archfem.limit.counted import Mechanism
 from archfem.joints.criteria import judged
 from archfem.motion.motion import Motion
 from archfem.statics.modes import modes
@@ -82,11 +83,12 @@ def run_of(rest: Rest, motion: Motion) -> History:
     return run
 
 
-def of_history(run: History) -> Found:
+def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None = None) -> Found:
     """Return the findings of a run.
 
     Args:
         run: what happened.
+        mechanisms: its first ones, as by `first_mechanisms`, which finds them if they are not told.
 
     Returns:
         The largest of rings and piers: `eccentricity`, |e| [-], 0.5 where a joint is open;
@@ -96,20 +98,25 @@ def of_history(run: History) -> Found:
         `ended`; what is left, `fall`, where displacements may be large; the largest drift of its
         energy at any step, of what was exchanged, `energy_drift` [-], and how many `doubts` it has.
     """
-    joints = judged(run.joints)
     found: Found = {
-        "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
-        "friction": float(joints["friction"].fillna(np.inf).max()),
+        "eccentricity": _largest(run, "eccentricity", 0.5),
+        "friction": _largest(run, "friction", np.inf),
+        **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
     }
-    found |= {name: float(abs(joints[name]).max()) for name in ("rotation", "opening", "slip")}
     for name in ("largest_displacement", "residual_displacement"):
         found[name] = float(run.dataset[name].max())
-    for definition, met in first_mechanisms(run).items():
+    for definition, met in (mechanisms or first_mechanisms(run)).items():
         found[definition] = np.inf if met is None or met.time is None else met.time
         found[f"{definition}, class"] = "" if met is None else str(met.kind)
     found |= {"ended": str(run.ended), "fall": "" if run.fall is None else run.fall.kind}
     drift = float(run.dataset.attrs["energy_drift"])
     return found | {"energy_drift": drift, "doubts": float(len(run.doubts))}
+
+
+def _largest(run: History, name: str, undefined: float = -np.inf) -> float:
+    """Largest size of something of the joints of rings and piers, and what stands where it is NaN."""
+    sizes = np.abs(run.dataset[name].values[..., run.dataset["judged"].values])
+    return float(np.where(np.isnan(sizes), undefined, sizes).max())
 
 
 def scales(
