@@ -4,7 +4,7 @@ An event says what to look for. Each run has a fresh watch of its own made by it
 serves any number of runs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.dynamics.glance import Glance
+from archfem.dynamics.glance import Glance, Look
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, chosen
 from archfem.joints.duration import Unbroken
@@ -98,15 +98,15 @@ class CountedMechanism:
         judged = np.flatnonzero(structure.judged).tolist()
         glance = Glance(structure, criteria, judged, lambda joints: _named(found(joints)))
 
-        def look(resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(glance(resultants, criteria.failures)), step):
+        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(now), step):
                 return None
             joints = glance.labelled(resultants)
             counted, motion = found(joints), verifier.verified(joints)
             assert counted is not None
             return f"a mechanism of {counted.part} by {listed_joints(counted.names)}; {motion}"
 
-        return look
+        return Look(glance, criteria.failures, told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,13 +153,13 @@ class MovingMechanism:
 
         glance = Glance(structure, criteria, verifier.skeleton.joints, moves)
 
-        def look(resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(glance(resultants, 1)), step):
+        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(now), step):
                 return None
             found = verifier.verified(glance.labelled(resultants))
             return f"a mechanism that moves, by {listed_joints(found.moved.names)}; {found}"
 
-        return look
+        return Look(glance, 1, told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,12 +208,11 @@ class EveryMechanism:
 
         glance = Glance(structure, criteria, sorted(concerned), holding)
 
-        def look(resultants: Array, step: float) -> str | None:
-            now = glance(resultants, 1)
+        def told(now: frozenset[str], _: Array, step: float) -> str | None:
             met.update(name for name, time in times.items() if time.lasts(name in now, step))
             return "a mechanism by each definition" if met >= wanted else None
 
-        return look
+        return Look(glance, 1, told)
 
 
 def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
@@ -257,6 +256,22 @@ def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
     if isinstance(until, Event):
         return until.watch(structure, criteria)
     return lambda resultants, step: until(structure, resultants)
+
+
+def first_told(watch: Watch, resultants: Array, steps: Sequence[float]) -> tuple[int, str] | None:
+    """Return the first step at which a watch ends the run, and its words; None where it does not.
+
+    Args:
+        watch: over the run.
+        resultants: N, V, M of steps one after another (steps, n_joints, 3) [N, N, N m].
+        steps: their lengths (steps,) [s].
+    """
+    if isinstance(watch, Look):
+        return watch.first(resultants, steps)
+    for number, step in enumerate(steps):
+        if words := watch(resultants[number], step):
+            return number, words
+    return None
 
 
 def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:

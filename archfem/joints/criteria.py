@@ -255,7 +255,9 @@ def failed(joints: xr.Dataset) -> xr.DataArray:
         joints: with the flags of `flagged`, of one instant or of many.
     """
     hinge = joints["hinge"]
-    slide, apart = (joints[name].transpose(*hinge.dims).values for name in ("slide", "open"))
+    slide, apart = (
+        joints.variables[name].transpose(*hinge.dims).values for name in ("slide", "open")
+    )
     return xr.DataArray(
         (hinge.values != 0) | slide | apart, hinge.coords, hinge.dims, name="failed"
     )

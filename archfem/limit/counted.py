@@ -147,7 +147,7 @@ def _over_time(joints: xr.Dataset) -> xr.DataArray:
         flags = flags.assign_coords(time=np.nan)
     if "time" not in flags.dims:
         flags = flags.expand_dims("time")
-    return flags.transpose("time", "joint")
+    return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
 
 
 def _counts(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArray[np.int64]]:

@@ -233,7 +233,7 @@ class Verifier:
         """
         own = list(self.skeleton.joints)
         side, apart, shear, slides = (
-            joints[name].transpose(..., "joint").values[..., own]
+            joints.variables[name].transpose(..., "joint").values[..., own]
             for name in ("hinge", "open", "V", "slide")
         )
         sense = np.sign(shear)
