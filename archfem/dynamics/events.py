@@ -12,14 +12,21 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.dynamics.glance import Glance, Look
+from archfem.dynamics.glance import Glance, Look, Seen
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, chosen
 from archfem.joints.duration import Unbroken
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.counted import KINDS, Mechanism, counted_mechanism, counted_mechanisms
-from archfem.limit.verified import verifier_of
+from archfem.limit.counted import (
+    KINDS,
+    Mechanism,
+    counted_mechanism,
+    counted_mechanisms,
+    definitions_met,
+)
+from archfem.limit.verified import freedoms_of, verifier_of
 from archfem.masonry.naming import listed_joints
+from archfem.masonry.roles import judged_parts
 from archfem.masonry.structure import Structure
 
 Watch = Callable[[Array, float], str | None]
@@ -96,7 +103,7 @@ class CountedMechanism:
             return counted_mechanism(joints, kinds=self.kinds)
 
         judged = np.flatnonzero(structure.judged).tolist()
-        glance = Glance(structure, criteria, judged, lambda joints: _named(found(joints)))
+        glance = Glance(structure, criteria, judged, lambda seen: _named(found(seen.labelled())))
 
         def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
             if not unbroken.lasts(bool(now), step):
@@ -147,8 +154,8 @@ class MovingMechanism:
         """
         verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
 
-        def moves(joints: xr.Dataset) -> frozenset[str]:
-            found = verifier.moving(joints)
+        def moves(seen: Seen) -> frozenset[str]:
+            found = verifier.moving(seen.labelled())
             return _named(found if found is not None and found.kind in self.kinds else None)
 
         glance = Glance(structure, criteria, verifier.skeleton.joints, moves)
@@ -196,17 +203,26 @@ class EveryMechanism:
             criteria: of the run.
         """
         verifier = verifier_of(structure)
-        concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
+        concerned = sorted({*np.flatnonzero(structure.judged), *verifier.skeleton.joints})
+        roles = {joint.part: joint.role for joint in structure.joints}
+        parts = np.array([structure.joints[number].part for number in concerned])
+        own = np.searchsorted(concerned, verifier.skeleton.joints)
         wanted = {"verified", *possible_counts(structure, criteria)}
         times = {name: Unbroken(criteria.duration) for name in wanted}
         met: set[str] = set()
 
-        def holding(joints: xr.Dataset) -> frozenset[str]:
-            counted = {name for name, found in counted_mechanisms(joints).items() if found}
-            moves = "verified" not in met and verifier.moving(joints) is not None
-            return frozenset(counted | ({"verified"} if moves else set()))
+        def moves(seen: Seen) -> bool:
+            free = freedoms_of(
+                seen.side[own], seen.slides[own], seen.apart[own], seen.sense[own]
+            )
+            return verifier.screen.permit(free) and verifier.verified(seen.labelled()).kind != "none"
 
-        glance = Glance(structure, criteria, sorted(concerned), holding)
+        def holding(seen: Seen) -> frozenset[str]:
+            count = {part: int(seen.failed[parts == part].sum()) for part in judged_parts(roles)}
+            counted = definitions_met(count, roles, criteria.failures)
+            return counted | ({"verified"} if "verified" not in met and moves(seen) else set())
+
+        glance = Glance(structure, criteria, concerned, holding)
 
         def told(now: frozenset[str], _: Array, step: float) -> str | None:
             met.update(name for name, time in times.items() if time.lasts(name in now, step))

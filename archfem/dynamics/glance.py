@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from archfem.arrays import Array
 from archfem.joints.criteria import Criteria, borne, failing, ratio_at_sliding
@@ -12,17 +14,41 @@ from archfem.joints.resultants import joint_dataset, ratios
 from archfem.masonry.structure import Structure
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """How some joints are at a step.
+
+    Attributes:
+        side: face on which each hinges, 1 extrados, -1 intrados, 0 none (n,).
+        sense: sign of its shear force where it slides, else 0 (n,).
+        slides: whether its friction is used up (n,).
+        apart: whether it has come apart (n,).
+        labelled: gives all joints with labels and flags, as made by `joint_dataset`.
+    """
+
+    side: NDArray[np.int8]
+    sense: NDArray[np.int8]
+    slides: NDArray[np.bool_]
+    apart: NDArray[np.bool_]
+    labelled: Callable[[], xr.Dataset]
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether each has failed (n,)."""
+        return (self.side != 0) | self.slides | self.apart
+
+
 class Glance:
     """A quick look at some joints of a structure at every step of a run.
 
-    Labels, which take long, and what is asked of them, are for states of joints that have not been
-    seen before.
+    What is asked of them, which takes longer, is for states of joints that have not been seen
+    before.
 
     Args:
         structure: whose joints they are.
         criteria: by which they fail.
         numbers: of the joints looked at.
-        ask: of labelled joints, whether what is looked for holds: names of what does.
+        ask: of those joints, whether what is looked for holds: names of what does.
     """
 
     def __init__(
@@ -30,7 +56,7 @@ class Glance:
         structure: Structure,
         criteria: Criteria,
         numbers: Sequence[int],
-        ask: Callable[[xr.Dataset], frozenset[str]],
+        ask: Callable[[Seen], frozenset[str]],
     ) -> None:
         self._structure, self._criteria, self._ask = structure, criteria, ask
         self._numbers = np.array(numbers, dtype=np.intp)
@@ -55,15 +81,18 @@ class Glance:
         own = resultants[:, self._numbers]
         e, friction = ratios(own, self._depth)
         limits = ratio_at_sliding(own[..., 0], e, *self._laws)
-        hinges, slides = failing(e, friction, limits, self._criteria.hinge)
-        apart = borne(own[..., 0], self._tension) <= 0.0
-        fail = np.count_nonzero(hinges | slides | apart, axis=1)
-        senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(own[..., 1]), 0.0)
-        states = np.stack([*senses, slides, apart], axis=1).astype(np.int8)
+        hinges, used_up = failing(e, friction, limits, self._criteria.hinge)
+        loose = borne(own[..., 0], self._tension) <= 0.0
+        fail = np.count_nonzero(hinges | used_up | loose, axis=1)
+        senses = np.where(hinges, np.sign(e), 0.0), np.where(used_up, np.sign(own[..., 1]), 0.0)
+        states = np.stack([*senses, used_up, loose], axis=1).astype(np.int8)
         for step, count in enumerate(fail.tolist()):
             key = states[step].tobytes() if count >= least else b""
             if key and key not in self._seen:
-                self._seen[key] = self._ask(self.labelled(resultants[step]))
+                side, sense, slides, apart = states[step]
+                labelled = partial(self.labelled, resultants[step])
+                seen = Seen(side, sense, slides.astype(bool), apart.astype(bool), labelled)
+                self._seen[key] = self._ask(seen)
             yield self._seen[key] if key else frozenset()
 
     def labelled(self, resultants: Array) -> xr.Dataset:

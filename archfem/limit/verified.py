@@ -232,14 +232,25 @@ class Verifier:
             either sense will do.
         """
         own = list(self.skeleton.joints)
-        side, apart, shear, slides = (
+        side, slides, apart, shear = (
             joints.variables[name].transpose(..., "joint").values[..., own]
-            for name in ("hinge", "open", "V", "slide")
+            for name in ("hinge", "slide", "open", "V")
         )
-        sense = np.sign(shear)
-        either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
-        slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
-        return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
+        return freedoms_of(side, slides, apart, np.sign(shear))
+
+
+def freedoms_of(side: Array, slides: Array, apart: Array, sense: Array) -> Array:
+    """Return what joints may do, as `Verifier.freedoms` does (…, 3 n_joints).
+
+    Args:
+        side: face on which each hinges, 1 extrados, -1 intrados, 0 none (…, n_joints).
+        slides: whether its friction is used up (…, n_joints).
+        apart: whether it has come apart (…, n_joints).
+        sense: sign of its shear force (…, n_joints).
+    """
+    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+    slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
+    return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
 
 
 @lru_cache(maxsize=8)

@@ -9,9 +9,11 @@ import archfem as af
 from archfem.limit.counted import (
     counted_mechanism,
     counted_mechanisms,
+    definitions_met,
     demirel_aldemir_mechanism,
     mechanism_kind,
 )
+from archfem.masonry.roles import judged_parts
 
 
 def history(structure, instants):
@@ -137,3 +139,17 @@ def test_what_is_shorter_than_a_mechanism_lasts_does_not_count_by_any_definition
     assert times(0.0) == {2e-4}
     assert times(1e-3) == times(1.1e-3) == {1.6e-3}
     assert times(1.2e-3) == {None}
+
+
+def test_definitions_are_met_at_an_instant_where_counting_finds_a_mechanism():
+    structure, rng, met = piers(2), np.random.default_rng(5), set()
+    roles = {joint.part: joint.role for joint in structure.joints}
+    for _ in range(40):
+        hinges = np.flatnonzero(rng.random(len(structure.joints)) < rng.uniform(0.0, 0.5)).tolist()
+        down = [structure.joints[number].part for number in hinges]
+        count = {part: down.count(part) for part in judged_parts(roles)}
+        joints = failing(structure, dict.fromkeys(hinges, 0.5))
+        found = {name for name, each in counted_mechanisms(joints).items() if each is not None}
+        assert definitions_met(count, roles, 4) == found
+        met.add(frozenset(found))
+    assert len(met) > 3
