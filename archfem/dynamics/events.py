@@ -212,10 +212,10 @@ class EveryMechanism:
         met: set[str] = set()
 
         def moves(seen: Seen) -> bool:
-            free = freedoms_of(
-                seen.side[own], seen.slides[own], seen.apart[own], seen.sense[own]
-            )
-            return verifier.screen.permit(free) and verifier.verified(seen.labelled()).kind != "none"
+            free = freedoms_of(seen.side[own], seen.slides[own], seen.apart[own], seen.sense[own])
+            if not verifier.screen.permit(free):
+                return False
+            return verifier.verified(seen.labelled()).kind != "none"
 
         def holding(seen: Seen) -> frozenset[str]:
             count = {part: int(seen.failed[parts == part].sum()) for part in judged_parts(roles)}

@@ -35,7 +35,8 @@ class Seen:
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Whether each has failed (n,)."""
-        return (self.side != 0) | self.slides | self.apart
+        found: NDArray[np.bool_] = (self.side != 0) | self.slides | self.apart
+        return found
 
 
 class Glance:

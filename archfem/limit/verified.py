@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -239,7 +241,9 @@ class Verifier:
         return freedoms_of(side, slides, apart, np.sign(shear))
 
 
-def freedoms_of(side: Array, slides: Array, apart: Array, sense: Array) -> Array:
+def freedoms_of(
+    side: NDArray[Any], slides: NDArray[np.bool_], apart: NDArray[np.bool_], sense: NDArray[Any]
+) -> Array:
     """Return what joints may do, as `Verifier.freedoms` does (…, 3 n_joints).
 
     Args:

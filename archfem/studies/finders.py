@@ -13,8 +13,8 @@ from archfem.dynamics.history import Ending, History
 from archfem.dynamics.scales import mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.errors import InvalidInput
-from archfem.limit.counted import Mechanism
 from archfem.joints.criteria import judged
+from archfem.limit.counted import Mechanism
 from archfem.motion.motion import Motion
 from archfem.statics.modes import modes
 from archfem.studies.memory import ground_motion, resting, stepper_of
@@ -114,7 +114,7 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
 
 
 def _largest(run: History, name: str, undefined: float = -np.inf) -> float:
-    """Largest size of something of the joints of rings and piers, and what stands where it is NaN."""
+    """Largest size of something of the joints of rings and piers; what stands for it where NaN."""
     sizes = np.abs(run.dataset[name].values[..., run.dataset["judged"].values])
     return float(np.where(np.isnan(sizes), undefined, sizes).max())
 

@@ -88,9 +88,7 @@ def _gap(scales: Sequence[float]) -> float | None:
     return sqrt(low * high) if high > NARROW * low else None
 
 
-def _run(
-    rest: Rest, motion: Motion
-) -> tuple[History, dict[str, Mechanism | None], dict[str, Any]]:
+def _run(rest: Rest, motion: Motion) -> tuple[History, dict[str, Mechanism | None], dict[str, Any]]:
     """A whole run, which limit states it has met, and demands, infinite where it broke off."""
     try:
         run = run_of(rest, motion)
@@ -104,9 +102,7 @@ def _run(
     return run, _met(run, mechanisms), {name: found[name] for name in DEMANDS}
 
 
-def _met(
-    run: History, mechanisms: Mapping[str, Mechanism | None]
-) -> dict[str, Mechanism | None]:
+def _met(run: History, mechanisms: Mapping[str, Mechanism | None]) -> dict[str, Mechanism | None]:
     """Which limit states a run has met; words for a first hinge are those of a mechanism."""
     hinges = judged(flagged(run.joints))["hinge"] != 0
     first = Mechanism("local", "", (), None) if bool(hinges.any()) else None
