@@ -16,8 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import judged
 from archfem.limit.counted import Mechanism
 from archfem.motion.motion import Motion
-from archfem.statics.modes import modes
-from archfem.studies.memory import ground_motion, resting, stepper_of
+from archfem.studies.memory import first_mode, ground_motion, resting, stepper_of
 
 Found = dict[str, Any]
 
@@ -36,8 +35,9 @@ def at_rest(case: Case) -> Found:
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    dead = resting(case).dead
-    joints, first = judged(dead.joints), modes(dead.model, 1, about=dead)
+    rest = resting(case)
+    dead = rest.dead
+    joints, first = judged(dead.joints), first_mode(rest)
     return {
         "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
         "friction": float(joints["friction"].max()),

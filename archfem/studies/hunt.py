@@ -19,10 +19,9 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import flagged, judged
 from archfem.limit.counted import Mechanism
 from archfem.motion.motion import Motion
-from archfem.statics.modes import modes
 from archfem.studies.finders import Found, of_history, run_of
 from archfem.studies.intensity import intensities
-from archfem.studies.memory import ground_motion, resting
+from archfem.studies.memory import first_mode, ground_motion, resting
 
 LIMITS = ("first hinge", "four failures", "verified", COLLAPSE)
 """Limit states: a joint of a ring or pier hinges; four of them fail at once; the failed joints
@@ -72,7 +71,7 @@ def searched(
     for _ in range(FILL):
         if (scale := _gap(sorted(made))) is not None:
             found = found.with_run(shaken(scale))
-    period = 1.0 / float(modes(rest.dead.model, 1, about=rest.dead).frequencies[0])
+    period = 1.0 / float(first_mode(rest).frequencies[0])
     told: Found = {"period": period, **intensities(motion, period)}
     for limit in asked:
         bracket = found[limit]

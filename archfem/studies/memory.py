@@ -22,6 +22,8 @@ from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.modes import Modes, modes
+from archfem.studies.points import MODEL
 from archfem.studies.steppers import Ready
 from archfem.studies.warm import warm
 
@@ -30,7 +32,6 @@ Made = TypeVar("Made")
 MODELS, OTHERS = 4, 64
 """How many models are kept, which may be large, and how many of anything else."""
 
-MODEL = ("structure", "materials", "contacts", "model", "dead_load")
 GROUND = ("motion", "suite")
 ANALYSIS = ("analysis", "criteria")
 
@@ -57,6 +58,20 @@ def resting(case: Case) -> Rest:
     found = _remembered("damping", damped, lambda: damping_of(case, dead))
     rest.__dict__["damping"] = found  # where the cached property would put it
     return rest
+
+
+def first_mode(rest: Rest) -> Modes:
+    """Return the first mode about a dead load.
+
+    Args:
+        rest: a case under its dead load.
+
+    Raises:
+        DidNotConverge: it was not found.
+    """
+    dead = rest.dead
+    key = _model_key(rest.case)
+    return _remembered("modes", key, lambda: modes(dead.model, 1, about=dead), MODELS)
 
 
 def ground_motion(case: Case) -> Motion:
