@@ -8,14 +8,20 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from archfem.arrays import Array
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.sparse import SparseSystem
 from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.stepping.strategy import Strategy
 from archfem.dynamics.steps import State
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
+
+KEPT = 8
+"""How many lengths of steps there are kept matrices of: as many as a run of its own pace has."""
 
 METHODS = ("compliance", "turning", "contact", "tangent", "snes")
 """Ways to step, of which the first that applies is taken: a choice by timing may differ."""
@@ -86,5 +92,13 @@ class Shared(Stepper):
             assert self.strategy is not None
             if dt not in self._made:
                 self._made[dt] = self.strategy.system(dt)
-            self._systems[dt] = deepcopy(self._made[dt])
+                while len(self._made) > KEPT:
+                    del self._made[next(iter(self._made))]
+            self._systems[dt] = _copied(self._made[dt])
         return super().prepared(state, dt, times)
+
+
+def _copied(system: Any) -> Any:
+    """A copy of matrices with which no step has been made yet."""
+    rooms = [system.compliance] if isinstance(system, SparseSystem) else []
+    return deepcopy(system, {id(room): np.empty_like(room) for room in rooms})  # nothing is in it
