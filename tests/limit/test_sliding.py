@@ -276,7 +276,8 @@ def test_a_settlement_without_dilatancy_pushes_at_least_as_hard():
 
 
 def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
-    monkeypatch.setattr("archfem.limit.sliding._solution", lambda *_: None)
+    monkeypatch.setattr("archfem.limit.sliding.solution", lambda *_: None)
+    monkeypatch.setattr("archfem.limit.sliding.weaker", lambda *_: [])
     structure = ring(embrace=120.0, voussoirs=9, contact=rough(0.4))
     push = af.PointLoad(0.0, (-1e3, 0.0))
     found = af.collapse_factor(structure, live=push, friction="nonassociated")
