@@ -77,7 +77,7 @@ class WithoutDilatancy:
         if not np.isfinite(least):
             return "without dilatancy it does not either: no factor is too large"
         low, high = self.between
-        found = f"found from {low:.4g} to {high:.4g}" if led else "were not found"
+        found = f"found from {low:.4g} to {high:.4g}" if np.isfinite(low) else "were not found"
         return (
             f"solutions without dilatancy {found} ({led} of {tried} starts); all lie from "
             f"{least:.4g} to {most:.4g}"
@@ -108,10 +108,12 @@ def without_dilatancy(
     thrusts = np.array([thrust(forces) for forces in starts])
     seen = thrusts.reshape(-1, len(programme.blocks.structure.depths)).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
-    limits = scale * associated, scale * max(associated, _bound(programme, seen))
+    bound = max(associated, _bound(programme, seen))
+    limits = scale * associated, scale * bound
     led = len(found)
-    if starts and max(limits) - min(limits) > WEAKER * abs(max(limits)):
-        first = max(found, key=_value, default=None)
+    first = max(found, key=_value, default=None)
+    least = -np.inf if first is None else first.state.value + WEAKER * abs(first.state.value)
+    if starts and bound > least:
         found += weaker(programme, first, starts[0], PATIENCE)
     values = [scale * turn.state.value for turn in found] or [np.nan]
     known = WithoutDilatancy(
