@@ -14,6 +14,15 @@ from archfem.statics.pushover import _extrapolated
 
 SIDEWAYS = af.BodyForce(1.0)
 
+EXACT = 1e-7
+"""Relative: linear programmes are solved to 1e-9 block weights, and the curve is flat at its end."""
+
+TENDS = 1e-3
+"""Relative: how near the extrapolation of a curve comes to its limit."""
+
+REACHED = 5e-3
+"""Relative: what is missing where a path ends far along, and its last steps are coarse."""
+
 
 def boxed(length, size, angle=35.0):
     """Dry fill in pieces between two walls, on a floor, 1.5 m high."""
@@ -58,7 +67,7 @@ def test_dry_fill_reaches_the_limit_of_joints_that_slide_flat(verified):
     assert np.isinf(af.collapse_factor(fill, live=SIDEWAYS).factor)
     limit = flat(fill)
     verified("dry fill between walls, pushed sideways: limit", limit, "limit analysis", push.factor)
-    assert push.factor == pytest.approx(limit, rel=1e-7)
+    assert push.factor == pytest.approx(limit, rel=EXACT)
 
 
 @pytest.mark.slow
@@ -69,8 +78,8 @@ def test_dry_fill_goes_on_by_creep_where_steps_would_crawl(control):
     push = af.pushover(af.build(fill, fidelity="rigid", cells=(1, 1)), SIDEWAYS, control=control)
     limit = flat(fill)
     assert "moved by" in push.outcome
-    assert push.factor == pytest.approx(limit, rel=5e-3)
-    assert push.limit == pytest.approx(limit, rel=5e-3)
+    assert push.factor == pytest.approx(limit, rel=REACHED)
+    assert push.limit == pytest.approx(limit, rel=REACHED)
 
 
 @pytest.mark.slow
@@ -85,7 +94,7 @@ def test_a_bridge_under_fill_in_pieces_tends_to_the_limit_of_flat_sliding(
     limit = flat(closed_cohesion(fill, push.joints.isel(step=-1)))
     case = f"bridge under fill in pieces, {cohesion:g} Pa, pushed sideways: limit"
     verified(case, limit, "limit analysis", push.limit)
-    assert push.limit == pytest.approx(limit, rel=1e-3)
+    assert push.limit == pytest.approx(limit, rel=TENDS)
     assert 0.99 * limit < push.factor < limit
     associated = af.collapse_factor(fill, live=SIDEWAYS).factor
     assert limit < 0.84 * associated
@@ -98,7 +107,7 @@ def test_a_path_that_crawls_at_its_limit_ends_and_says_so():
     model = af.build(filled_bridge(0.0, 2.2), fidelity="rigid", cells=(2, 1))
     push = af.pushover(model, SIDEWAYS)
     assert "it crawls: in 40 steps the load moved by no more than 1%" in push.outcome
-    assert push.factor == pytest.approx(0.2748, rel=0.01)
+    assert push.factor == pytest.approx(0.27481, rel=2.0 * REACHED)
 
 
 @pytest.mark.parametrize(("step", "crawls"), [(1e-5, True), (1e-2, False)])
