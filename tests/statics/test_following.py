@@ -15,7 +15,7 @@ from archfem.statics.pushover import _extrapolated
 SIDEWAYS = af.BodyForce(1.0)
 
 EXACT = 1e-7
-"""Relative: linear programmes are solved to 1e-9 block weights, and the curve is flat at its end."""
+"""Relative: programmes are solved to 1e-9 block weights, and the curve is flat at its end."""
 
 TENDS = 1e-3
 """Relative: how near the extrapolation of a curve comes to its limit."""
