@@ -34,7 +34,9 @@ def yardstick(monkeypatch):
         jump = 0.02 if model == "rattling" and more < -0.015 else 0.0
         return np.array([0.1, known + 0.4 * more + jump])
 
-    monkeypatch.setattr("archfem.dynamics.yardstick.peaks", peaks)
+    monkeypatch.setattr("archfem.dynamics.yardstick.time_history", peaks)
+    monkeypatch.setattr("archfem.dynamics.yardstick.peaks_of", lambda run: run)
+    monkeypatch.setattr("archfem.dynamics.yardstick._turned", lambda run: 0.0)
     monkeypatch.setattr("archfem.dynamics.yardstick.dead_load", lambda model: None)
     return Yardstick("finest", af.Motion(np.array([0.0, 1.0, 0.0]), 0.01), None)
 
