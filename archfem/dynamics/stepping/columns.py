@@ -23,6 +23,7 @@ class Columns(NamedTuple):
         places: which of the rows each column is, in the order in which they came (k,).
         column: which column each row is, -1 if it is none (k,).
         taken: how many columns have been (1,).
+        force: room for λ of the columns (k,).
     """
 
     entries: Array
@@ -30,6 +31,7 @@ class Columns(NamedTuple):
     places: Indices
     column: Indices
     taken: Indices
+    force: Array
 
 
 @numba.njit(cache=True)
@@ -41,7 +43,8 @@ def no_columns(rows):  # type: ignore
     """
     size = len(rows)
     entries, places = np.empty((size, size)), np.empty(size, np.int64)
-    return Columns(entries, rows, places, np.full(size, -1), np.zeros(1, np.int64))
+    column, taken = np.full(size, -1), np.zeros(1, np.int64)
+    return Columns(entries, rows, places, column, taken, np.empty(size))
 
 
 @numba.njit(cache=True)
@@ -85,9 +88,11 @@ def add_gaps(columns, force, gaps):  # type: ignore
         force: λ of the rows (k,).
         gaps: of the rows, changed (k,).
     """
-    places, count = columns.places, columns.taken[0]
+    count, own = columns.taken[0], columns.force
+    for j in range(count):
+        own[j] = force[columns.places[j]]
     for i in range(len(gaps)):
-        own, total = columns.entries[i], 0.0
+        row, total = columns.entries[i], 0.0
         for j in range(count):
-            total += own[j] * force[places[j]]
+            total += row[j] * own[j]
         gaps[i] += total

@@ -112,34 +112,36 @@ def holding(was, force, change):  # type: ignore
 
 
 @numba.njit(cache=True)
-def prepared(columns, entries, count, factor):  # type: ignore
+def prepared(columns, entries, count, room):  # type: ignore
     """Get ready to solve with 1 - λ' F.
 
     Args:
         columns: of F, `Columns`, among them all rows of λ'.
         entries: rows and columns of λ', and its values there.
         count: how many of them there are.
-        factor: filled at the top left with that or, of at most `FEW` columns, its factor (k, k).
+        room: of which part is taken (k²,).
 
     Returns:
-        With which column each was exchanged; nothing is where they are many.
+        That matrix or, of at most `FEW` columns, its factor (c, c); and with which column each was
+        exchanged, which is of no matter where they are many (c,).
     """
-    _equations(columns, entries, count, factor)
     size = columns.taken[0]
-    return factorised(factor, size) if size <= FEW else np.zeros(size, np.int64)
+    matrix = room[: size**2].reshape((size, size))
+    _equations(columns, entries, count, matrix)
+    return matrix, factorised(matrix) if size <= FEW else np.zeros(size, np.int64)
 
 
 @summing
-def _equations(columns, entries, count, factor):  # type: ignore
+def _equations(columns, entries, count, matrix):  # type: ignore
     """Fill 1 - λ' F of the columns."""
-    (places, values), size = entries, columns.taken[0]
+    (places, values), size = entries, len(matrix)
     for i in range(size):
-        own = factor[i]
+        own = matrix[i]
         for k in range(size):
             own[k] = 0.0
         own[i] = 1.0
     for entry in range(count):
-        own, other = factor[columns.column[places[entry, 0]]], columns.entries[places[entry, 1]]
+        own, other = matrix[columns.column[places[entry, 0]]], columns.entries[places[entry, 1]]
         value = values[entry]
         for k in range(size):
             own[k] -= value * other[k]
@@ -152,39 +154,38 @@ def newton_change(rest, entered, system):  # type: ignore
     Args:
         rest: r (k,).
         entered: rows and columns of λ' with its values, and how many those are.
-        system: `Columns`; factor of 1 - λ' F or, of more than `FEW` columns, that itself; and with
-            which each was exchanged, or how many there are.
+        system: `Columns`, and what `prepared` returned.
 
     Returns:
         μ (k,).
     """
-    ((places, values), count), (columns, factor, exchanges) = entered, system
+    ((places, values), count), (columns, (matrix, exchanges)) = entered, system
     change, own, size = np.zeros(len(rest)), np.zeros(len(exchanges)), len(exchanges)
     for k in range(count):
         own[columns.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
     if size > FEW:
-        own = _gradients(np.ascontiguousarray(factor[:size, :size]), own)
+        own = _gradients(matrix, own)
     else:
-        _substitute(factor, exchanges, own)
+        _substitute(matrix, exchanges, own)
     for k in range(size):
         change[columns.places[k]] = own[k]
     return change
 
 
 @numba.njit(cache=True, fastmath={"contract"})
-def factorised(matrix, size):  # type: ignore
-    """Factorise the top left of a matrix in place.
+def factorised(matrix):  # type: ignore
+    """Factorise a matrix in place.
 
     Faster than LAPACK's where there are but some tens of rows. Of a matrix that is singular,
     solutions are not numbers.
 
     Args:
-        matrix: of which only that part is changed.
-        size: of the part that is factorised.
+        matrix: changed (c, c).
 
     Returns:
-        With which row each was exchanged.
+        With which row each was exchanged (c,).
     """
+    size = len(matrix)
     exchanges = np.empty(size, np.int64)
     for k in range(size):
         best = k
@@ -196,9 +197,9 @@ def factorised(matrix, size):  # type: ignore
             for j in range(size):
                 matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
         scale = 1.0 / matrix[k, k] if matrix[k, k] != 0.0 else np.nan
-        top = matrix[k, k + 1 : size]
+        top = matrix[k][k + 1 :]
         for i in range(k + 1, size):
-            factor, row = scale * matrix[i, k], matrix[i, k + 1 : size]
+            factor, row = scale * matrix[i, k], matrix[i][k + 1 :]
             matrix[i, k] = factor
             for j in range(len(top)):
                 row[j] -= factor * top[j]

@@ -239,26 +239,26 @@ def _settled(law, problem, free, own, enough):  # type: ignore
         Passes; -1 if it does not settle.
     """
     (compliance, columns, known), size = problem, len(free)
-    wanted, factor = np.empty(size), np.empty((size, size))
-    entries, count, off, last = (law.work.places, law.work.values), 0, np.inf, np.inf
-    exchanges = np.empty(0, np.int64)
+    wanted, room, off = np.empty(size), np.empty(size**2), np.inf
     taken_out(law, known, wanted)
     own[:] = wanted
+    entries, count = (law.work.places, law.work.values), rates(law, known)
+    take_in(columns, compliance, wanted, entries[0], count)
+    system = prepared(columns, entries, count, room)
     for passes in range(1, TRIES + 1):
-        renew = passes <= 2 or off**2 > last * enough
-        if renew:
-            count = rates(law, known)
-        take_in(columns, compliance, wanted, entries[0], count)
-        if renew:
-            exchanges = prepared(columns, entries, count, factor)
         rest = free - chosen(law.guess, columns.rows)
         add_gaps(columns, wanted, rest)
-        change = newton_change(rest, (entries, count), (columns, factor, exchanges))
+        change = newton_change(rest, (entries, count), (columns, system))
         last, off = off, _moved(law, problem, free, (own, wanted, change), passes >= WHOLE)
         if off <= enough or last <= off <= ROUNDED * enough:
             return passes
         if not off < np.inf:
             return -1
+        renew = passes == 1 or off**2 > last * enough
+        count = rates(law, known) if renew else count
+        take_in(columns, compliance, wanted, entries[0], count)
+        if renew:
+            system = prepared(columns, entries, count, room)
     return -1
 
 
