@@ -104,7 +104,7 @@ class Equation:
             return None
         return joints if self.conserving or joints.offset is None else None
 
-    @property
+    @cached_property
     def remembers(self) -> int:
         """How many joint points remember what they have slid."""
         slides = bool(np.isfinite(self.model.structure.friction).any())
