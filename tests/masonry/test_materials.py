@@ -42,7 +42,12 @@ def test_presets_are_those_of_table_2():
         assert contact.shear_stiffness == pytest.approx(1e9 * shear)
         assert contact.friction == 0.60
     stone, backfill = af.STONE, BACKFILL
-    assert (stone.young, stone.poisson, stone.unit_weight, stone.strength) == (3e10, 0.2, 2e4, 5.6e7)
+    assert (stone.young, stone.poisson, stone.unit_weight, stone.strength) == (
+        3e10,
+        0.2,
+        2e4,
+        5.6e7,
+    )
     assert (backfill.young, backfill.poisson, backfill.unit_weight) == (6.25e6, 0.2, 18e3)
     assert backfill.strength is None
 
