@@ -4,7 +4,7 @@ import builtins
 import tomllib
 from pathlib import Path
 
-from mutants.__main__ import KNOWN, _chosen
+from mutants.__main__ import DEFAULTS, KNOWN, _chosen
 from mutants.changes import changed, changes, marked
 
 ROOT = Path(__file__).parents[1]
@@ -59,6 +59,14 @@ def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_fir
     }
     first = ["tests/joints/test_law.py::own", "tests/a/test_any.py::short"]
     assert _chosen(path, change, tests) == [first, ["tests/a/test_any.py::long"]]
+
+
+def test_a_default_meets_the_tests_of_defaults_though_they_come_to_no_statement():
+    path, default = Path("archfem/joints/law.py"), changes("def f(x=2):\n    return x\n")[0]
+    own, other = f"{DEFAULTS}::own", "tests/a/test_any.py::idle"
+    assert default.statement is None
+    assert (ROOT / DEFAULTS).exists()
+    assert _chosen(path, default, {own: (0.1, []), other: (0.1, [])}) == [[own]]
 
 
 def test_what_changes_no_number_is_still_there_and_has_a_reason():

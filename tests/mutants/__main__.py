@@ -33,6 +33,9 @@ COMPILED = ("joints/moving", "dynamics/stepping", "dynamics/falling")
 TESTS = [f"tests/{room}" for room in (*ROOMS, "validation", "verification", "cases", "studies")]
 TESTS.append("tests/test_doctests.py")
 
+DEFAULTS = "tests/verification/test_defaults.py"
+"""Tests of what is kept as a module is read: they come to no statement of it."""
+
 FIRST, FILES = 4.0, 8
 """CPU time [s] and number of files of the tests that run first: most changes go no further."""
 
@@ -169,7 +172,7 @@ def _comes(test: str, places: list[list[str | int]], path: Path, change: Change)
     if _compiled(path):
         return test.startswith((f"tests/{path.parts[1]}/", "tests/verification"))
     if change.statement is None:
-        return any(place[0] == path.as_posix() for place in places)
+        return test.startswith(DEFAULTS) or any(place[0] == path.as_posix() for place in places)
     return [path.as_posix(), change.statement.lineno] in places
 
 

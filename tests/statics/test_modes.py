@@ -180,3 +180,13 @@ def test_table():
     assert head.split("  ")[0] == "mode"
     cells = ["2", "72.64 Hz", "0.01377 s", "0.0%", "100.0%", "75.3%", "100.0%"]
     assert re.split(r"\s{2,}", second) == cells
+
+
+def test_modes_in_a_line():
+    """Of the block: sway has no mass along y, and the two lowest have all of that."""
+    found = modes(block(), 2)
+    share = f"{found.effective_masses[:, 0].sum() / of_blocks(found.model.structure):.0%}"
+    assert repr(found) == (
+        f"Modes of '{found.model.structure.name}': 2 from 8.88 to 72.64 Hz, with {share} of the mass "
+        "along x and 100% along y"
+    )

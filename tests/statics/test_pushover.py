@@ -1,5 +1,6 @@
 """Pushover: it rises to the limit of rigid blocks, whichever way it is controlled."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
 
@@ -153,6 +154,7 @@ def test_curve_starts_at_the_dead_load_and_never_falls():
     found = pushed("eccentric", "displacement")
     assert float(found.curve["factor"][0]) == 0.0
     assert float(found.curve["displacement"][0]) == 0.0
+    assert int(found.curve["iterations"][0]) == 0
     assert float(found.curve["displacement"].diff("step").min()) > 0.0
     assert float(found.curve["factor"].diff("step").min()) > -1e-6 * found.factor
     dead = found.joints["eccentricity"].isel(step=0)
@@ -270,6 +272,15 @@ def test_work_on_a_settlement_is_the_thrust_on_the_support():
     thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
     assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)
     assert float(found.curve["displacement"][-1]) > 0.0
+    assert int(found.curve["iterations"][0]) == 0
+
+
+def test_a_pushover_in_a_line():
+    found, endless = pushed("eccentric", "displacement"), pushed("sideways", "force")
+    steps = len(found.curve["factor"]) - 1
+    assert repr(found).startswith(f"Pushover: factor {found.factor:.4g} after {steps} steps, tends")
+    unknown = replace(endless, limit=np.nan)
+    assert f"steps, {len(endless.hinges)} hinges; " in repr(unknown)
 
 
 def test_joints_turn_as_the_mechanism_of_limit_analysis():
