@@ -185,8 +185,7 @@ def test_table():
 def test_modes_in_a_line():
     """Of the block: sway has no mass along y, and the two lowest have all of that."""
     found = modes(block(), 2)
-    share = f"{found.effective_masses[:, 0].sum() / of_blocks(found.model.structure):.0%}"
-    assert repr(found) == (
-        f"Modes of '{found.model.structure.name}': 2 from 8.88 to 72.64 Hz, with {share} of the mass "
-        "along x and 100% along y"
-    )
+    structure = found.model.structure
+    share = f"{found.effective_masses[:, 0].sum() / of_blocks(structure):.0%}"
+    said = f"2 from 8.88 to 72.64 Hz, with {share} of the mass along x and 100% along y"
+    assert repr(found) == f"Modes of '{structure.name}': {said}"

@@ -200,7 +200,7 @@ def test_what_cannot_stand_until_the_rest_is_placed_is_told(bridge):
 
 @pytest.mark.parametrize(("friction", "tension"), [(None, 0.0), (0.6, 2e4)])
 def test_forces_on_what_stands_are_the_slope_of_its_energy(column, friction, tension):
-    """Of two courses of three, whose joints open and shear, but do not slide; by central differences.
+    """By central differences: two courses of three whose joints open and shear, and do not slide.
 
     A millionth of the largest force: steps of 1e-9 m lose 1e-16 of the energy over 1e-9 m.
     """
