@@ -8,7 +8,9 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem.dynamics.collapse_scale import CollapseScale
 from archfem.dynamics.scales import (
+    COLLAPSE,
     DEFINITIONS,
     MechanismScales,
     ScaledRun,
@@ -210,3 +212,25 @@ def test_refusals(on_piers, motion):
         mechanism_scales(on_piers, motion, precision=0.0)
     with pytest.raises(af.InvalidInput, match="the smaller first"):
         mechanism_scales(on_piers, motion, between=(2.0, 1.0))
+
+
+def test_a_search_makes_forty_runs_at_most():
+    found = searched({name: beyond(0.7) for name in DEFINITIONS}, precision=1e-12)
+    assert len(found.runs) == 40
+    assert found["verified"].lower < 0.7 <= found["verified"].upper
+
+
+def fallen(*scales):
+    """Runs at some scales, those of a negative one fallen."""
+    made = (af.dynamics.Fall("fallen" if s < 0 else "stands", {}, 0.1, None, True) for s in scales)
+    runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))
+    return MechanismScales((COLLAPSE,), tuple(runs))
+
+
+def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
+    found = CollapseScale({0.01: fallen(1.0, -2.0, 3.0, -4.0), 0.005: fallen(0.5, 1.5, -2.5, 2.7)})
+    assert (found.lower, found.upper) == (1.0, 2.5)
+    assert found.above == (2.7, 3.0)
+    assert found.bracket(0.005).upper == 2.5
+    never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
+    assert (never.lower, never.upper, never.above) == (1.0, inf, ())
