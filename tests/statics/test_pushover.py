@@ -264,13 +264,17 @@ def test_spreading_supports_bring_meshed_rungs_to_the_least_thrust(rung):
     assert found.factor < 0.8 * float(found.curve["factor"][0])  # the thrust of the dead load
 
 
-def test_work_on_a_settlement_is_the_thrust_on_the_support():
-    found = pushover(
-        rigid(RING), af.Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3)
-    )
+@pytest.mark.parametrize("motion", [(-2.0, 0.0, 0.0), (-1.0, -0.3, 0.4)])
+def test_work_on_a_settlement_is_the_thrust_on_the_support(motion):
+    """Of N and V on the point at M / N from mid-depth, which moves and turns with the support."""
+    found = pushover(rigid(RING), af.Settlement("left abutment", motion), stop=Stop(steps=3))
     joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
-    thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
-    assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)
+    support = RING.blocks[RING.block_number("left abutment")]
+    place = joint.middle + float(last["M"]) / float(last["N"]) * joint.tangent
+    x, y = place - support.centroid
+    way = np.array([motion[0] - motion[2] * y, motion[1] + motion[2] * x])
+    work = float(last["V"]) * joint.tangent @ way - float(last["N"]) * RING.normals[0] @ way
+    assert found.factor == pytest.approx(work, rel=1e-9)
     assert float(found.curve["displacement"][-1]) > 0.0
     assert int(found.curve["iterations"][0]) == 0
 
