@@ -6,9 +6,9 @@ import pytest
 import archfem as af
 from archfem.joints.resultants import joint_dataset
 from archfem.statics.equilibrium import self_weight
-from archfem.statics.newton import Solver
+from archfem.statics.newton import Solved, Solver
 from archfem.statics.path import LoadPath
-from archfem.statics.relaxation import relaxed
+from archfem.statics.relaxation import _crept, relaxed
 
 REST = 1e-10
 """Out of balance relative to the load, to which equilibria are found."""
@@ -136,3 +136,52 @@ def test_a_pushover_of_fill_in_pieces_goes_on_where_newton_fails(bridge):
     assert 0.66 * most < found.factor < most
     assert "the load cannot grow beyond a factor of" in found.outcome
     assert "pieces of fill flow" in found.outcome
+
+
+def counting(monkeypatch):
+    """How many iterations each solve has made, as a list that grows."""
+    made, solve = [], Solver.solve
+
+    def counted(solver, *given, **more):
+        solved = solve(solver, *given, **more)
+        made.append(solved.iterations)
+        return solved
+
+    monkeypatch.setattr(Solver, "solve", counted)
+    return made
+
+
+def test_iterations_that_are_told_are_those_made(stack, ring, monkeypatch):
+    """By creep, under dead load at once and in stages, on a support that moves, and by a push."""
+    model, made = af.build(stack, fidelity="rigid"), counting(monkeypatch)
+    _, solved = relaxed(Solver(model.size), model, self_weight(model), np.zeros(model.size))
+    assert solved.iterations == sum(made) > 0
+    for stages in (None, af.masonry.usual_stages(stack)):
+        made.clear()
+        assert af.dead_load(model, stages=stages).iterations == sum(made) > 0
+    settled = model.settled(af.Settlement("base", (0.0, -0.01, 0.0)))
+    made.clear()
+    found = af.dead_load(settled)
+    assert found.iterations == sum(made) > 0
+    assert found.steps == len(made)
+
+
+def test_where_newton_fails_a_step_of_creep_is_made_with_given_limits(stack, monkeypatch):
+    """Six times, each from limits of the one before; what they all took is told."""
+    asked = []
+
+    def dragged(solver, model, load, starts, drag, searches):
+        asked.append((starts, searches, getattr(model, "operator", model)))
+        if len(asked) == 1:
+            raise af.DidNotConverge("made to fail")
+        return Solved(starts[1] + 1.0, len(asked), 0.5)
+
+    monkeypatch.setattr("archfem.statics.relaxation._dragged", dragged)
+    model = af.build(stack, fidelity="rigid")
+    load, start = self_weight(model), np.zeros(model.size)
+    solved = _crept(Solver(model.size), model, load, start, model.closed())
+    assert solved.iterations == sum(range(2, 8))
+    assert [float(guess[0]) for (_, guess), _, _ in asked] == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert all(not first.any() for (first, _), _, _ in asked)
+    assert [searches for _, searches, _ in asked] == [("basic",)] + [("basic", "cp")] * 6
+    assert (solved.q == 6.0).all()
