@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.dynamics import collapse
 from archfem.dynamics.collapse import Parting, tilting
 
 BREADTH = 0.5
@@ -57,3 +58,39 @@ def test_blocks_that_lean_and_move_are_followed(tower, turn, speed, falls):
     velocity[3] = speed
     state = af.dynamics.State(1.0, np.array(leant(turn)), velocity, np.zeros(tower.size))
     assert tilting(tower, state) is falls
+
+
+def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypatch):
+    """Frames each fiftieth of a second, of joints that all slide and none of which is bonded."""
+    asked = []
+
+    class Falling:
+        def __init__(self, structure):
+            asked.append(structure)
+
+        def frames(self, start, end, motion, *, spacing):
+            asked.append((start, end, spacing))
+            yield start
+
+    given = SimpleNamespace(start=SimpleNamespace(time=1.0, poses=np.zeros((3, 3))))
+    given.strain, given.before, given.after = 0.5, 2.0, 1.5
+    monkeypatch.setattr(collapse, "released", lambda model, state: given)
+    monkeypatch.setattr(collapse, "Falling", Falling)
+    monkeypatch.setattr(collapse, "fall_of", lambda structure, frames: len(frames))
+    motion = af.Motion(np.arange(401.0) / 1e3, 0.01)
+    for time, end in ((1.0, 24.0), (6.0, 26.0)):
+        asked.clear()
+        state = SimpleNamespace(time=time)
+        found, fall = collapse.fallen(tower, state, motion)
+        assert asked[1] == (given.start, pytest.approx(end), 0.02)
+        assert fall == 1
+    assert found["fall_ground"].values == pytest.approx(np.array([[0.1, 0.0]]))
+    assert found.attrs["handover_kinetic"].tolist() == [2.0, 1.5]
+
+
+def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
+    for friction, rubs in ((0.45, 0.45), (None, 0.6)):
+        contact = af.Contact(1e9, 4e8, friction, cohesion=1e4)
+        loose = collapse._rubbing(af.column(breadth=1.0, heights=[1.0], contact=contact))
+        assert [each.contact.friction for each in loose.joints] == [rubs]
+        assert [each.contact.cohesion for each in loose.joints] == [0.0]

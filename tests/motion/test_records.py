@@ -452,3 +452,11 @@ def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
         rows = "".join(f"{time:.3f} {k % 7}\n" for k, time in enumerate(times))
         with pytest.raises(af.InvalidInput, match=says):
             read_channels(write("# gal, dt = 0.01 s\n" + rows))
+
+
+def test_columns_of_afad_are_named_on_their_last_line(write):
+    """Another line that names three directions, before the peaks, tells nothing."""
+    head, peaks = SAMPLES["afad"].split("RAW PGA")
+    (first, *others) = read_channels(write(f"{head}  U-D  N-S  E-W\r\nRAW PGA{peaks}"))
+    assert [each.direction for each in (first, *others)] == ["N-S", "E-W", "U-D"]
+    assert first.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
