@@ -344,6 +344,7 @@ class Steps:
 
     def __init__(self, fails=(), iterations=9):
         self.fails, self.asked, self.each = list(fails), [], iterations
+        self.borders = []
         self.unit, self.states, self.iterations = (1.0, 1.0), [0], [0]
         self.displacements, self.factors = np.zeros(1), [0.0]
         self.model = SimpleNamespace(structure=SimpleNamespace(size=1e9))
@@ -351,6 +352,7 @@ class Steps:
 
     def advance(self, border, distance):
         self.asked.append(distance)
+        self.borders.append(border.tolist())
         if self.fails and self.fails.pop(0):
             return False
         self.states.append(0)
@@ -395,3 +397,17 @@ def test_rules_end_a_path_where_they_are_met():
     assert finished(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
     path.units = "N m"
     assert finished(path, Stop(displacement=1.0), criteria, even) is None
+
+
+def test_arc_length_goes_on_in_the_direction_of_the_last_step():
+    """Of length one, half of each at first; the units of both are those of the first step."""
+    path = Steps()
+    path.unit = (0.5, 2.0)
+    _follow(path, "arc length", Stop(steps=3), af.Criteria())
+    even, later = 0.5**0.5, np.array([2.0, 0.5]) / np.hypot(2.0, 0.5)
+    assert path.borders[0] == pytest.approx([even, even])
+    assert path.borders[1] == path.borders[2] == pytest.approx(later.tolist())
+    for control, border in (("force", [0.0, 1.0]), ("displacement", [1.0, 0.0])):
+        path = Steps()
+        _follow(path, control, Stop(steps=2), af.Criteria())
+        assert path.borders == [border] * 2
