@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.motion.records import afad, cosmos, csmip, esm, knet, peer, smc
 from archfem.motion.records.read import read_channels, read_components
+from archfem.motion.records.text import RecordText
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -460,3 +462,28 @@ def test_columns_of_afad_are_named_on_their_last_line(write):
     (first, *others) = read_channels(write(f"{head}  U-D  N-S  E-W\r\nRAW PGA{peaks}"))
     assert [each.direction for each in (first, *others)] == ["N-S", "E-W", "U-D"]
     assert first.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
+KEYS = [
+    (smc, "2 CORRECTED ACCELEROGRAM", "*", 11),
+    (afad, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
+    (afad, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
+    (csmip, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
+    (cosmos, "", "Corrected acceleration (Format v01.20", 3),
+    (cosmos, "", " 100 Integer-header values follow", 40),
+    (esm, "", "NDATA: 40", 80),
+    (esm, "", "SAMPLING_INTERVAL_S: 0.01", 80),
+    (knet, "", "Scale Factor      7845(gal)/8000000", 20),
+    (knet, "", "Sampling Freq(Hz) 100Hz", 20),
+    (peer, "NPTS= 40", "DT= .01 SEC", 12),
+    (peer, "DT= .01 SEC", "NPTS= 40", 12),
+]
+"""A first line, another by which a format then is known, and how far down that may stand."""
+
+
+@pytest.mark.parametrize(("form", "first", "key", "last"), KEYS)
+def test_a_format_is_known_by_lines_of_its_header(form, first, key, last):
+    for place, known in ((2, True), (last, True), (last + 1, False)):
+        text = RecordText(Path("any"), (first, *["x"] * (place - 2), key, "x"), True)
+        assert form.recognises(text) is known
+    assert not form.recognises(RecordText(Path("any"), (first, "x"), True))

@@ -411,3 +411,10 @@ def test_arc_length_goes_on_in_the_direction_of_the_last_step():
         path = Steps()
         _follow(path, control, Stop(steps=2), af.Criteria())
         assert path.borders == [border] * 2
+
+
+@pytest.mark.parametrize("load", [af.BodyForce(0.1), af.Settlement("left abutment", (-1.0, 0, 0))])
+def test_the_first_step_is_a_millionth_of_the_structure(load):
+    found = pushover(rigid(RING), load, stop=Stop(steps=1))
+    moved = found.curve["displacement"].values
+    assert moved == pytest.approx([0.0, 1e-6 * RING.size], rel=1e-6)

@@ -214,3 +214,28 @@ def test_forces_on_what_stands_are_the_slope_of_its_energy(column, friction, ten
     force = site.force(q)
     assert slope == pytest.approx(force[:6], abs=1e-6 * np.abs(force).max())
     assert np.abs(force[:6]).min() > 1e-3 * np.abs(force).max()
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(5, "'block 4', 'block 5']: every"), (7, "'block 5'] and 2 more: every")]
+)
+def test_blocks_that_no_stage_places_are_named_up_to_five(count, words):
+    tower = af.column(breadth=1.0, heights=[1.0] * (count + 1))
+    stages = [Stage(blocks=(count + 1,))]
+    with pytest.raises(InvalidInput) as caught:
+        af.dead_load(af.build(tower, fidelity="rigid"), stages=stages)
+    assert "no stage places ['block 1', 'block 2', 'block 3', 'block 4'" in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_fill_is_placed_in_layers_of_equal_height(bridge):
+    """By the heights of its pieces, from the lowest to the highest of them."""
+    soil = {n: bridge.blocks[n].centroid[1] for n in bridge.free if bridge.blocks[n].grain}
+    low, high = min(soil.values()), max(soil.values())
+    layers = [each for each in usual_stages(bridge, layers=3) if "layer" in each.name]
+    assert sum(len(each.blocks) for each in layers) == len(soil)
+    for k, each in enumerate(layers):
+        own = [(soil[n] - low) / (high - low) for n in each.blocks]
+        assert k / 3 <= min(own) + 1e-12
+        assert max(own) <= (k + 1) / 3 + 1e-12
+    assert [each.centring for each in usual_stages(bridge)].count(True) == 1
