@@ -174,3 +174,25 @@ def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, 
     monkeypatch.setattr(type(model), "mismatch", lambda self, q: (1.02, "joint 1"))
     with pytest.raises(af.DidNotConverge, match=r"'joint 1' had slid by 1 of a facet"):
         looked(model).judge()
+
+
+def test_between_looks_the_middles_of_blocks_are_watched(stack):
+    """Every 32nd step all points are looked at: the first, and the 33rd."""
+    model = af.build(stack, fidelity="rigid")
+    gauges, far = af.models.Gauges.on(model), np.array([0.0, 0.3, 0.0, 0.0, 0.4, 0.0])
+    guard = looked(model)
+    asked = []
+
+    def state(k):
+        asked.append(k)
+        return af.dynamics.State(0.0, np.zeros(model.size), *np.zeros((2, model.size)))
+
+    count = 40
+    none, times = np.zeros((count, len(stack.joints), 3)), np.arange(2.0, 2.0 + count)
+    rows = np.zeros((count, 4))
+    steps = af.dynamics.Batch(times, none, 0 * times, times, rows, state)
+    readings = np.array([gauges.read(k / (count - 1.0) * far) for k in range(count)])
+    guard.add(steps, readings)
+    assert guard.largest_displacement == pytest.approx(0.4)
+    assert asked[0] == 31  # the 33rd of all, since one had come before
+    assert set(asked[1:]) == {count - 1}

@@ -40,7 +40,7 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late):
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity):
-    """Along the step, by central differences, where joints hold: Gauss places that move leave 2e-6."""
+    """Along the step, by central differences: places of Gauss that move leave 2e-6."""
     model, first, last = moved(fidelity, 1, friction=None)
     passage, way = model.passage(first, 0.4), last - first
     slope = (passage.force(last + 1e-5 * way) - passage.force(last - 1e-5 * way)) / 2e-5
