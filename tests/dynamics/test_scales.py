@@ -8,7 +8,7 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.collapse_scale import CollapseScale
+from archfem.dynamics.collapse_scale import CollapseScale, collapse_scale
 from archfem.dynamics.scales import (
     COLLAPSE,
     DEFINITIONS,
@@ -234,3 +234,21 @@ def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
     assert found.bracket(0.005).upper == 2.5
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
+
+
+@pytest.mark.parametrize(
+    ("between", "limits"),
+    [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
+)
+def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, monkeypatch):
+    """Five g, of a motion of 20 m/s²; one scale where the least of those asked for is beyond."""
+    asked = []
+    monkeypatch.setattr(
+        "archfem.dynamics.collapse_scale.search",
+        lambda shaken, what, precision, found: asked.append(found),
+    )
+    block = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(block, fidelity="rigid", displacements="large")
+    strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
+    collapse_scale(model, strong, between=between)
+    assert asked == [pytest.approx(limits)] * 2
