@@ -68,8 +68,8 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return what may be changed in a module.
 
-    Words of errors and of the log, annotations, imports and what a function that only refuses does
-    are left out.
+    Words of errors and of the log, annotations, imports, what a function that only refuses does and
+    sizes of a shape that are to be found are left out.
 
     Args:
         source: of the module.
@@ -136,10 +136,21 @@ def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list
                 continue
             if isinstance(node, ast.If) and isinstance(node.body[-1], ast.Raise):
                 continue
+            if field == "args" and _is_reshape(tree) and ast.unparse(node) == "-1":
+                continue
             if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("logger."):
                 continue
             yield node, around
             yield from _places(node, around)
+
+
+def _is_reshape(call: ast.AST) -> bool:
+    """Whether it gives a shape, in which -1 stands for a size that is to be found."""
+    return (
+        isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr == "reshape"
+    )
 
 
 def _changed(node: ast.AST) -> ast.expr | None:
