@@ -255,3 +255,24 @@ def test_turning_is_slowed_by_what_is_left_at_the_largest_tilts():
     energy = np.array([7.0, 1.0, 7.0, 7.0, 0.9, 7.0, 7.0, 0.64, 7.0])
     assert _slowed(angle, energy) == pytest.approx(0.64**0.25)
     assert _slowed(angle[:6], energy[:6]) == 0.0  # it came to rest before
+
+
+@pytest.mark.parametrize("size", [0.1, 10.0])
+def test_a_block_is_followed_for_two_impacts_and_a_half(size, monkeypatch):
+    """From tilt to level it takes √(2 θ I / M) under the moment M of its weight about the edge."""
+    asked = []
+
+    class Stepper:
+        @staticmethod
+        def batches(start, dt, end):
+            asked.append((dt, end))
+            return []
+
+    monkeypatch.setattr("archfem.dynamics.impact.stepper_for", lambda *_: Stepper)
+    block = _Block(size * BREADTH, size * HEIGHT, contact(), STONE)
+    assert block.restitution(None) == 0.0  # it never comes to an impact here
+    mass = WEIGHT / 9.81 * size**2 * BREADTH * HEIGHT
+    inertia = mass * size**2 * (BREADTH**2 + HEIGHT**2) / 3.0
+    swing = np.sqrt(2.0 * block.tilt * inertia / (mass * 9.81 * size * BREADTH / 2.0))
+    fine = 2.0 * np.pi / np.sqrt(1e9 / (WEIGHT / 9.81 * size * HEIGHT)) / 20.0
+    assert asked == [(pytest.approx(min(1e-3, fine)), pytest.approx(4.5 * swing))]
