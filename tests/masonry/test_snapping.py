@@ -7,6 +7,7 @@ import pytest
 from drawn import assert_same, geojson, square
 
 import archfem as af
+from archfem.masonry.survey.snapping import _area
 
 
 @pytest.mark.parametrize(("error", "snap"), [(0.5e-3, 2e-3), (2e-3, 8e-3), (8e-3, 0.03)])
@@ -125,3 +126,13 @@ def test_vertices_move_by_twice_the_tolerance_at_most(tmp_path, step, refused):
             af.read_outlines(path)
     else:
         assert af.read_outlines(path).moved == pytest.approx(2.5 * step)
+
+
+def test_areas_have_the_sense_of_their_outline():
+    """Of a triangle, a square and an angle, wherever they are, by Green's theorem by hand."""
+    angle = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]], float)
+    outlines = {4.5: [[0, 0], [3, 0], [1, 3]], 1.0: square(0, 0), 4.0: angle}
+    for area, outline in outlines.items():
+        points = np.array(outline, float) + np.array([100.0, -50.0])
+        assert _area(points) == pytest.approx(area)
+        assert _area(points[::-1]) == pytest.approx(-area)
