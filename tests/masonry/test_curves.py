@@ -197,3 +197,17 @@ def test_corners_of_stones_are_the_ends_of_their_joints(kind, chords):
         assert len(block.outline) == least or kind == "pointed"  # its keystone has more
         turn = (b - a)[0] * (c - b)[1] - (b - a)[1] * (c - b)[0]
         assert turn > 0.0
+
+
+@pytest.mark.parametrize("kind", RINGS)
+def test_abutments_lie_behind_the_springings(kind):
+    """Half as deep as the first joint, and as broad as theirs."""
+    ring = RINGS[kind](2)
+    deep = 0.5 * ring.depths[0]
+    for joint, name in ((ring.joints[0], "left abutment"), (ring.joints[-1], "right abutment")):
+        block = ring.blocks[ring.block_number(name)]
+        normal = np.array([-joint.tangent[1], joint.tangent[0]])
+        off = (block.points - joint.middle) @ normal
+        assert np.ptp(off) == pytest.approx(deep)
+        assert np.abs(off).min() == pytest.approx(0.0, abs=1e-9)
+        assert block.area == pytest.approx(deep * joint.depth)
