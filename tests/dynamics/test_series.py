@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.dynamics.series import frames
+from archfem.dynamics.series import _kind, frames
 from archfem.models.exchange.solids import Solids
 
 h5py = pytest.importorskip("h5py")
@@ -177,3 +177,8 @@ def test_frames_of_a_fall_turn_blocks_about_their_centroids():
             assert moved == pytest.approx(to, abs=1e-12)
         assert frame.stress.shape == shown[0].stress.shape
         assert not frame.stress.any()
+
+
+def test_kinds_of_cells_are_those_of_xdmf():
+    """Its numbers of topologies: 4 a triangle, 5 a quadrilateral, 3 a polygon and its corners."""
+    assert [_kind(size) for size in (3, 4, 5, 17)] == [(4,), (5,), (3, 5), (3, 17)]
