@@ -110,8 +110,8 @@ def test_a_structure_in_a_line():
 def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
     """Of the lower of two blocks the height; loads and names do not matter."""
 
-    def pair(height, **more):
-        boxes = {"base": (0.0, 3.0, -1.0, 0.0), "tall": (0, 1, 0, 3), "low": (2, 3, 0, height)}
+    def pair(height, zero=0.0, **more):
+        boxes = {"base": (zero, 3.0, -1.0, zero), "tall": (0, 1, 0, 3), "low": (2, 3, 0, height)}
         blocks = [
             af.Block(((x, y), (r, y), (r, top), (x, top)), af.STONE, name, name == "base")
             for name, (x, r, y, top) in boxes.items()
@@ -123,5 +123,6 @@ def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
     assert pair(1.0 + 3e-10 * size).fingerprint == told
     assert pair(1.0 + 1e-9 * size).fingerprint != told
     assert pair(1.0, name="another", gravity=5.0).fingerprint == told
+    assert pair(1.0, zero=-0.0).fingerprint == told
     assert pair(1.0, width=1.0 + 2e-9).fingerprint == told
     assert pair(1.0, width=1.0 + 2e-8).fingerprint != told

@@ -94,7 +94,8 @@ def marked(source: str, name: str) -> str:
     """Return a module that says which statements with changes it comes to.
 
     Each is told to the function `_reached` among the built-in names, where there is one, as the
-    module's name and the statement's line.
+    module's name and the statement's line; so is the first statement of each function, which may
+    read what is kept as the module is read.
 
     Args:
         source: of the module.
@@ -102,6 +103,7 @@ def marked(source: str, name: str) -> str:
     """
     tree = ast.parse(source)
     marks = {id(found): found for each in _found(tree) if (found := each.statement) is not None}
+    marks |= {id(first): first for first in _first_statements(tree)}
     for node in list(ast.walk(tree)):
         for field in ("body", "orelse", "finalbody"):
             block = getattr(node, field, None)
@@ -115,6 +117,13 @@ def marked(source: str, name: str) -> str:
     start = "import builtins; _reached = getattr(builtins, '_reached', bool)"
     tree.body[first:first] = ast.parse(start).body
     return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _first_statements(tree: ast.AST) -> Iterator[ast.stmt]:
+    """What each function begins with, after its docstring."""
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            yield from function.body[int(ast.get_docstring(function) is not None) :][:1]
 
 
 def _found(tree: ast.AST) -> list[Change]:

@@ -75,6 +75,7 @@ BLOCKS = {
     "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
     "models.discretisation.Discretisation": {"cells": (4, 4), "degree": 1},
     "models.exchange.states.write_state": {"magnification": 1.0},
+    "models.rigid.rigid": {"cells": 4},
     "models.model.Prediction": {"of_small": 0.0, "of_chance": 0.0},
     "statics.ends.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
     "statics.newton.Newton": {"tolerance": 1e-10},
