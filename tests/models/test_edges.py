@@ -43,3 +43,21 @@ def test_a_joint_has_the_edges_that_both_blocks_have_between_its_ends():
     assert found.lengths[found.around[1]].sum() == pytest.approx(3.0)
     assert len(found.boundaries[1]) == 6
     assert sorted(found.structured + found.unstructured) == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("off", "points"), [(0.9e-6, 6), (1.1e-6, 8)])
+@pytest.mark.parametrize("size", [0.05, 40.0])
+def test_corners_are_one_up_to_a_millionth_of_the_structure(size, off, points):
+    """Of a square on another, moved along their joint; both lie in a box of 1 by 2."""
+    lower = size * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    shift = off * size * np.hypot(1.0, 2.0)
+    upper = lower + np.array([shift, size])
+    given = {"part": "pier", "role": "pier", "corners": (0, 1, 2, 3)}
+    blocks = [
+        af.Block(tuple(map(tuple, each)), af.STONE, name, name == "base", **given)
+        for each, name in ((lower, "base"), (upper, "stone"))
+    ]
+    contact = af.masonry.STONE_TO_STONE
+    bed = af.Joint((0, 1), (shift, size), (size, size), contact, "bed", "pier", "pier")
+    found = edges_of(af.Structure(tuple(blocks), (bed,)), [1, 1])
+    assert len(found.points) == points
