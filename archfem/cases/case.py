@@ -19,7 +19,7 @@ from archfem.cases.building import stages_asked
 from archfem.cases.limits import Limit, limit_asked
 from archfem.cases.settings import Table, change, checked, refuse_unknown
 from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
-from archfem.cases.structures import planned
+from archfem.cases.structures import structure_of
 from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
 from archfem.dynamics.time_history import LEAST_STEP
 from archfem.errors import ArchfemError, InvalidInput
@@ -163,7 +163,7 @@ class Case:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
             title=str(settings.get("title", "case")),
-            structure=_titled(planned(settings, folder), settings),
+            structure=structure_of(settings, folder),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),
             suite=None if suite is None else ground.suite_settings(suite),
@@ -291,8 +291,3 @@ class Case:
     def text(self) -> str:
         """The case as TOML, changes included."""
         return tomli_w.dumps(self.settings)
-
-
-def _titled(structure: Structure, settings: Table) -> Structure:
-    """Return a structure that pictures call by the title of its case, where it has one."""
-    return replace(structure, name=str(settings.get("title", structure.name)))

@@ -71,7 +71,8 @@ def inputs_digest(settings: Table, folder: Path = Path()) -> str:
         folder: where relative file names start.
     """
     files = [(path.name, content_digest(path)) for path in input_files(settings, folder)]
-    text = json.dumps([package_version(), settings, files], sort_keys=True, default=str)
+    order = _tables_within(settings.get("structure"))  # arches and piers stand in theirs
+    text = json.dumps([package_version(), settings, files, order], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -85,6 +86,12 @@ def _named(motion: Any) -> Iterator[str]:
         yield upright
     elif upright is not None:
         yield from _named(upright)
+
+
+def _tables_within(table: Any) -> list[Any]:
+    """Names of the tables within a table, in their order, each with those within it."""
+    own = _table(table).items()
+    return [(name, _tables_within(each)) for name, each in own if isinstance(each, Mapping)]
 
 
 def _table(given: Any) -> Table:

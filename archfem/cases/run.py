@@ -19,6 +19,7 @@ from archfem.dynamics.events import CountedMechanism
 from archfem.dynamics.history import Ending, History, history_of
 from archfem.dynamics.ladder import Damping, choose
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
+from archfem.dynamics.stepping.stepper import Stepper
 from archfem.dynamics.time_history import Record, time_history
 from archfem.errors import DidNotConverge
 from archfem.limit.collapse import Collapse
@@ -246,7 +247,7 @@ def shaken(
     dead: Equilibrium,
     damping: Viscous | None = None,
     *,
-    method: str = "auto",
+    method: str | Stepper = "auto",
 ) -> History:
     """Return the time history of a case under a motion; the history carries the case.
 

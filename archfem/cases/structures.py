@@ -1,9 +1,13 @@
 """Structures as tables describe them: shapes and their lengths, materials and contacts by name."""
 
+import json
+from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from archfem.cases.inputs import content_digest, input_files
 from archfem.cases.settings import NumberOr, Table, checked, chosen
 from archfem.errors import InvalidInput
 from archfem.masonry.fill import jointed_fill
@@ -130,6 +134,40 @@ CONTACT = {
     "tension": "Pa",
 }
 """A friction of "none" is that of a joint that never slides."""
+
+
+KEPT = 8
+"""Structures that are kept, of those made last."""
+
+_kept: OrderedDict[str, Structure] = OrderedDict()
+
+
+def structure_of(settings: Table, folder: Path = Path()) -> Structure:
+    """Return the structure that a case describes, under the title of the case where it has one.
+
+    One that was described lately, to the letter and by the same drawing, is given again, for it
+    cannot be changed.
+
+    Args:
+        settings: tables "structure", "materials" and "contacts", and the title.
+        folder: where the names of drawings start.
+
+    Raises:
+        InvalidInput: as by `planned`.
+        InvalidStructure: likewise.
+    """
+    sections = ("title", "structure", "materials", "contacts")
+    told = {name: settings[name] for name in sections if name in settings}
+    drawings = input_files({"structure": told.get("structure")}, folder)
+    files = [(str(path), content_digest(path)) for path in drawings]
+    key = json.dumps([told, files], default=repr)
+    if key not in _kept:
+        made = planned(settings, folder)
+        _kept[key] = replace(made, name=str(settings.get("title", made.name)))
+        while len(_kept) > KEPT:
+            _kept.popitem(last=False)
+    _kept.move_to_end(key)
+    return _kept[key]
 
 
 def planned(settings: Table, folder: Path = Path()) -> Structure:

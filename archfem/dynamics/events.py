@@ -4,7 +4,7 @@ An event says what to look for. Each run has a fresh watch of its own made by it
 serves any number of runs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -12,14 +12,21 @@ import numpy as np
 import xarray as xr
 
 from archfem.arrays import Array
-from archfem.dynamics.glance import Glance
+from archfem.dynamics.glance import Glance, Look, Seen
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, chosen
 from archfem.joints.duration import Unbroken
 from archfem.joints.resultants import joint_dataset
-from archfem.limit.counted import KINDS, Mechanism, counted_mechanism, counted_mechanisms
-from archfem.limit.verified import Verifier
+from archfem.limit.counted import (
+    KINDS,
+    Mechanism,
+    counted_mechanism,
+    counted_mechanisms,
+    definitions_met,
+)
+from archfem.limit.verified import freedoms_of, verifier_of
 from archfem.masonry.naming import listed_joints
+from archfem.masonry.roles import judged_parts
 from archfem.masonry.structure import Structure
 
 Watch = Callable[[Array, float], str | None]
@@ -90,23 +97,23 @@ class CountedMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
+        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
 
         def found(joints: xr.Dataset) -> Mechanism | None:
             return counted_mechanism(joints, kinds=self.kinds)
 
         judged = np.flatnonzero(structure.judged).tolist()
-        glance = Glance(structure, criteria, judged, lambda joints: _named(found(joints)))
+        glance = Glance(structure, criteria, judged, lambda seen: _named(found(seen.labelled())))
 
-        def look(resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(glance(resultants, criteria.failures)), step):
+        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(now), step):
                 return None
             joints = glance.labelled(resultants)
             counted, motion = found(joints), verifier.verified(joints)
             assert counted is not None
             return f"a mechanism of {counted.part} by {listed_joints(counted.names)}; {motion}"
 
-        return look
+        return Look(glance, criteria.failures, told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,21 +152,21 @@ class MovingMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier, unbroken = Verifier(structure), Unbroken(criteria.duration)
+        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
 
-        def moves(joints: xr.Dataset) -> frozenset[str]:
-            found = verifier.moving(joints)
+        def moves(seen: Seen) -> frozenset[str]:
+            found = verifier.moving(seen.labelled())
             return _named(found if found is not None and found.kind in self.kinds else None)
 
         glance = Glance(structure, criteria, verifier.skeleton.joints, moves)
 
-        def look(resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(glance(resultants, 1)), step):
+        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.lasts(bool(now), step):
                 return None
             found = verifier.verified(glance.labelled(resultants))
             return f"a mechanism that moves, by {listed_joints(found.moved.names)}; {found}"
 
-        return look
+        return Look(glance, 1, told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,25 +202,33 @@ class EveryMechanism:
             structure: that moves.
             criteria: of the run.
         """
-        verifier = Verifier(structure)
-        concerned = {*np.flatnonzero(structure.judged).tolist(), *verifier.skeleton.joints}
+        verifier = verifier_of(structure)
+        concerned = sorted({*np.flatnonzero(structure.judged), *verifier.skeleton.joints})
+        roles = {joint.part: joint.role for joint in structure.joints}
+        parts = np.array([structure.joints[number].part for number in concerned])
+        own = np.searchsorted(concerned, verifier.skeleton.joints)
         wanted = {"verified", *possible_counts(structure, criteria)}
         times = {name: Unbroken(criteria.duration) for name in wanted}
         met: set[str] = set()
 
-        def holding(joints: xr.Dataset) -> frozenset[str]:
-            counted = {name for name, found in counted_mechanisms(joints).items() if found}
-            moves = "verified" not in met and verifier.moving(joints) is not None
-            return frozenset(counted | ({"verified"} if moves else set()))
+        def moves(seen: Seen) -> bool:
+            free = freedoms_of(seen.side[own], seen.slides[own], seen.apart[own], seen.sense[own])
+            if not verifier.screen.permit(free):
+                return False
+            return verifier.verified(seen.labelled()).kind != "none"
 
-        glance = Glance(structure, criteria, sorted(concerned), holding)
+        def holding(seen: Seen) -> frozenset[str]:
+            count = {part: int(seen.failed[parts == part].sum()) for part in judged_parts(roles)}
+            counted = definitions_met(count, roles, criteria.failures)
+            return counted | ({"verified"} if "verified" not in met and moves(seen) else set())
 
-        def look(resultants: Array, step: float) -> str | None:
-            now = glance(resultants, 1)
+        glance = Glance(structure, criteria, concerned, holding)
+
+        def told(now: frozenset[str], _: Array, step: float) -> str | None:
             met.update(name for name, time in times.items() if time.lasts(name in now, step))
             return "a mechanism by each definition" if met >= wanted else None
 
-        return look
+        return Look(glance, 1, told)
 
 
 def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
@@ -257,6 +272,22 @@ def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
     if isinstance(until, Event):
         return until.watch(structure, criteria)
     return lambda resultants, step: until(structure, resultants)
+
+
+def first_told(watch: Watch, resultants: Array, steps: Sequence[float]) -> tuple[int, str] | None:
+    """Return the first step at which a watch ends the run, and its words; None where it does not.
+
+    Args:
+        watch: over the run.
+        resultants: N, V, M of steps one after another (steps, n_joints, 3) [N, N, N m].
+        steps: their lengths (steps,) [s].
+    """
+    if isinstance(watch, Look):
+        return watch.first(resultants, steps)
+    for number, step in enumerate(steps):
+        if words := watch(resultants[number], step):
+            return number, words
+    return None
 
 
 def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """What a run leaves behind: records of its steps, the effort they took, and its energy balance."""
 
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -194,15 +195,15 @@ class Recorder:
         dataset = joint_dataset(
             structure, resultants, times, self.criteria, faces=faces, moved=moved
         )
-        dataset = dataset.assign(self._reach.variables()).assign_coords(
-            block=[block.name for block in structure.blocks]
-        )
         about = {"units": "m/s2", "long_name": "acceleration of the ground"}
-        dataset["ground"] = ("time", "axis"), motion.at(times), about
-        dataset.coords["axis"] = ["x", "y"]
+        variables: dict[str, Any] = self._reach.variables()
+        variables["ground"] = ("time", "axis"), motion.at(times), about
         for (name, words), values in zip(_EFFORT.items(), self._effort(), strict=True):
-            dataset[name] = "time", values, words
-        self._add_coordinates(dataset)
+            variables[name] = "time", values, words
+        dataset = dataset.assign_coords(
+            block=[block.name for block in structure.blocks], axis=["x", "y"]
+        ).assign(variables)
+        dataset = self._with_coordinates(dataset)
         dataset.attrs |= {
             "title": f"{structure.name}: {motion.name or 'time history'}",
             "motion": motion.name,
@@ -237,18 +238,22 @@ class Recorder:
             self._drift.values[ends],
         )
 
-    def _add_coordinates(self, dataset: xr.Dataset) -> None:
-        """Add the coordinates that were kept, and the state in which the run ended."""
+    def _with_coordinates(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Return the dataset with the coordinates that were kept, and the state at the end."""
         if frames := self._fields.count:
             dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
             dataset["q"] = ("frame", "coordinate"), self._fields.values
             dataset.update(corner_displacements(self.model, self._fields.values))
-        for name in ("q", "velocity", "acceleration"):
-            dataset[f"last_{name}"] = "coordinate", getattr(self.state, name)
+        last: dict[str, Any] = {
+            f"last_{name}": ("coordinate", getattr(self.state, name))
+            for name in ("q", "velocity", "acceleration")
+        }
         if self.state.memory is not None:
-            dataset["last_memory"] = "point", self.state.memory
+            last["last_memory"] = "point", self.state.memory
+        return dataset.assign(last)
 
 
+@cache
 def versions() -> str:
     """Versions of the libraries that results depend on."""
     found = []

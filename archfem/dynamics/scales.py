@@ -187,7 +187,7 @@ def mechanism_scales(  # noqa: PLR0913  (what `time_history` takes, and the sear
     criteria: Criteria | None = None,
     precision: float = 0.05,
     between: tuple[float, float] = (0.05, 5.0),
-    method: str | Stepper = "auto",
+    method: str | Callable[[Motion], Stepper] = "auto",
 ) -> MechanismScales:
     """Find the least factor on a motion at which each definition of a mechanism is first met.
 
@@ -205,7 +205,7 @@ def mechanism_scales(  # noqa: PLR0913  (what `time_history` takes, and the sear
         criteria: as for `time_history`.
         precision: relative width of the last brackets [-].
         between: least and largest scale tried [-]; no ground motion may exceed 5 g.
-        method: as for `time_history`.
+        method: as for `time_history`, or what makes a stepper for each scaled motion.
 
     Returns:
         Brackets, mechanisms and runs; at most 40 runs are made.
@@ -226,16 +226,17 @@ def mechanism_scales(  # noqa: PLR0913  (what `time_history` takes, and the sear
     least, largest = between
 
     def shaken(scale: float) -> ScaledRun:
+        scaled = motion.scaled(scale)
         try:
             run = time_history(
                 model,
-                motion.scaled(scale),
+                scaled,
                 start=start,
                 damping=damping,
                 dt=dt,
                 until=EveryMechanism(),
                 criteria=criteria,
-                method=method,
+                method=method if isinstance(method, str) else method(scaled),
             )
         except DidNotConverge as error:
             run = history_of(error)

@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from archfem.arguments import instance, real, whole
 from archfem.dynamics.collapse import Parting, fallen, left_standing, tilting
-from archfem.dynamics.events import Until, Watch, agreed, begun
+from archfem.dynamics.events import Until, Watch, agreed, begun, first_told
 from archfem.dynamics.guard import Guard
 from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.recorder import Recorder
@@ -289,10 +289,9 @@ def _reason(
     loose = parting.step(batch) if parting is not None else None
     last = len(batch.times) if loose is None else loose[0] + 1
     if watch is not None:
-        steps = np.diff(batch.times[:last], prepend=before)
-        for k, step in enumerate(steps):
-            if reason := watch(batch.resultants[k], float(step)):
-                return Ending.EVENT, reason, k + 1
+        steps = np.diff(batch.times[:last], prepend=before).tolist()
+        if met := first_told(watch, batch.resultants[:last], steps):
+            return Ending.EVENT, met[1], met[0] + 1
     if loose is not None:
         return Ending.PARTED, f"the blocks coming loose: {loose[1]}", last
     return Ending.FINISHED, None, last

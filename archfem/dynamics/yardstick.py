@@ -20,8 +20,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from archfem.arrays import Array
-from archfem.dynamics.probe import largest_difference, peaks
+from archfem.dynamics.history import History
+from archfem.dynamics.probe import largest_difference, peaks_of
 from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
@@ -64,6 +66,14 @@ class Steps:
 
 
 @dataclass(frozen=True, eq=False)
+class _Told:
+    """What a run tells: the largest |e| of each judged joint (n,), and turn of any [rad]."""
+
+    peaks: Array
+    turn: float
+
+
+@dataclass(frozen=True, eq=False)
 class Yardstick:
     """The finest model under the strongest part of a motion, with which others are compared.
 
@@ -78,7 +88,7 @@ class Yardstick:
     window: Motion
     damping: Viscous | None
     told: Callable[[], object] = lambda: None
-    _known: dict[tuple[Model, Steps, float], Array] = field(default_factory=dict)
+    _known: dict[tuple[Model, Steps, float], _Told] = field(default_factory=dict)
     _dead: dict[Model, Equilibrium] = field(default_factory=dict)
 
     def by(self, finer: Model) -> "Yardstick":
@@ -133,24 +143,45 @@ class Yardstick:
         except DidNotConverge:
             return np.inf
 
+    def turn(self, steps: Steps) -> float:
+        """Return how far a joint of the finest model turns at most [rad].
+
+        Args:
+            steps: of the run.
+
+        Raises:
+            DidNotConverge: the finest model failed.
+        """
+        return self._run(self.model, steps).turn
+
     def _stray(self, model: Model, steps: Steps, near: float) -> float:
         """How far |e| is from its mean over motions so much weaker and stronger."""
         weaker, stronger = (self._peaks(model, steps, 1.0 + part) for part in (-near, near))
         return largest_difference(self._peaks(model, steps), 0.5 * (weaker + stronger))
 
     def _peaks(self, model: Model, steps: Steps, share: float = 1.0) -> Array:
-        """Largest |e| of the joints of a model under so much of the motion, found once."""
+        """Largest |e| of the joints of a model under so much of the motion."""
+        return self._run(model, steps, share).peaks
+
+    def _run(self, model: Model, steps: Steps, share: float = 1.0) -> _Told:
+        """What a model tells under so much of the motion, run once."""
         asked = model, steps, share
         if asked not in self._known:
             if model not in self._dead:
                 self._dead[model] = dead_load(model)
-            self._known[asked] = peaks(
+            run = time_history(
                 model,
                 self.window if share == 1.0 else self.window.scaled(share),
-                self.damping,
-                steps.dt,
+                damping=self.damping,
+                dt=steps.dt,
                 tolerance=steps.pace,
                 start=self._dead[model],
             )
+            self._known[asked] = _Told(peaks_of(run), _turned(run))
             self.told()
         return self._known[asked]
+
+
+def _turned(run: History) -> float:
+    """How far a joint turns at most [rad]."""
+    return float(np.abs(run.joints["rotation"]).max())

@@ -254,7 +254,13 @@ def failed(joints: xr.Dataset) -> xr.DataArray:
     Args:
         joints: with the flags of `flagged`, of one instant or of many.
     """
-    return ((joints["hinge"] != 0) | joints["slide"] | joints["open"]).rename("failed")
+    hinge = joints["hinge"]
+    slide, apart = (
+        joints.variables[name].transpose(*hinge.dims).values for name in ("slide", "open")
+    )
+    return xr.DataArray(
+        (hinge.values != 0) | slide | apart, hinge.coords, hinge.dims, name="failed"
+    )
 
 
 def first_time(flags: xr.DataArray) -> xr.DataArray:

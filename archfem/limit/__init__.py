@@ -5,6 +5,9 @@
     weight     self-weight, to which all else is added
     collapse   the load that makes a mechanism; whether a structure stands
     sliding    sliding without dilatancy
+    turns      turns of its search
+    closed     cohesion on what is closed of joints
+    told       what it warns of
     displaced  rigid blocks that have moved far
     movement   the largest movement of a support that is survived
     fill       strength of a fill, earth pressure, how it spreads loads

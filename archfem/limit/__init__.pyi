@@ -1,3 +1,4 @@
+from .closed import closed_cohesion as closed_cohesion
 from .collapse import Collapse as Collapse
 from .collapse import Outcome as Outcome
 from .collapse import collapse_factor as collapse_factor

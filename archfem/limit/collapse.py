@@ -14,6 +14,7 @@ from archfem.limit.fill import Fill
 from archfem.limit.filled import Stones
 from archfem.limit.programme import Optimum, Programme
 from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
+from archfem.limit.told import tell_of_cohesion, tell_of_dilatancy, tell_of_sliding
 from archfem.limit.weight import balanced, self_weight
 from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.masonry.structure import Structure
@@ -131,7 +132,8 @@ def collapse_factor(
         min c A·|G_s v| - f_dead·v   subject to   G_o v >= μ |G_s v|.
 
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
-    not only on its closed part: the factor is an upper estimate where a joint with cohesion opens.
+    not only on its closed part: the factor is an upper estimate where a joint with cohesion opens,
+    a warning says so, and `closed_cohesion` leaves it to what a given state has closed.
     Joints with tensile strength are refused, since bonds break and do not yield. The dilatancy of
     contacts plays no part: sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and
     a warning says so where the latter leaves it out.
@@ -205,7 +207,7 @@ def _found(
     found = associated = asked.solve()
     known = None
     if friction == "nonassociated":
-        _tell_of_dilatancy(structure)
+        tell_of_dilatancy(structure)
         found, known = without_dilatancy(asked, associated, scale)
     if found is None:
         rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
@@ -216,26 +218,12 @@ def _found(
     result = replace(result, solutions=known)
     if not isinstance(live, Settlement):
         stones.warn_of_sliding_fill(loads(live), result.factor)
-    if friction == "coulomb" and result.sliding:
-        logger.warning(
-            "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
-            "upper estimate; friction='nonassociated' does without it",
-            list(result.sliding),
-            ", ".join(result.sliding_names),
-            result.factor,
-        )
+        failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
+        if friction is not None:
+            tell_of_cohesion(structure, tuple(failing), result.joints, result.factor)
+    if friction == "coulomb":
+        tell_of_sliding(result.sliding, result.sliding_names, result.factor)
     return result
-
-
-def _tell_of_dilatancy(structure: Structure) -> None:
-    """Warn of saw teeth that sliding without dilatancy leaves out."""
-    steepest = max(joint.contact.dilatancy for joint in structure.joints)
-    if steepest > 0.0:
-        logger.warning(
-            "joints dilate by up to %.3g, which friction='nonassociated' leaves out: the factor is "
-            "that of joints which slide flat, 'coulomb' gives that of joints which dilate by μ",
-            steepest,
-        )
 
 
 def stands(

@@ -147,7 +147,7 @@ def _over_time(joints: xr.Dataset) -> xr.DataArray:
         flags = flags.assign_coords(time=np.nan)
     if "time" not in flags.dims:
         flags = flags.expand_dims("time")
-    return flags.transpose("time", "joint")
+    return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
 
 
 def _counts(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArray[np.int64]]:
@@ -195,8 +195,31 @@ def counted_mechanisms(
     }
 
 
+def definitions_met(
+    count: Mapping[str, int], roles: Mapping[str, str], failures: int
+) -> frozenset[str]:
+    """Return the definitions of `counted_mechanisms` that failed joints meet at an instant.
+
+    Args:
+        count: failed joints of each judged part, by its name.
+        roles: of the parts.
+        failures: how many make a mechanism.
+    """
+    rings = {name: number for name, number in count.items() if roles[name] == "ring"}
+    looked = {
+        "any four joints": (count, KINDS),
+        "four in a ring": (rings, ("local",)),
+        "ring and pier": (count, ("semi-global",)),
+    }
+    return frozenset(
+        name
+        for name, (own, kinds) in looked.items()
+        if _widest_group(own, roles, failures, kinds) is not None
+    )
+
+
 def _widest_group(
-    count: dict[str, int], roles: Mapping[str, str], failures: int, kinds: Sequence[str]
+    count: Mapping[str, int], roles: Mapping[str, str], failures: int, kinds: Sequence[str]
 ) -> tuple[str, ...] | None:
     """Parts whose failures together are enough, of the widest class asked for, or None."""
 

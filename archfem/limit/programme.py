@@ -14,6 +14,9 @@ from archfem.limit.blocks import RigidBlocks
 FEASIBLE = 1e-9
 """Residual of balance and limits that the linear programme accepts, in mean block weights."""
 
+TRIALS = ((False, FEASIBLE), (True, FEASIBLE), (True, 10.0 * FEASIBLE))
+"""Whether the solver simplifies first, and what it accepts: the next where round-off stopped it."""
+
 EXCESS = 1e-7
 """Largest violation of the crushing limit accepted, as a fraction of the crushing force σ w h."""
 
@@ -222,7 +225,7 @@ class Programme:
         bounds = np.tile([0.0, np.inf], (size + extra, 1))
         bounds[2 * joints : size, 0] = -np.inf
         bounds[size:, 1] = self.most
-        for presolve in (False, True):  # the second where round-off stopped the first
+        for presolve, fits in TRIALS:
             found = linprog(
                 cost,
                 A_ub=sparse.hstack([limits.rows, beside], format="csr"),
@@ -232,8 +235,8 @@ class Programme:
                 bounds=bounds,
                 method="highs-ds",
                 options={
-                    "primal_feasibility_tolerance": FEASIBLE,
-                    "dual_feasibility_tolerance": FEASIBLE,
+                    "primal_feasibility_tolerance": fits,
+                    "dual_feasibility_tolerance": fits,
                     "presolve": presolve,
                 },
             )

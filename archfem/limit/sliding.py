@@ -9,7 +9,7 @@ the mechanism that is dual to φ, and t(y) its slips, the gap
 
 is zero for such a pair, and is linear in the forces x for a given mechanism and in the mechanism
 for given forces: a bilinear programme over two separate polyhedra, searched from many starts by
-solving for one and the other in turn.
+solving for one and the other in turn, and from the weakest solution downwards.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,19 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
-from archfem.limit.programme import Limits, Optimum, Programme, friction_limits
+from archfem.limit.programme import Optimum, Programme
+from archfem.limit.turns import (
+    CLOSED,
+    ROOM,
+    WEAKER,
+    Turn,
+    fixed,
+    gaps,
+    resistance,
+    solution,
+    thrust,
+    weaker,
+)
 
 STARTS = 40
 """States from which the search starts, besides the associated one; fewer for many joints."""
@@ -27,17 +39,8 @@ STARTS = 40
 JOINTS = 150
 """Joints up to which every start is tried, and normal forces are bounded one by one."""
 
-ROUNDS = 30
-"""Turns of forces and mechanism from one start; most end within three."""
-
-PREFERRED = 1e-4
-"""Share of the objective by which, among states of one gap, the weakest is taken."""
-
-ROOM = 1e-8
-"""Resistance added to c A + μ N, lest round-off make the programme infeasible [block weights]."""
-
-CLOSED = 1e-7
-"""Gap, relative to the objective, that counts as none: programmes are solved to 1e-9."""
+PATIENCE = 30
+"""Turns after which no solution weaker than the weakest is looked for any longer."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class WithoutDilatancy:
         if not np.isfinite(least):
             return "without dilatancy it does not either: no factor is too large"
         low, high = self.between
-        found = f"found from {low:.4g} to {high:.4g}" if led else "were not found"
+        found = f"found from {low:.4g} to {high:.4g}" if np.isfinite(low) else "were not found"
         return (
             f"solutions without dilatancy {found} ({led} of {tried} starts); all lie from "
             f"{least:.4g} to {most:.4g}"
@@ -100,20 +103,30 @@ def without_dilatancy(
         209-224. The gap is a disjoint bilinear programme: Konno, Math. Program. 11 (1976) 14-27.
     """
     starts = _starts(programme, start)
-    tried = [_solution(programme, forces) for forces in starts]
-    found = [state for state in tried if state is not None]
-    thrusts = np.array([_thrust(forces) for forces in starts])
+    tried = [solution(programme, forces) for forces in starts]
+    found = [turn for turn in tried if turn is not None]
+    thrusts = np.array([thrust(forces) for forces in starts])
     seen = thrusts.reshape(-1, len(programme.blocks.structure.depths)).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
-    limits = scale * associated, scale * max(associated, _bound(programme, seen))
-    values = [scale * state.value for state, _ in found] or [np.nan]
+    bound = max(associated, _bound(programme, seen))
+    limits = scale * associated, scale * bound
+    led = len(found)
+    first = max(found, key=_value, default=None)
+    least = -np.inf if first is None else first.state.value + WEAKER * abs(first.state.value)
+    if starts and bound > least:
+        found += weaker(programme, first, starts[0], PATIENCE)
+    values = [scale * turn.state.value for turn in found] or [np.nan]
     known = WithoutDilatancy(
-        (min(limits), max(limits)), (min(values), max(values)), (len(starts), len(found))
+        (min(limits), max(limits)), (min(values), max(values)), (len(starts), led)
     )
     if not found:
         return None, known
-    weakest, gap = max(found, key=lambda each: each[0].value)
-    return weakest, _checked(programme, weakest, gap, known)
+    weakest = max(found, key=_value)
+    return weakest.state, _checked(programme, weakest, known)
+
+
+def _value(turn: Turn) -> float:
+    return turn.state.value
 
 
 def weakest_from(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
@@ -124,8 +137,8 @@ def weakest_from(programme: Programme, starts: Sequence[Array]) -> Optimum | Non
         starts: forces at the joints (3 n_joints,) each [mean block weights], as solutions under
             loads near by have them.
     """
-    found = [state for forces in starts if (state := _solution(programme, forces))]
-    return max((state for state, _ in found), key=lambda state: state.value, default=None)
+    found = [turn for forces in starts if (turn := solution(programme, forces))]
+    return max((turn.state for turn in found), key=lambda state: state.value, default=None)
 
 
 def some_starts(programme: Programme, start: Optimum | None, number: int, seed: int) -> list[Array]:
@@ -186,42 +199,6 @@ def _vertex(
     return given.solve()
 
 
-def _solution(programme: Programme, forces: Array) -> tuple[Optimum, float] | None:
-    """State and gap of a solution without dilatancy near given forces, or None."""
-    least = np.inf
-    for _ in range(ROUNDS):
-        held = _resistance(programme, _thrust(forces)) + ROOM
-        try:
-            mechanism = replace(programme, limits=_fixed(programme, held)).solve()
-            if mechanism is None:
-                return None
-            slips = _slips(programme, mechanism.coordinates)
-            state = _weakest(programme, slips)
-        except DidNotConverge:  # round-off left no state
-            return None
-        if state is None:
-            return None
-        forces = state.forces
-        value = programme.objective(state)
-        lost = float((_resistance(programme, _thrust(forces)) - held) @ slips)
-        gap = value + lost - mechanism.value
-        if gap <= CLOSED * max(abs(value), abs(mechanism.value)) + ROOM * float(slips.sum()):
-            return Optimum(value, forces, mechanism.coordinates, state.unknowns), gap
-        if gap > (1.0 - CLOSED) * least:
-            return None
-        least = gap
-    return None
-
-
-def _weakest(programme: Programme, slips: Array) -> Optimum | None:
-    """Forces of least gap to a mechanism of given slips, and of these the weakest."""
-    friction = _friction(programme) * slips
-    cost = np.concatenate([friction, friction, np.zeros(len(friction))])
-    if programme.cost is not None:
-        cost += (1.0 - PREFERRED) * programme.cost
-    return replace(programme, cost=cost, prices=(1.0 - PREFERRED) * programme.prices).solve()
-
-
 def _bound(programme: Programme, seen: Array) -> float:
     """Bound the objective of every solution without dilatancy from above.
 
@@ -241,7 +218,7 @@ def _bound(programme: Programme, seen: Array) -> float:
         least[joint] = max(found - ROOM, 0.0)
     negated = None if programme.cost is None else -programme.cost
     highest = -_least(replace(programme, cost=negated, prices=-programme.prices))
-    limits = _fixed(programme, _resistance(programme, least))
+    limits = fixed(programme, resistance(programme, least))
     try:
         safe = replace(programme, limits=limits).solve()
     except DidNotConverge:  # no equilibrium with so little friction
@@ -258,66 +235,29 @@ def _least(programme: Programme) -> float:
     return -np.inf if found is None else found.value
 
 
-def _checked(
-    programme: Programme, state: Optimum, gap: float, known: WithoutDilatancy
-) -> WithoutDilatancy:
+def _checked(programme: Programme, found: Turn, known: WithoutDilatancy) -> WithoutDilatancy:
     """Add how well a state fulfils what a solution must."""
-    thrust, shear = _thrust(state.forces), np.abs(state.forces.reshape(3, -1)[2])
+    state = found.state
+    normal, shear = thrust(state.forces), np.abs(state.forces.reshape(3, -1)[2])
     left = programme.blocks.balance @ state.forces - programme.load
     if programme.columns is not None:
         left = left + programme.columns @ state.unknowns
-    gaps = _gaps(programme, state.coordinates)
-    carries = state.forces[: 2 * len(thrust)] > CLOSED * max(float(thrust.max()), 1.0)
+    opened = gaps(programme, state.coordinates)
+    carries = state.forces[: 2 * len(normal)] > CLOSED * max(float(normal.max()), 1.0)
     slides = np.isfinite(programme.blocks.structure.friction)
-    excess = np.max((shear - _resistance(programme, thrust))[slides], initial=0.0)
-    opening = np.max(gaps[: len(carries)][carries], initial=0.0)
+    excess = np.max((shear - resistance(programme, normal))[slides], initial=0.0)
+    opening = np.max(opened[: len(carries)][carries], initial=0.0)
     if programme.crushing is not None:
         opening = np.nan
     return replace(
         known,
         unbalanced=float(np.abs(left).max()),
-        excess=float(excess) / _largest(thrust),
-        opening=float(opening) / _largest(gaps),
-        gap=max(gap, 0.0) / _largest(np.array([state.value, ROOM])),
+        excess=float(excess) / _largest(normal),
+        opening=float(opening) / _largest(opened),
+        gap=max(found.gap, 0.0) / _largest(np.array([state.value, ROOM])),
     )
 
 
 def _largest(values: Array) -> float:
     """Largest magnitude, to divide by."""
     return float(np.abs(values).max(initial=np.finfo(float).tiny))
-
-
-def _friction(programme: Programme) -> Array:
-    """Coulomb's μ, zero where a joint never slides and nothing is dissipated (n_joints,)."""
-    friction = programme.blocks.structure.friction
-    return np.where(np.isfinite(friction), friction, 0.0)
-
-
-def _resistance(programme: Programme, thrust: Array) -> Array:
-    """Shear c A + μ N at which joints slide under given N (n_joints,) [block weights]."""
-    resistance: Array = programme.blocks.cohesion + _friction(programme) * thrust
-    return resistance
-
-
-def _fixed(programme: Programme, resistance: Array) -> Limits:
-    """Limits |V| <= R that do not depend on N, none where a joint never slides."""
-    slides = np.isfinite(programme.blocks.structure.friction)
-    return friction_limits(np.where(slides, 0.0, np.inf), resistance)
-
-
-def _gaps(programme: Programme, coordinates: Array) -> Array:
-    """Openings of both ends and slips of a mechanism, with those of a moving support."""
-    gaps: Array = -(programme.blocks.balance.T @ coordinates)
-    return gaps if programme.cost is None else gaps + programme.cost
-
-
-def _slips(programme: Programme, coordinates: Array) -> Array:
-    """Sizes of the slips of a mechanism (n_joints,)."""
-    slips: Array = np.abs(_gaps(programme, coordinates).reshape(3, -1)[2])
-    return slips
-
-
-def _thrust(forces: Array) -> Array:
-    """Normal force of each joint (n_joints,) [block weights]."""
-    thrust: Array = forces.reshape(3, -1)[:2].sum(axis=0)
-    return thrust

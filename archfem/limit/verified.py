@@ -1,10 +1,12 @@
 """Mechanisms that are verified: is there a motion that the failed joints, and only they, permit?"""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -104,7 +106,7 @@ def verified_mechanism(
     """
     instance(structure, Structure, "structure", "give that whose joints these are")
     instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
-    return Verifier(structure).verified(flagged(joints, chosen(criteria, hinge=limit)))
+    return verifier_of(structure).verified(flagged(joints, chosen(criteria, hinge=limit)))
 
 
 def first_verified_mechanism(
@@ -123,20 +125,26 @@ def first_verified_mechanism(
     Returns:
         The motion and its class at that instant; None where no ring and no pier ever moves.
     """
-    verifier, joints = Verifier(structure), flagged(joints, criteria)
+    verifier, joints = verifier_of(structure), flagged(joints, criteria)
     moving: dict[bytes, bool] = {}
-    free = verifier.freedoms(joints.transpose("time", "joint"))
+    met: dict[int, VerifiedMechanism] = {}
+    free = verifier.freedoms(joints)
 
-    def look(instant: int) -> VerifiedMechanism | None:
+    def at(instant: int) -> VerifiedMechanism:
+        if instant not in met:
+            met[instant] = verifier.verified(joints.isel(time=instant))
+        return met[instant]
+
+    def look(instant: int) -> int | None:
         state = free[instant].tobytes()
-        if moving.get(state) is False:
-            return None
-        found = verifier.moving(joints.isel(time=instant))
-        moving[state] = found is not None
-        return found
+        if state not in moving:
+            permitted = verifier.screen.permit(free[instant])
+            moving[state] = permitted and at(instant).kind != "none"
+        return instant if moving[state] else None
 
     instants = np.flatnonzero(free.any(axis=1))
-    return first_lasting(instants, joints["time"].values, Criteria.of(joints).duration, look)
+    found = first_lasting(instants, joints["time"].values, Criteria.of(joints).duration, look)
+    return None if found is None else at(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,12 +233,38 @@ class Verifier:
             may open, the sense in which a joint may slip, 1 or -1; 0 where it may not, and 2 where
             either sense will do.
         """
-        joints = joints.isel(joint=list(self.skeleton.joints))
-        side, apart = joints["hinge"].values, joints["open"].values
-        sense, slides = np.sign(joints["V"].values), joints["slide"].values
-        either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
-        slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
-        return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
+        own = list(self.skeleton.joints)
+        side, slides, apart, shear = (
+            joints.variables[name].transpose(..., "joint").values[..., own]
+            for name in ("hinge", "slide", "open", "V")
+        )
+        return freedoms_of(side, slides, apart, np.sign(shear))
+
+
+def freedoms_of(
+    side: NDArray[Any], slides: NDArray[np.bool_], apart: NDArray[np.bool_], sense: NDArray[Any]
+) -> Array:
+    """Return what joints may do, as `Verifier.freedoms` does (…, 3 n_joints).
+
+    Args:
+        side: face on which each hinges, 1 extrados, -1 intrados, 0 none (…, n_joints).
+        slides: whether its friction is used up (…, n_joints).
+        apart: whether it has come apart (…, n_joints).
+        sense: sign of its shear force (…, n_joints).
+    """
+    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+    slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
+    return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
+
+
+@lru_cache(maxsize=8)
+def verifier_of(structure: Structure) -> Verifier:
+    """Return the verifier of a structure, the same for structures that are equal.
+
+    Args:
+        structure: whose blocks move.
+    """
+    return Verifier(structure)
 
 
 def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:

@@ -55,12 +55,13 @@ def _small(structure: Structure, asked: Discretisation) -> Model:
         _check_plain(structure)
     if asked.fidelity == "rigid":
         return rigid(structure, asked.through, asked.rule)
-    from archfem.models.fem.mesh import mesh, read_mesh  # FEniCSx is needed from here on only
+    from archfem.models.fem.mesh import read_mesh  # FEniCSx is needed from here on only
+    from archfem.models.fem.meshes import mesh_of
     from archfem.models.fem.space import broken_space
     from archfem.models.full import full
     from archfem.models.monolithic import Monolithic
 
-    made = mesh(structure, asked) if asked.file is None else read_mesh(structure, asked.file)
+    made = mesh_of(structure, asked) if asked.file is None else read_mesh(structure, asked.file)
     space = broken_space(made, asked.degree)
     if asked.fidelity == "monolithic":
         return Monolithic(space, asked.rule)

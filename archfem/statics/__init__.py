@@ -13,6 +13,7 @@
     path         paths of equilibrium under a load that grows
     support_path the same under the dead load, over a support that moves
     pushover     a load grows until hardly anything resists
+    following    how it goes from step to step
     ends         where that ends, and what is tried before it does
     eigen        the lowest vibrations of sparse matrices, by SLEPc
     dense_eigen  those of small ones by LAPACK, where SLEPc is not installed

@@ -13,9 +13,14 @@ from archfem.statics.support_path import SupportPath
 
 Path = LoadPath | SupportPath
 
-CREEP, STOPPED = 0.05, 0.04
+CREEP, KNOWN = 0.05, 0.002
 """Growth of the load, of itself, under which a structure creeps on that is found no other way, and
-the share of that to which it is halved before giving up: the limit is known to 0.002."""
+that to which it is halved before giving up: so well is the limit known."""
+
+TINY = np.finfo(float).tiny
+
+CRAWL, HARDLY = 40, 0.01
+"""Steps in which a path must go on, and the share of all its displacement by which it must."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +70,19 @@ def finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | 
         count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
+    if len(path.states) > CRAWL and _crawls(path):
+        return (
+            f"it crawls: in {CRAWL} steps the {path.moving} moved by no more than {HARDLY:.0%} of "
+            f"{reached:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
+        )
     return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
+
+
+def _crawls(path: Path) -> bool:
+    """Whether neither displacement nor factor goes on, although each step finds its state."""
+    moved, factors = path.displacements[[-CRAWL, -1]], np.array(path.factors)[[-CRAWL, -1]]
+    grown = abs(factors[1] - factors[0]) / max(abs(factors[1]), TINY)
+    return bool(moved[1] - moved[0] <= HARDLY * moved[1] and grown <= KNOWN)
 
 
 def crept(path: Path, stop: Stop, criteria: Criteria) -> str | None:
@@ -79,10 +96,10 @@ def crept(path: Path, stop: Stop, criteria: Criteria) -> str | None:
     Returns:
         The rule in words; None where the structure does not creep to rest any further.
     """
-    if not (isinstance(path, LoadPath) and len(path.states) > 1 and _sliding(path, criteria)):
+    if not (isinstance(path, LoadPath) and len(path.states) > 1 and sliding(path, criteria)):
         return None
     farthest, share = stop.displacement * path.model.structure.size, CREEP
-    while share > CREEP * STOPPED:
+    while share > KNOWN:
         if not path.creep(share * path.factors[-1], farthest):
             share /= 2.0
             continue
@@ -93,8 +110,13 @@ def crept(path: Path, stop: Stop, criteria: Criteria) -> str | None:
     return None
 
 
-def _sliding(path: Path, criteria: Criteria) -> list[str]:
-    """Names of the joints that slide in the last state."""
+def sliding(path: Path, criteria: Criteria) -> list[str]:
+    """Return the names of the joints that slide in the last state.
+
+    Args:
+        path: so far.
+        criteria: what makes a joint slide.
+    """
     joints = joint_dataset(path.model.structure, path.resisted[-1], criteria=criteria)
     return [str(name) for name in joints["name"].values[joints["slide"].values]]
 
@@ -115,7 +137,7 @@ def stuck(path: Path, control: str, criteria: Criteria) -> str:
     """
     if len(path.states) == 1:
         raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
-    slides = _sliding(path, criteria) if isinstance(path, LoadPath) else []
+    slides = sliding(path, criteria) if isinstance(path, LoadPath) else []
     limit = control == "force" or (slides and control != "path")
     what = "the load cannot grow beyond" if limit else "no equilibrium was found past"
     words = f"{what} a factor of {path.factors[-1]:.5g}"

@@ -1,5 +1,7 @@
 """Modal analysis about a state: joints stay as open or closed as they are then."""
 
+import hashlib
+from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -22,6 +24,11 @@ from archfem.threads import on_one_thread
 
 SEEN = 1e-3
 """Share of the mass from which a mode's sense along an axis is clear of rounding."""
+
+KEPT = 6
+"""How many solutions are kept, of those found last."""
+
+_kept: OrderedDict[str, tuple[Array, Array]] = OrderedDict()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,7 +136,25 @@ def modes(model: Model, count: int, about: Equilibrium | None = None) -> Modes:
 def _lowest(
     stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
 ) -> tuple[Array, Array]:
-    """The lowest ω² and their shapes: by SLEPc, or where that is not installed by LAPACK."""
+    """The lowest ω² and their shapes, found once of the same matrices to the last bit."""
+    by_slepc = find_spec("slepc4py") is not None
+    told = hashlib.sha256(str((count, stiffness.shape, by_slepc)).encode())
+    for matrix in (stiffness, mass):
+        for part in (matrix.indptr, matrix.indices, matrix.data):
+            told.update(part.tobytes())
+    key = told.hexdigest()
+    if key not in _kept:
+        _kept[key] = _solved(stiffness, mass, count)
+        while len(_kept) > KEPT:
+            _kept.popitem(last=False)
+    _kept.move_to_end(key)
+    return _kept[key]
+
+
+def _solved(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
+) -> tuple[Array, Array]:
+    """The same by SLEPc, or where that is not installed by LAPACK."""
     if find_spec("slepc4py") is None:
         return dense_eigen.lowest(stiffness, mass, count)
     with needed("SLEPc"):

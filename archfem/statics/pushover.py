@@ -15,8 +15,9 @@ from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
 from archfem.models.model import Model, check_model
 from archfem.models.moving import Moving
 from archfem.shown import Shown
-from archfem.statics.ends import Path, Stop, crept, finished, stuck
+from archfem.statics.ends import Path, Stop
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.following import GROWTH, follow
 from archfem.statics.path import LoadPath
 from archfem.statics.support_path import SupportPath
 from archfem.threads import on_one_thread
@@ -26,13 +27,6 @@ CONTROLS = ("displacement", "arc length", "path", "force")
 FLAT, STEEP = 1e-6, 0.2
 """Growth of the factor in the last step below which the limit has been reached, and the largest
 extrapolation beyond the last factor; both relative to it."""
-
-GROWTH, SMALLEST = 1.1, 1e-3
-"""Growth of steps, and the smallest one, relative to the first, to which they are halved before
-giving up."""
-
-FASTER, EASY = 1.4, 4
-"""Growth of steps across the last one where Newton's method needs few iterations, and how many."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,9 +100,8 @@ def pushover(
     where d = f_live·q / |f_live| is the displacement of the load along itself: a = 0 is control by
     force, b = 0 by displacement, and for arc length (a, b) is the direction of the last step, in
     units of the first, so that it turns from one to the other as the curve bends (Riks). Steps
-    grow by a tenth each, and are halved where Newton's method fails. Where it fails altogether
-    and joints slide, as those of fill in pieces do, the load grows on by itself as long as the
-    structure creeps to rest under it.
+    grow by a tenth each. Where Newton's method fails and joints slide, as those of fill in pieces
+    do, the load grows by itself, and the structure creeps to rest under it; else steps are halved.
 
     Displacements are small and the joint law is the gradient of a convex energy: the curve never
     falls nor snaps back, but rises to the limit of rigid blocks as an asymptote. The thrust at a
@@ -159,43 +152,7 @@ def pushover(
         actions = loads(load)
         path = LoadPath.of(model, actions, begin)
     criteria = criteria or Criteria()
-    return _read(path, criteria, _follow(path, control, stop or Stop(), criteria))
-
-
-def _follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
-    """Add states until a rule ends it, and say which.
-
-    Args:
-        path: that begins with the dead load.
-        control: one of `CONTROLS`.
-        stop: the rules.
-        criteria: what makes a joint hinge.
-
-    Returns:
-        The rule that ended it, in words.
-
-    Raises:
-        DidNotConverge: there is no equilibrium just after the dead load.
-    """
-    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
-    fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
-    while True:
-        if control == "path" and isinstance(path, LoadPath):
-            found = path.onward(distance)
-        else:
-            found = path.advance(fixed.get(control, direction), distance)
-        if not found:
-            distance /= 2.0
-            if distance < SMALLEST:
-                return crept(path, stop, criteria) or stuck(path, control, criteria)
-            continue
-        last = np.array([path.displacements[-2:], path.factors[-2:]])
-        moved = np.diff(last)[:, 0] / np.array(path.unit)
-        direction = moved / np.linalg.norm(moved)
-        if reason := finished(path, stop, criteria, moved):
-            return reason
-        easy = control == "path" and path.iterations[-1] <= EASY
-        distance *= FASTER if easy else GROWTH
+    return _read(path, criteria, follow(path, control, stop or Stop(), criteria))
 
 
 def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
@@ -240,6 +197,12 @@ def hinge_order(
     return hinges, tuple(int(first[j]) for j in order)
 
 
+def _shortness(displacements: Array) -> float:
+    """How much shorter the last step is than one that grows as usual, at least 1 [-]."""
+    last, step = float(displacements[-1]), float(displacements[-1] - displacements[-2])
+    return max(1.0, (1.0 - 1.0 / GROWTH) * last / step) if step > 0.0 else 1.0
+
+
 def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
     """Return the limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
 
@@ -247,7 +210,8 @@ def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
     elastic it is too high, so that the limit lies in between; a flat last step has reached it.
     """
     last, before = float(factors[-1]), float(factors[-2])
-    if abs(last - before) <= FLAT * abs(last):
+    grown = abs(last - before) * _shortness(displacements)
+    if grown <= FLAT * abs(last):
         return last, FLAT * abs(last)
     if len(factors) == 2:  # one step tells no curve
         return float("nan"), float("nan")

@@ -5,6 +5,7 @@
     asking      one function from a case to findings
     finders     what can be found of a case, by name
     memory      models, damping and motions that a process remembers between points
+    steppers    steppers that runs under many motions share
     warm        compiled code, loaded once a process
     worker      one point at a time, on one thread, and a row even where it fails
     processes   points on processes of this machine

@@ -15,12 +15,11 @@ from archfem.dynamics.history import History, history_of
 from archfem.dynamics.verdicts import first_mechanisms
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import judged, roles_of
-from archfem.statics.modes import modes
 from archfem.studies.asking import Asked
 from archfem.studies.files import study_tables
 from archfem.studies.finders import Found, of_scales, run_of
 from archfem.studies.findings import by_part
-from archfem.studies.memory import ground_motion, ground_suite, resting
+from archfem.studies.memory import first_mode, ground_motion, ground_suite, resting
 from archfem.studies.over import Axis
 from archfem.studies.points import PAIR, Point
 
@@ -149,7 +148,7 @@ def beside(case: Case, scales: Mapping[str, Any] | None = None) -> Found:
         KeyboardInterrupt: on Ctrl-C.
     """
     rest, motion = resting(case), ground_motion(case)
-    joints, first = judged(rest.dead.joints), modes(rest.dead.model, 1, about=rest.dead)
+    joints, first = judged(rest.dead.joints), first_mode(rest)
     found: Found = {
         "frequency": float(first.frequencies[0]),
         "mass": float(first.mass_ratios[0, 0]),

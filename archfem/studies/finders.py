@@ -1,6 +1,7 @@
 """What can be found of a case, by name: each a function from a case to a flat table."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,9 @@ from archfem.dynamics.scales import mechanism_scales
 from archfem.dynamics.verdicts import DEFINITIONS, first_mechanisms
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import judged
+from archfem.limit.counted import Mechanism
 from archfem.motion.motion import Motion
-from archfem.statics.modes import modes
-from archfem.studies.memory import ground_motion, method_for, resting
+from archfem.studies.memory import first_mode, ground_motion, resting, stepper_of
 
 Found = dict[str, Any]
 
@@ -34,8 +35,9 @@ def at_rest(case: Case) -> Found:
     Raises:
         DidNotConverge: the structure does not stand.
     """
-    dead = resting(case).dead
-    joints, first = judged(dead.joints), modes(dead.model, 1, about=dead)
+    rest = resting(case)
+    dead = rest.dead
+    joints, first = judged(dead.joints), first_mode(rest)
     return {
         "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
         "friction": float(joints["friction"].max()),
@@ -74,18 +76,19 @@ def run_of(rest: Rest, motion: Motion) -> History:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    method = method_for(rest, motion)
-    run = shaken(rest.case, motion, rest.dead, rest.damping[0], method=method)
+    stepper = stepper_of(rest, motion)
+    run = shaken(rest.case, motion, rest.dead, rest.damping[0], method=stepper)
     if run.ended is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return run
 
 
-def of_history(run: History) -> Found:
+def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None = None) -> Found:
     """Return the findings of a run.
 
     Args:
         run: what happened.
+        mechanisms: its first ones, as by `first_mechanisms`, which finds them if they are not told.
 
     Returns:
         The largest of rings and piers: `eccentricity`, |e| [-], 0.5 where a joint is open;
@@ -95,20 +98,25 @@ def of_history(run: History) -> Found:
         `ended`; what is left, `fall`, where displacements may be large; the largest drift of its
         energy at any step, of what was exchanged, `energy_drift` [-], and how many `doubts` it has.
     """
-    joints = judged(run.joints)
     found: Found = {
-        "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
-        "friction": float(joints["friction"].fillna(np.inf).max()),
+        "eccentricity": _largest(run, "eccentricity", 0.5),
+        "friction": _largest(run, "friction", np.inf),
+        **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
     }
-    found |= {name: float(abs(joints[name]).max()) for name in ("rotation", "opening", "slip")}
     for name in ("largest_displacement", "residual_displacement"):
         found[name] = float(run.dataset[name].max())
-    for definition, met in first_mechanisms(run).items():
+    for definition, met in (mechanisms or first_mechanisms(run)).items():
         found[definition] = np.inf if met is None or met.time is None else met.time
         found[f"{definition}, class"] = "" if met is None else str(met.kind)
     found |= {"ended": str(run.ended), "fall": "" if run.fall is None else run.fall.kind}
     drift = float(run.dataset.attrs["energy_drift"])
     return found | {"energy_drift": drift, "doubts": float(len(run.doubts))}
+
+
+def _largest(run: History, name: str, undefined: float = -np.inf) -> float:
+    """Largest size of something of the joints of rings and piers; what stands for it where NaN."""
+    sizes = np.abs(run.dataset[name].values[..., run.dataset["judged"].values])
+    return float(np.where(np.isnan(sizes), undefined, sizes).max())
 
 
 def scales(
@@ -154,7 +162,7 @@ def of_scales(rest: Rest, motion: Motion, **options: Any) -> Found:
             damping=rest.damping[0],
             dt=rest.case.analysis.get("dt"),
             criteria=rest.case.criteria,
-            method=method_for(rest, motion),
+            method=partial(stepper_of, rest),
             **options,
         )
     if found.interrupted:

@@ -4,9 +4,10 @@ References:
     Vamvatsikos and Cornell, Earthq. Spectra 20 (2004) 523-553.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf, sqrt
+from typing import Any
 
 from archfem.cases.case import Case
 from archfem.cases.run import Rest
@@ -18,10 +19,9 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import flagged, judged
 from archfem.limit.counted import Mechanism
 from archfem.motion.motion import Motion
-from archfem.statics.modes import modes
 from archfem.studies.finders import Found, of_history, run_of
 from archfem.studies.intensity import intensities
-from archfem.studies.memory import ground_motion, resting
+from archfem.studies.memory import first_mode, ground_motion, resting
 
 LIMITS = ("first hinge", "four failures", "verified", COLLAPSE)
 """Limit states: a joint of a ring or pier hinges; four of them fail at once; the failed joints
@@ -60,8 +60,8 @@ def searched(
     made: dict[float, Found] = {}
 
     def shaken(scale: float) -> ScaledRun:
-        run, made[scale] = _run(rest, motion.scaled(scale))
-        return ScaledRun(scale, _met(run), run.ended, run.outcome, run.fall)
+        run, met, made[scale] = _run(rest, motion.scaled(scale))
+        return ScaledRun(scale, met, run.ended, run.outcome, run.fall)
 
     least, largest = between
     reach = (least, max(least, min(largest, largest_scale(motion))))
@@ -71,7 +71,7 @@ def searched(
     for _ in range(FILL):
         if (scale := _gap(sorted(made))) is not None:
             found = found.with_run(shaken(scale))
-    period = 1.0 / float(modes(rest.dead.model, 1, about=rest.dead).frequencies[0])
+    period = 1.0 / float(first_mode(rest).frequencies[0])
     told: Found = {"period": period, **intensities(motion, period)}
     for limit in asked:
         bracket = found[limit]
@@ -87,23 +87,24 @@ def _gap(scales: Sequence[float]) -> float | None:
     return sqrt(low * high) if high > NARROW * low else None
 
 
-def _run(rest: Rest, motion: Motion) -> tuple[History, Found]:
-    """A whole run, and its demands; they are infinite where it broke off."""
+def _run(rest: Rest, motion: Motion) -> tuple[History, dict[str, Mechanism | None], dict[str, Any]]:
+    """A whole run, which limit states it has met, and demands, infinite where it broke off."""
     try:
         run = run_of(rest, motion)
     except DidNotConverge as error:
-        return history_of(error), dict.fromkeys(DEMANDS, inf)
-    found = of_history(run)
+        run = history_of(error)
+        return run, _met(run, first_mechanisms(run)), dict.fromkeys(DEMANDS, inf)
+    mechanisms = first_mechanisms(run)
+    found = of_history(run, mechanisms)
     if run.ended is Ending.PARTED:
         found |= dict.fromkeys(DEMANDS, inf)
-    return run, {name: found[name] for name in DEMANDS}
+    return run, _met(run, mechanisms), {name: found[name] for name in DEMANDS}
 
 
-def _met(run: History) -> dict[str, Mechanism | None]:
+def _met(run: History, mechanisms: Mapping[str, Mechanism | None]) -> dict[str, Mechanism | None]:
     """Which limit states a run has met; words for a first hinge are those of a mechanism."""
     hinges = judged(flagged(run.joints))["hinge"] != 0
     first = Mechanism("local", "", (), None) if bool(hinges.any()) else None
-    mechanisms = first_mechanisms(run)
     return {
         "first hinge": first,
         "four failures": mechanisms["any four joints"],

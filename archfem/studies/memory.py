@@ -1,24 +1,30 @@
-"""What a process remembers between points: models under dead load, damping, motions.
+"""What a process remembers between points: models under dead load, damping, steppers, motions.
 
 Points of a study often differ in little. What a later point shares with an earlier one, by all that
 the case and its files say of it, is taken from here.
 """
 
+import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from archfem.cases.case import Case
 from archfem.cases.inputs import content_digest, input_files
 from archfem.cases.run import Rest, at_rest, damping_of
-from archfem.dynamics.schemes import Conserving, Scheme, Viscous
-from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.schemes import Conserving
 from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.time_history import STEP
 from archfem.errors import InvalidInput
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.modes import Modes, modes
+from archfem.studies.points import MODEL
+from archfem.studies.steppers import Ready
 from archfem.studies.warm import warm
 
 Made = TypeVar("Made")
@@ -26,12 +32,11 @@ Made = TypeVar("Made")
 MODELS, OTHERS = 4, 64
 """How many models are kept, which may be large, and how many of anything else."""
 
-MODEL = ("structure", "materials", "contacts", "model", "dead_load")
 GROUND = ("motion", "suite")
 ANALYSIS = ("analysis", "criteria")
 
-METHODS = ("compliance", "turning", "contact", "tangent", "snes")
-"""Ways to step, of which the first that applies is taken: a choice by timing may differ."""
+FACTORS = ("scale", "reduction", "reversed")
+"""What a case says of a motion, or a suite, that is read and matched without it all the same."""
 
 _kept: dict[str, OrderedDict[str, Any]] = {}
 
@@ -55,6 +60,20 @@ def resting(case: Case) -> Rest:
     return rest
 
 
+def first_mode(rest: Rest) -> Modes:
+    """Return the first mode about a dead load.
+
+    Args:
+        rest: a case under its dead load.
+
+    Raises:
+        DidNotConverge: it was not found.
+    """
+    dead = rest.dead
+    key = _model_key(rest.case)
+    return _remembered("modes", key, lambda: modes(dead.model, 1, about=dead), MODELS)
+
+
 def ground_motion(case: Case) -> Motion:
     """Return the motion of a case, or that of the only pair of its suite, matched if it is to be.
 
@@ -72,11 +91,15 @@ def ground_motion(case: Case) -> Motion:
         )
     if case.suite is not None:
         return ground_suite(case).motions[0]
-    return _remembered("motions", _key(case, GROUND), case.ground_motion)
+    if case.motion is None:
+        return case.ground_motion()  # which says that there is none
+    plain = replace(case, motion=_without(case.motion, ("scale",)))
+    whole = _remembered("motions", _ground_key(case), plain.ground_motion)
+    return whole.scaled(case.motion.get("scale", 1.0))
 
 
 def ground_suite(case: Case) -> Suite:
-    """Return the suite of a case, read and matched before if it was.
+    """Return the suite of a case, read and matched before if it was, at whatever scale.
 
     Args:
         case: what is asked.
@@ -85,33 +108,30 @@ def ground_suite(case: Case) -> Suite:
         InvalidInput: there is none, or a pair cannot be read or matched.
         DidNotConverge: a pair cannot be matched.
     """
-    return _remembered("suites", _key(case, GROUND), case.ground_suite)
+    if (told := case.suite) is None:
+        return case.ground_suite()  # likewise
+    plain = replace(case, suite=_without(told, FACTORS))
+    found = _remembered("suites", _ground_key(case), plain.ground_suite)
+    factors = {name: told.get(name, 1.0) for name in ("scale", "reduction")}
+    scaled = replace(found, **factors)
+    return scaled.reversed() if told.get("reversed", False) else scaled
 
 
-def method_for(rest: Rest, motion: Motion) -> str:
-    """Return the way to step that a run takes whatever else the machine does: not that timed best.
+def stepper_of(rest: Rest, motion: Motion) -> Stepper:
+    """Return a fresh stepper for a run, the way it steps chosen whatever else the machine does.
 
     Args:
         rest: what is shaken.
         motion: of the ground.
     """
-    damping, scheme = rest.damping[0], rest.case.scheme or Conserving()
+    dead, damping, scheme = rest.dead, rest.damping[0], rest.case.scheme or Conserving()
+
+    def ready() -> Ready:
+        equation = Equation(dead.continued(dead.model), motion, damping, scheme)
+        return Ready.of(equation, equation.at_rest(dead.q, memory=dead.model.memory), STEP)
+
     key = f"{_model_key(rest.case)} {damping!r} {scheme!r}"
-    return _remembered("methods", key, lambda: _first_method(rest, motion, damping, scheme))
-
-
-def _first_method(rest: Rest, motion: Motion, damping: Viscous | None, scheme: Scheme) -> str:
-    """The first way to step that applies."""
-    dead = rest.dead
-    equation = Equation(dead.continued(dead.model), motion, damping, scheme)
-    start = equation.at_rest(dead.q, memory=dead.model.memory)
-    for method in METHODS:
-        try:
-            stepper_for(method, equation, start, 0.005)
-        except InvalidInput:
-            continue
-        return method
-    return METHODS[-1]
+    return _remembered("steppers", key, ready, MODELS).under(motion)
 
 
 def _model_key(case: Case) -> str:
@@ -119,11 +139,29 @@ def _model_key(case: Case) -> str:
     return _key(case, (*MODEL, *GROUND, *ANALYSIS) if case.chooses else MODEL)
 
 
-def _key(case: Case, sections: Sequence[str]) -> str:
-    """Everything that some sections of a case say, files included, as text."""
-    told = {name: case.settings[name] for name in sections if name in case.settings}
+def _ground_key(case: Case) -> str:
+    """Everything that a case says of the ground, but for factors."""
+    left_out = {"motion": ("scale",), "suite": FACTORS}
+    return _key(case, GROUND, left_out)
+
+
+def _key(
+    case: Case, sections: Sequence[str], left_out: Mapping[str, Collection[str]] | None = None
+) -> str:
+    """What tells everything that some sections of a case say, files included."""
+    told = {
+        name: _without(case.settings[name], (left_out or {}).get(name, ()))
+        for name in sections
+        if name in case.settings
+    }
     files = [(str(p), content_digest(p)) for p in input_files(told, case.folder)]
-    return json.dumps([told, files], sort_keys=True, default=str)
+    text = json.dumps([told, files], default=str)  # arches and piers stand in their order
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
+    """A table without some of its keys."""
+    return {key: value for key, value in table.items() if key not in keys}
 
 
 def _remembered(kind: str, key: str, make: Callable[[], Made], most: int = OTHERS) -> Made:

@@ -12,6 +12,9 @@ from archfem.cases.inputs import inputs_digest
 from archfem.cases.settings import put, refuse_unknown
 from archfem.errors import InvalidInput
 
+MODEL = ("structure", "materials", "contacts", "model", "dead_load")
+"""Sections of a case that make its model."""
+
 PAIR = "suite.pair"
 """Key whose value is the one pair of the suite that a point is about."""
 
@@ -64,6 +67,16 @@ class Point:
         """
         text = f"{asked}\n{inputs_digest(self.settings, self.folder)}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def model_of(point: Point) -> str:
+    """Return what points of one study have in common where they are of one model, as a rule.
+
+    Args:
+        point: of the study.
+    """
+    told = [change for change in point.changes if change[0].partition(".")[0] in MODEL]
+    return f"{id(point.base)} {told!r}"
 
 
 def _leave_one(settings: dict[str, Any], pair: str) -> None:

@@ -1,4 +1,8 @@
-"""Points on processes of this machine: who is free takes the next; one that dies is replaced."""
+"""Points on processes of this machine: who is free takes the next; one that dies is replaced.
+
+Who is free goes on with points of the model that it knows, as long as there are any, and then takes
+up a model that nobody is at: so each is built once, not once a process.
+"""
 
 import os
 import pickle
@@ -6,14 +10,14 @@ import socket
 import subprocess
 import sys
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from archfem.errors import InvalidInput
 from archfem.studies.asking import Asked
-from archfem.studies.points import Point
+from archfem.studies.points import Point, model_of
 from archfem.studies.worker import SINGLE, Row, answer, row
 
 ATTEMPTS = 3
@@ -53,7 +57,7 @@ def on_processes(
     Raises:
         InvalidInput: the function that finds cannot be handed to another process.
     """
-    tasks = deque((number, _pickled(point, asked)) for number, point in points)
+    tasks = Tasks(points, asked)
     died: Counter[int] = Counter()
     with Path(os.devnull if log is None else log).open("a") as words:
         staff: list[_Worker] = []
@@ -69,26 +73,82 @@ def on_processes(
                         continue
                     staff.remove(worker)
                     assert task is not None
-                    died[task[0]] += 1
-                    if died[task[0]] < ATTEMPTS:
-                        tasks.appendleft(task)
+                    died[task.number] += 1
+                    if died[task.number] < ATTEMPTS:
+                        tasks.again(task)
                     else:
-                        yield task[0], row({}, _fatal(worker), ours=False)
+                        yield task.number, row({}, _fatal(worker), ours=False)
         finally:
             for worker in staff:
                 worker.end()
 
 
-def _hand_out(
-    tasks: "deque[tuple[int, bytes]]", staff: "list[_Worker]", most: int, words: Any
-) -> None:
+class Task(NamedTuple):
+    """A point to be handed out.
+
+    Attributes:
+        number: of the point.
+        told: the point and what is asked, as bytes.
+        model: what points of one model share.
+    """
+
+    number: int
+    told: bytes
+    model: str
+
+
+class Tasks:
+    """Points to be handed out, in their order, but those of one model together.
+
+    Args:
+        points: with their numbers.
+        asked: what is to be found.
+    """
+
+    def __init__(self, points: Sequence[tuple[int, Point]], asked: Asked) -> None:
+        self._left: dict[str, deque[Task]] = {}
+        for number, point in points:
+            task = Task(number, _pickled(point, asked), model_of(point))
+            self._left.setdefault(task.model, deque()).append(task)
+
+    def __bool__(self) -> bool:
+        """Whether there are any left."""
+        return bool(self._left)
+
+    def next(self, known: str | None, others: Collection[str]) -> Task:
+        """Return the next: of a model that is known, else of one that others are not at.
+
+        Args:
+            known: model that was worked at before, or None.
+            others: models that are worked at elsewhere.
+        """
+        if known not in self._left:
+            fresh = (model for model in self._left if model not in others)
+            known = next(fresh, next(iter(self._left)))
+        found = self._left[known].popleft()
+        if not self._left[known]:
+            del self._left[known]
+        return found
+
+    def again(self, task: Task) -> None:
+        """Put a task back.
+
+        Args:
+            task: that was handed out.
+        """
+        self._left.setdefault(task.model, deque()).appendleft(task)
+
+
+def _hand_out(tasks: Tasks, staff: "list[_Worker]", most: int, words: Any) -> None:
     """Give a task to each process that has none, and to new ones where there may be more."""
     idle = [worker for worker in staff if worker.task is None]
     while tasks and (idle or len(staff) < most):
         if not idle:
             idle.append(_Worker(words))
             staff.append(idle[0])
-        idle.pop().begin(tasks.popleft())
+        free = idle.pop()
+        others = {other.model for other in staff if other is not free and other.model is not None}
+        free.begin(tasks.next(free.model, others))
 
 
 class _Worker:
@@ -108,13 +168,14 @@ class _Worker:
         )
         theirs.close()
         self.pipe = Connection(ours.detach())
-        self.task: tuple[int, bytes] | None = None
+        self.task: Task | None = None
+        self.model: str | None = None
 
-    def begin(self, task: tuple[int, bytes]) -> None:
+    def begin(self, task: Task) -> None:
         """Hand over a point; a process that is gone is noticed when its answer is waited for."""
-        self.task = task
+        self.task, self.model = task, task.model
         try:
-            self.pipe.send(task)
+            self.pipe.send((task.number, task.told))
         except OSError:
             self.process.kill()
 

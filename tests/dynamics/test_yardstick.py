@@ -3,6 +3,7 @@
 import io
 import logging
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,7 +35,9 @@ def yardstick(monkeypatch):
         jump = 0.02 if model == "rattling" and more < -0.015 else 0.0
         return np.array([0.1, known + 0.4 * more + jump])
 
-    monkeypatch.setattr("archfem.dynamics.yardstick.peaks", peaks)
+    monkeypatch.setattr("archfem.dynamics.yardstick.time_history", peaks)
+    monkeypatch.setattr("archfem.dynamics.yardstick.peaks_of", lambda run: run)
+    monkeypatch.setattr("archfem.dynamics.yardstick._turned", lambda run: 0.0)
     monkeypatch.setattr("archfem.dynamics.yardstick.dead_load", lambda model: None)
     return Yardstick("finest", af.Motion(np.array([0.0, 1.0, 0.0]), 0.01), None)
 
@@ -85,11 +88,12 @@ def test_motions_near_by_are_one_and_two_per_cent_weaker_and_stronger(monkeypatc
     """Each run is made once, and told of; steps half as long have a quarter of the tolerance."""
     asked, told = [], []
 
-    def peaks(model, motion, damping, dt, *, tolerance, start):
+    def run(model, motion, *, damping, dt, tolerance, start):
         asked.append((motion.pga, dt, tolerance))
-        return np.zeros(1)
+        return SimpleNamespace(joints={"rotation": np.array([0.1, -0.2])})
 
-    monkeypatch.setattr("archfem.dynamics.yardstick.peaks", peaks)
+    monkeypatch.setattr("archfem.dynamics.yardstick.time_history", run)
+    monkeypatch.setattr("archfem.dynamics.yardstick.peaks_of", lambda run: np.zeros(1))
     monkeypatch.setattr("archfem.dynamics.yardstick.dead_load", lambda model: None)
     motion = af.Motion(np.array([0.0, 1.0, 0.0]), 0.01)
     measure = Yardstick("finest", motion, None, lambda: told.append(1))
@@ -99,6 +103,8 @@ def test_motions_near_by_are_one_and_two_per_cent_weaker_and_stronger(monkeypatc
     assert len(told) == 5
     measure.in_time(Steps(None, 0.004))
     assert asked[5:] == [(1.0, None, 0.004), (1.0, None, 0.001)]
+    assert measure.turn(Steps(None, 0.004)) == 0.2
+    assert len(asked) == 7
     assert Steps(0.01, None).halved == Steps(0.005, None)
     assert Steps(0.01, None).label == "steps of 10 ms"
     assert Steps(None, 0.004).label == "steps for 0.004 in |e|"

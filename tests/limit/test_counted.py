@@ -10,9 +10,11 @@ from archfem.limit.counted import (
     counted_mechanism,
     counted_mechanisms,
     counts_as_mechanism,
+    definitions_met,
     demirel_aldemir_mechanism,
     mechanism_kind,
 )
+from archfem.masonry.roles import judged_parts
 
 
 def history(structure, instants):
@@ -152,3 +154,17 @@ def test_as_many_fail_as_make_a_mechanism_from_four_on(ring):
         ring, resultants, np.arange(3.0), criteria=af.Criteria(failures=5)
     )
     assert counts_as_mechanism(strict).values.tolist() == [False, False, True]
+
+
+def test_definitions_are_met_at_an_instant_where_counting_finds_a_mechanism():
+    structure, rng, met = piers(2), np.random.default_rng(5), set()
+    roles = {joint.part: joint.role for joint in structure.joints}
+    for _ in range(40):
+        hinges = np.flatnonzero(rng.random(len(structure.joints)) < rng.uniform(0.0, 0.5)).tolist()
+        down = [structure.joints[number].part for number in hinges]
+        count = {part: down.count(part) for part in judged_parts(roles)}
+        joints = failing(structure, dict.fromkeys(hinges, 0.5))
+        found = {name for name, each in counted_mechanisms(joints).items() if each is not None}
+        assert definitions_met(count, roles, 4) == found
+        met.add(frozenset(found))
+    assert len(met) > 3

@@ -12,6 +12,9 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 import archfem as af
 from archfem.limit.blocks import RigidBlocks, rigid_load
 from archfem.limit.collapse import Outcome
+from archfem.limit.sliding import STARTS, some_starts
+from archfem.limit.turns import solution, weaker
+from archfem.limit.weight import self_weight
 
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""
@@ -254,6 +257,22 @@ def test_a_block_held_between_walls_lifts_at_its_weight():
     assert found.factor == pytest.approx(structure.weight, rel=1e-6)
 
 
+def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
+    """A wall that slides at two factors, of which the mixed-integer programme finds the least."""
+    structure = random_structure(10)
+    _, dead = self_weight(structure, "nonassociated", None, None)
+    asked = dead.growing(rigid_load(structure, [SIDEWAYS]))
+    starts = some_starts(asked, asked.solve(), STARTS, 0)
+    found = [turn for forces in starts if (turn := solution(asked, forces))]
+    strongest = min(found, key=lambda turn: turn.state.value)
+    assert -strongest.state.value == pytest.approx(0.67229, rel=1e-4)
+    values = [-turn.state.value for turn in weaker(asked, strongest, strongest.state.forces, 30)]
+    assert values == sorted(values, reverse=True)
+    assert values[-1] == pytest.approx(least_by_integers(structure, SIDEWAYS), rel=1e-5)
+    from_none = [-turn.state.value for turn in weaker(asked, None, starts[0], 30)]
+    assert min(from_none) == pytest.approx(values[-1], rel=EXACT)
+
+
 def test_without_friction_a_column_resists_nothing():
     found = af.collapse_factor(
         af.column(breadth=0.6, heights=[2.4], contact=rough(0.0)),
@@ -276,7 +295,8 @@ def test_a_settlement_without_dilatancy_pushes_at_least_as_hard():
 
 
 def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
-    monkeypatch.setattr("archfem.limit.sliding._solution", lambda *_: None)
+    monkeypatch.setattr("archfem.limit.sliding.solution", lambda *_: None)
+    monkeypatch.setattr("archfem.limit.sliding.weaker", lambda *_: [])
     structure = ring(embrace=120.0, voussoirs=9, contact=rough(0.4))
     push = af.PointLoad(0.0, (-1e3, 0.0))
     found = af.collapse_factor(structure, live=push, friction="nonassociated")

@@ -156,6 +156,14 @@ def test_limit_analysis_of_the_pieces_finds_the_same_wedges(angle, passive):
     assert found.sliding
 
 
+def test_between_fixed_walls_pieces_that_dilate_bear_any_load():
+    """They lock; round-off keeps the solver from saying so within its usual tolerance."""
+    rough = af.Contact(0.3e9, 0.24e9, tan(radians(30.0)))
+    fill = jointed_fill(box(3.0, rough, rough), 0.7, angle=35.0)
+    found = af.collapse_factor(fill, live=af.PointLoad(1.5, (0.0, -1e3)))
+    assert found.outcome.sentence == "this load never overturns it"
+
+
 @pytest.mark.slow
 def test_without_dilatancy_the_wedge_is_the_same():
     found = af.collapse_factor(

@@ -36,7 +36,7 @@ class Slow(LoadPath):
 def slides(monkeypatch):
     """Names of the joints that slide."""
     names = ["bed 3", "bed 4"]
-    monkeypatch.setattr(ends, "_sliding", lambda path, criteria: names)
+    monkeypatch.setattr(ends, "sliding", lambda path, criteria: names)
     return names
 
 

@@ -12,7 +12,8 @@ from glued import glued
 import archfem as af
 from archfem.limit.blocks import RigidBlocks
 from archfem.statics.ends import finished
-from archfem.statics.pushover import CONTROLS, Stop, _extrapolated, _follow, pushover
+from archfem.statics.following import follow
+from archfem.statics.pushover import CONTROLS, Stop, _extrapolated, pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
@@ -364,7 +365,7 @@ class Steps:
 
 def test_steps_grow_by_a_tenth_and_are_halved_where_they_fail():
     path = Steps([False, False, True, True, False])
-    said = _follow(path, "force", Stop(steps=4), af.Criteria())
+    said = follow(path, "force", Stop(steps=4), af.Criteria())
     assert said == "4 steps were taken"
     known = [1.0, 1.1, 1.21, 0.605, 0.3025, 0.33275]
     assert path.asked == pytest.approx(known)
@@ -374,7 +375,7 @@ def test_steps_are_given_up_below_a_thousandth_of_the_first():
     """2^-9 is still tried, 2^-10 is not: then what slides decides what is said."""
     path = Steps([True] * 99)
     with pytest.raises(af.DidNotConverge, match="no equilibrium just after the dead load"):
-        _follow(path, "force", Stop(), af.Criteria())
+        follow(path, "force", Stop(), af.Criteria())
     assert path.asked == pytest.approx(0.5 ** np.arange(10))
 
 
@@ -403,13 +404,13 @@ def test_arc_length_goes_on_in_the_direction_of_the_last_step():
     """Of length one, half of each at first; the units of both are those of the first step."""
     path = Steps()
     path.unit = (0.5, 2.0)
-    _follow(path, "arc length", Stop(steps=3), af.Criteria())
+    follow(path, "arc length", Stop(steps=3), af.Criteria())
     even, later = 0.5**0.5, np.array([2.0, 0.5]) / np.hypot(2.0, 0.5)
     assert path.borders[0] == pytest.approx([even, even])
     assert path.borders[1] == path.borders[2] == pytest.approx(later.tolist())
     for control, border in (("force", [0.0, 1.0]), ("displacement", [1.0, 0.0])):
         path = Steps()
-        _follow(path, control, Stop(steps=2), af.Criteria())
+        follow(path, control, Stop(steps=2), af.Criteria())
         assert path.borders == [border] * 2
 
 

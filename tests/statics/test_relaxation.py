@@ -127,18 +127,6 @@ def test_a_load_on_fill_in_pieces_goes_on_by_creep(bridge):
     assert path.factors == [0.0, 0.1]
 
 
-@pytest.mark.slow
-def test_a_pushover_of_fill_in_pieces_goes_on_where_newton_fails(bridge):
-    """Steps by displacement alone end at 0.21, by force at 0.06, of what limit analysis gives."""
-    fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
-    model, load = af.build(fill, fidelity="rigid", cells=(2, 1)), af.BodyForce(1.0)
-    most = af.collapse_factor(fill, live=load).factor
-    found = af.pushover(model, load, control="force")
-    assert 0.66 * most < found.factor < most
-    assert "the load cannot grow beyond a factor of" in found.outcome
-    assert "pieces of fill flow" in found.outcome
-
-
 def counting(monkeypatch):
     """How many iterations each solve has made, as a list that grows."""
     made, solve = [], Solver.solve

@@ -13,7 +13,9 @@ from scipy import stats
 
 import archfem as af
 from archfem.cases import inputs
+from archfem.studies.asking import Asked
 from archfem.studies.over import axes_over
+from archfem.studies.processes import Tasks
 from archfem.studies.store import Store
 
 
@@ -344,3 +346,21 @@ def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
     frame = pd.read_csv(tmp_path / "results.csv")
     assert frame["title"].tolist() == ["'=1+1", "'@SUM(A1)", "plain"]
     assert frame["motion.scale"].tolist() == [-1.0, -1.0, -1.0]
+
+
+def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
+    over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
+    points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
+    tasks = Tasks(points, Asked.of("dead load"))
+    first = tasks.next(None, set())
+    other = tasks.next(None, {first.model})
+    assert other.model != first.model
+    told = [first, *(tasks.next(first.model, {other.model}) for _ in range(2))]
+    assert {task.model for task in told} == {first.model}
+    third = tasks.next(first.model, {other.model})
+    assert third.model not in (first.model, other.model)
+    tasks.again(third)
+    rest = [tasks.next(other.model, {third.model}) for _ in range(5)]
+    assert [task.model for task in rest] == 2 * [other.model] + 3 * [third.model]
+    assert sorted(task.number for task in (*told, other, *rest)) == list(range(9))
+    assert not tasks

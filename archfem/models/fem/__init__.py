@@ -3,6 +3,7 @@
 edges         edges that touching blocks share
 division      into how many cells each edge is cut
 mesh          one conforming mesh of all blocks
+meshes        those made lately, for structures of the same shapes
 space         the Lagrange space broken across joints
 joint_facets  what points on joint facets carry into forms, and what is read there
 joint_forms   gap, slip and tractions of joints in UFL
