@@ -14,6 +14,7 @@ from archfem.dynamics.scales import (
     DEFINITIONS,
     MechanismScales,
     ScaledRun,
+    largest_scale,
     mechanism_scales,
     search,
 )
@@ -252,3 +253,13 @@ def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, mon
     strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
     collapse_scale(model, strong, between=between)
     assert asked == [pytest.approx(limits)] * 2
+
+
+def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
+    """However weak they are; one that is none may be multiplied by anything."""
+    weak, strong = np.array([0.0, 0.01, -0.02]), np.array([0.0, 0.03, -0.05])
+    five_g = 5.0 * 9.80665
+    assert largest_scale(af.Motion(weak, 0.01)) == pytest.approx(five_g / 0.02)
+    for others in ({"vertical": strong}, {"transverse": strong}):
+        assert largest_scale(af.Motion(weak, 0.01, **others)) == pytest.approx(five_g / 0.05)
+    assert largest_scale(af.Motion(0.0 * weak, 0.01)) == inf
