@@ -1,13 +1,14 @@
 """Into how many cells edges are cut: alike on both sides, and dealt evenly."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import archfem as af
-from archfem.models.fem.division import Sizes, _check_room, _wanted, divided
+from archfem.models.fem.division import Sizes, _check_room, _graded, _wanted, divided
 from archfem.models.fem.edges import edges_of
 
 
@@ -129,3 +130,26 @@ def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
         for first, last in pairwise(stations):
             share = quad(density, first, last, limit=200)[0] * (len(stations) - 1) / fit
             assert share == pytest.approx(1.0, abs=0.01)  # of 500 pieces each
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_an_edge_between_blocks_has_the_cells_of_the_finer(order):
+    """Whichever comes first; those through a structured block are not theirs to cut."""
+    edges = SimpleNamespace(
+        structured=[2],
+        around={0: np.array([0, 1]), 1: np.array([1, 2]), 2: np.array([2])},
+        points=np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]]),
+        ends=np.array([[0, 1], [1, 2], [2, 0]]),
+        lengths=np.array([1.0, 3.0, 10.0**0.5]),
+    )
+    sizes = {
+        number: SimpleNamespace(
+            at=lambda places, size=(0.5, 0.2)[number]: np.full(len(places), size)
+        )
+        for number in order
+    }
+    found = _graded(edges, sizes)
+    assert {edge: through[-1] for edge, through in found.items()} == pytest.approx(
+        {0: 1.0 / 0.5, 1: 3.0 / 0.2}
+    )
+    assert np.diff(found[1], 2) == pytest.approx(0.0, abs=1e-12)

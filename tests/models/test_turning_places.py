@@ -5,6 +5,7 @@ import pytest
 from scipy import sparse
 
 import archfem as af
+from archfem.models.turning_joints import Pieces
 from archfem.models.turning_places import StillPoint, TurningPoint
 
 STEP = 1e-6
@@ -74,3 +75,22 @@ def test_points_of_stones_turn_and_strain_as_their_frames_do():
     far = [middle[b] for b in structure.free]
     mean = [moved[cells.block == b].mean(axis=0) for b in structure.free]
     assert np.array(far) == pytest.approx(np.array(mean), abs=1e-12)
+
+
+def test_faces_of_supports_turn_about_their_centroids():
+    """By complex numbers: the middle of every piece goes with either block, and turns as much."""
+    arch = af.circular_arch(radius=3.0, thickness=0.5, embrace=140.0, voussoirs=3, chords=1)
+    joint = np.array([0, 0, 1, 2, 3])
+    aside = np.array([-0.125, 0.125, 0.0, 0.1, 0.0])
+    pieces = Pieces(arch, joint, np.arange(6), aside, np.full(5, 0.25))
+    poses = np.random.default_rng(3).normal(size=(len(arch.blocks), 3))
+    found = pieces.held(poses)
+    for k, number in enumerate(joint):
+        section = arch.joints[number]
+        place = (section.middle + aside[k] * section.tangent) @ [1, 1j]
+        for side, block in enumerate(section.blocks):
+            centre, turn = arch.blocks[block].centroid @ [1, 1j], poses[block, 2]
+            moved = centre + poses[block, :2] @ [1, 1j] + np.exp(1j * turn) * (place - centre)
+            assert found[k, side, :2] @ [1, 1j] == pytest.approx(moved - place, abs=1e-14)
+            assert found[k, side, 2] == turn
+    assert pieces.paired.tolist() == [True, True, False, False, False]
