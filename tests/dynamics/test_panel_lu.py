@@ -10,7 +10,8 @@ from scipy.sparse.linalg import spsolve
 import archfem as af
 from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.stepping.panel_lu import back, panels_of, renewed
+from archfem.dynamics.stepping.panel_lu import panels_of, renewed
+from archfem.dynamics.stepping.panel_solution import back
 from archfem.dynamics.stepping.turning import Turning
 
 SIDE = 9

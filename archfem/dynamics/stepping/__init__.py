@@ -22,6 +22,7 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     open_points      its solution at an instant
     sliding_points   its solution over a step
     newton_pass      of which this is one pass
+    columns          the part of the compliance that it needs
     chain            joints of a chain of blocks, and the band that they make
     chain_newton     the same solution in that band
     modal            the strategy in the modes of the closed structure
@@ -30,11 +31,13 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     sparse           the strategy for large structures, with one sparse factor
     tangent          the strategy for large structures that slide, with their sparse tangent
     tangent_newton   its passes
+    tangent_pass     what each takes: rates of joints, and the tangent with them
     panels           that factor, dense block by dense block
     turning          the strategy for blocks that move as far as they like
     turning_newton   Newton's method for a step of theirs
     band_lu          its elimination in a band, with row exchanges
     panel_lu         its elimination in dense panels, condensed onto what joints move
+    panel_solution   solutions by it
     elimination      the order in which its unknowns are eliminated
     sparse_rows      compiled products of matrices and vectors
 """

@@ -6,7 +6,6 @@ Of (1 - λ' F) μ = λ' (z₀ + F λ - z) for the change μ of λ the rows matte
 import numba
 import numpy as np
 
-from archfem.dynamics.stepping.open_points import chosen
 from archfem.joints.moving.compiled import computing, inlined, summing
 
 FEW = 60
@@ -89,57 +88,86 @@ def _enter(entries, number, entry):  # type: ignore
     entries[1][number] = entry[2]
 
 
-@numba.njit(cache=True, fastmath={"contract"})
-def equations(matrix, entries, count, factor):  # type: ignore
-    """Fill 1 - λ' F at rows and columns of λ' that are not zero, at the top left.
+@computing
+def holding(was, force, change):  # type: ignore
+    """Let points hold that would turn round: none slides one way and then, at once, the other.
+
+    Newton's method foresees nothing of the range in between, in which a point holds, and would go
+    to and fro across it.
 
     Args:
-        matrix: F (k, k).
-        entries: rows and columns of λ', and its values there.
-        count: how many of them there are.
-        factor: filled (k, k).
+        was: λ that the gaps asked for before a pass (r,).
+        force: λ after it, changed (r,).
+        change: filled with the change of it (r,).
 
     Returns:
-        Which rows they are.
+        Whether there are any.
     """
-    (places, values), changes = entries, np.zeros(len(matrix), dtype=np.bool_)
-    whole, size = np.eye(len(matrix)), len(matrix)
-    for entry in range(count):
-        row, column, value = places[entry, 0], places[entry, 1], values[entry]
-        changes[row] = True
+    some = False
+    for k in range(len(was)):
+        change[k] = 0.0
+        if was[k] * force[k] < 0.0:
+            change[k], force[k], some = -force[k], 0.0, True
+    return some
+
+
+@numba.njit(cache=True)
+def prepared(columns, entries, count, factor):  # type: ignore
+    """Get ready to solve with 1 - λ' F.
+
+    Args:
+        columns: of F, `Columns`, among them all rows of λ'.
+        entries: rows and columns of λ', and its values there.
+        count: how many of them there are.
+        factor: filled at the top left with that or, of at most `FEW` columns, its factor (k, k).
+
+    Returns:
+        With which column each was exchanged; nothing is where they are many.
+    """
+    _equations(columns, entries, count, factor)
+    size = columns.taken[0]
+    return factorised(factor, size) if size <= FEW else np.zeros(size, np.int64)
+
+
+@summing
+def _equations(columns, entries, count, factor):  # type: ignore
+    """Fill 1 - λ' F of the columns."""
+    (places, values), size = entries, columns.taken[0]
+    for i in range(size):
+        own = factor[i]
         for k in range(size):
-            whole[row, k] -= value * matrix[column, k]
-    rows = np.flatnonzero(changes)
-    for i in range(len(rows)):
-        for k in range(len(rows)):
-            factor[i, k] = whole[rows[i], rows[k]]
-    return rows
+            own[k] = 0.0
+        own[i] = 1.0
+    for entry in range(count):
+        own, other = factor[columns.column[places[entry, 0]]], columns.entries[places[entry, 1]]
+        value = values[entry]
+        for k in range(size):
+            own[k] -= value * other[k]
 
 
 @numba.njit(cache=True)
 def newton_change(rest, entered, system):  # type: ignore
-    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no row of λ' is.
+    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no column is.
 
     Args:
         rest: r (k,).
         entered: rows and columns of λ' with its values, and how many those are.
-        system: factor of 1 - λ' F or, of more than `FEW` rows, that itself; its rows; and with
-            which each was exchanged.
+        system: `Columns`; factor of 1 - λ' F or, of more than `FEW` columns, that itself; and with
+            which each was exchanged, or how many there are.
 
     Returns:
         μ (k,).
     """
-    ((places, values), count), (factor, rows, exchanges) = entered, system
-    change, size = np.zeros(len(rest)), len(rows)
+    ((places, values), count), (columns, factor, exchanges) = entered, system
+    change, own, size = np.zeros(len(rest)), np.zeros(len(exchanges)), len(exchanges)
     for k in range(count):
-        change[places[k, 0]] += values[k] * rest[places[k, 1]]
-    own = chosen(change, rows)
+        own[columns.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
     if size > FEW:
         own = _gradients(np.ascontiguousarray(factor[:size, :size]), own)
     else:
         _substitute(factor, exchanges, own)
     for k in range(size):
-        change[rows[k]] = own[k]
+        change[columns.places[k]] = own[k]
     return change
 
 

@@ -140,7 +140,7 @@ def eliminated(panels, entries, room):  # type: ignore
 
     Args:
         panels: `Panels`.
-        entries: of the matrix, then of its triangles.
+        entries: of the matrix, then of its triangles, pivots inverted.
         room: for intermediate results (n,).
 
     Returns:
@@ -153,116 +153,98 @@ def eliminated(panels, entries, room):  # type: ignore
         top = entries[start : start + width * (width + count)].reshape((width, width + count))
         left = entries[start + width * (width + count) : end].reshape((width, count))
         targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
-        if not _split(top, left):
+        if not _split_rows(top):
             return False
+        _split_columns(top, left)
         _passed_on(top, left, targets, room, entries)
     return True
 
 
 @summing
-def _split(top, left):  # type: ignore
-    """Eliminate the columns of a group within its blocks; whether no pivot is small."""
+def _split_rows(top):  # type: ignore
+    """Eliminate in each row of a group the columns before its own; whether no pivot is small."""
     width, size = top.shape
-    for k in range(width):
-        row, largest = top[k], 0.0
-        for j in range(k, size):
-            largest = max(largest, abs(row[j]))
-        if not abs(row[k]) > SMALL * largest:
+    for i in range(width):
+        own, k = top[i], 0
+        while k + 4 <= i:
+            p, q, r, s = top[k], top[k + 1], top[k + 2], top[k + 3]
+            a = own[k] * p[k]
+            b = (own[k + 1] - a * p[k + 1]) * q[k + 1]
+            c = (own[k + 2] - a * p[k + 2] - b * q[k + 2]) * r[k + 2]
+            d = (own[k + 3] - a * p[k + 3] - b * q[k + 3] - c * r[k + 3]) * s[k + 3]
+            own[k], own[k + 1], own[k + 2], own[k + 3] = a, b, c, d
+            k += 4
+            rest, p, q, r, s = own[k:], p[k:], q[k:], r[k:], s[k:]
+            for j in range(len(rest)):
+                rest[j] -= a * p[j] + b * q[j] + c * r[j] + d * s[j]
+        for last in range(k, i):
+            row = top[last]
+            own[last] = factor = own[last] * row[last]
+            for j in range(last + 1, size):
+                own[j] -= factor * row[j]
+        largest = 0.0
+        for j in range(i, size):
+            largest = max(largest, abs(own[j]))
+        if not abs(own[i]) > SMALL * largest:
             return False
-        inverse = 1.0 / row[k]
-        for i in range(k + 1, width):
-            other = top[i]
-            factor = other[k] * inverse
-            other[k] = factor
-            for j in range(k + 1, size):
-                other[j] -= factor * row[j]
-        column = left[k]
-        for i in range(len(column)):
-            column[i] *= inverse
-        for m in range(k + 1, width):
-            other, factor = left[m], row[m]
-            for i in range(len(column)):
-                other[i] -= factor * column[i]
+        own[i] = 1.0 / own[i]
     return True
 
 
 @summing
-def _passed_on(top, left, targets, room, entries):  # type: ignore
-    """Take what a group's elimination changes from the entries further down."""
+def _split_columns(top, left):  # type: ignore
+    """Eliminate the same in the rows below, which are given column by column."""
     width, count = left.shape
-    for i in range(count):
-        for j in range(count):
-            room[j] = 0.0
-        done = 0
-        while done + 4 <= width:
-            a, b, c, d = left[done, i], left[done + 1, i], left[done + 2, i], left[done + 3, i]
-            p, q, r, s = top[done], top[done + 1], top[done + 2], top[done + 3]
-            p, q, r, s = p[width:], q[width:], r[width:], s[width:]
-            for j in range(count):
-                room[j] += a * p[j] + b * q[j] + c * r[j] + d * s[j]
+    for m in range(width):
+        own, done = left[m], 0
+        while done + 4 <= m:
+            a, b, c, d = top[done, m], top[done + 1, m], top[done + 2, m], top[done + 3, m]
+            p, q, r, s = left[done], left[done + 1], left[done + 2], left[done + 3]
+            for i in range(count):
+                own[i] -= a * p[i] + b * q[i] + c * r[i] + d * s[i]
             done += 4
-        for k in range(done, width):
-            factor, row = left[k, i], top[k, width:]
-            for j in range(count):
-                room[j] += factor * row[j]
+        for k in range(done, m):
+            factor, other = top[k, m], left[k]
+            for i in range(count):
+                own[i] -= factor * other[i]
+        inverse = top[m, m]
+        for i in range(count):
+            own[i] *= inverse
+
+
+@summing
+def _passed_on(top, left, targets, room, entries):  # type: ignore
+    """Take what a group's elimination changes from the entries further down, two rows at a time."""
+    count = left.shape[1]
+    for i in range(0, count, 2):
+        pair = i + 1 < count
+        one, two = room[:count], room[count : 2 * count]
+        _products(top, left, (i, i + 1 if pair else i), one, two)
         own = targets[i * count : (i + 1) * count]
         for j in range(count):
-            entries[own[j]] -= room[j]
+            entries[own[j]] -= one[j]
+        if pair:
+            own = targets[(i + 1) * count : (i + 2) * count]
+            for j in range(count):
+                entries[own[j]] -= two[j]
 
 
 @summing
-def back(panels, entries, vector, room):  # type: ignore
-    """Solve a system in place by its triangles.
-
-    Args:
-        panels: `Panels`.
-        entries: as `renewed` leaves them.
-        vector: right side, then solution (n,).
-        room: for intermediate results (n,).
-    """
-    _down(panels, entries, vector, room)
-    _up(panels, entries, vector, room)
-
-
-@summing
-def _down(panels, entries, vector, room):  # type: ignore
-    """Solve with the lower triangle."""
-    first, below = panels.first, panels.below
-    for group in range(len(first) - 1):
-        start, width = first[group], first[group + 1] - first[group]
-        rows = panels.rows[below[group] : below[group + 1]]
-        count, place = len(rows), panels.places[group]
-        lower = place + width * (width + count)
-        total = room[:count]
-        for i in range(count):
-            total[i] = 0.0
-        for k in range(width):
-            value = vector[start + k]
-            for i in range(k + 1, width):
-                vector[start + i] -= value * entries[place + i * (width + count) + k]
-            column = entries[lower + k * count : lower + (k + 1) * count]
-            for i in range(count):
-                total[i] += value * column[i]
-        for i in range(count):
-            vector[rows[i]] -= total[i]
-
-
-@summing
-def _up(panels, entries, vector, room):  # type: ignore
-    """Solve with the upper triangle."""
-    first, below = panels.first, panels.below
-    for group in range(len(first) - 2, -1, -1):
-        start, width = first[group], first[group + 1] - first[group]
-        rows = panels.rows[below[group] : below[group + 1]]
-        count, own = len(rows), room[: width + len(rows)]
-        for k in range(width):
-            own[k] = vector[start + k]
-        for i in range(count):
-            own[width + i] = vector[rows[i]]
-        for k in range(width - 1, -1, -1):
-            begin = panels.places[group] + k * (width + count)
-            row, value = entries[begin : begin + width + count], own[k]
-            for j in range(k + 1, width + count):
-                value -= row[j] * own[j]
-            own[k] = value / row[k]
-            vector[start + k] = own[k]
+def _products(top, left, rows, one, two):  # type: ignore
+    """Multiply two rows below a group by its rows."""
+    (width, count), (m, n), k = left.shape, rows, 0
+    for j in range(count):
+        one[j] = two[j] = 0.0
+    while k + 4 <= width:
+        p, q, r, s = top[k][width:], top[k + 1][width:], top[k + 2][width:], top[k + 3][width:]
+        a, b, c, d = left[k, m], left[k + 1, m], left[k + 2, m], left[k + 3, m]
+        e, f, g, h = left[k, n], left[k + 1, n], left[k + 2, n], left[k + 3, n]
+        for j in range(count):
+            one[j] += a * p[j] + b * q[j] + c * r[j] + d * s[j]
+            two[j] += e * p[j] + f * q[j] + g * r[j] + h * s[j]
+        k += 4
+    for last in range(k, width):
+        row, a, e = top[last][width:], left[last, m], left[last, n]
+        for j in range(count):
+            one[j] += a * row[j]
+            two[j] += e * row[j]

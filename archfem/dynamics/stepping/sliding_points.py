@@ -16,16 +16,10 @@ import numba
 import numpy as np
 
 from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE, along_chain
+from archfem.dynamics.stepping.columns import add_gaps, no_columns, take_in
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.newton_pass import (
-    FEW,
-    equations,
-    factorised,
-    newton_change,
-    rates,
-    taken_out,
-)
-from archfem.dynamics.stepping.open_points import chosen, square
+from archfem.dynamics.stepping.newton_pass import holding, newton_change, prepared, rates, taken_out
+from archfem.dynamics.stepping.open_points import chosen
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import (
@@ -189,8 +183,8 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
     for k in range(len(rows)):
         local[rows[k]] = k
     known = local, _within(law.stretches, local), rows[np.searchsorted(rows, len(law.stiffness)) :]
-    matrix, own, z = square(compliance, rows), np.zeros(len(rows)), chosen(law.guess, rows)
-    problem, free = (matrix, rows, known), chosen(start, rows)
+    own, z, free = np.zeros(len(rows)), chosen(law.guess, rows), chosen(start, rows)
+    problem = (compliance, no_columns(rows), known)
     passes = _settled(law, problem, free, own, enough)
     if passes < 0:
         passes = _led(law, problem, (free, z), own, enough)
@@ -207,7 +201,7 @@ def _led(law, problem, ends, own, enough):  # type: ignore
 
     Args:
         law: `PathLaw`.
-        problem: F (k, k), its rows, and what is known of them.
+        problem: F (p, p), the rows' columns of it, and what is known of them.
         ends: z₀ (k,) and the guess of z (k,).
         own: filled with λ (k,).
         enough: error of λ that is left [N].
@@ -215,12 +209,14 @@ def _led(law, problem, ends, own, enough):  # type: ignore
     Returns:
         Passes; -1 if it does not settle.
     """
-    (matrix, rows, known), (free, z) = problem, ends
+    (compliance, columns, known), (free, z), rows = problem, ends, problem[1].rows
     _go(law, (rows, known), z, own)
-    added, done, share, passes = z - matrix @ own - free, 0.0, FIRST, ITERATIONS
+    take_in(columns, compliance, own, law.work.places, 0)
+    added, done, share, passes = free - z, 0.0, FIRST, ITERATIONS
+    add_gaps(columns, own, added)
     while done < 1.0:
         goal = min(done + share, 1.0)
-        taken = _settled(law, problem, free + (1.0 - goal) * added, own, enough)
+        taken = _settled(law, problem, free - (1.0 - goal) * added, own, enough)
         passes += abs(taken)
         if taken > 0:
             done, share, z = goal, 2.0 * share, chosen(law.guess, rows)
@@ -242,21 +238,22 @@ def _settled(law, problem, free, own, enough):  # type: ignore
     Returns:
         Passes; -1 if it does not settle.
     """
-    (matrix, rows, known), size = problem, len(free)
-    wanted, factor, rest = np.empty(size), np.empty((size, size)), np.empty(size)
-    changes, places = np.empty(0, np.int64), np.empty(0, np.int64)
+    (compliance, columns, known), size = problem, len(free)
+    wanted, factor = np.empty(size), np.empty((size, size))
     entries, count, off, last = (law.work.places, law.work.values), 0, np.inf, np.inf
+    exchanges = np.empty(0, np.int64)
     taken_out(law, known, wanted)
     own[:] = wanted
     for passes in range(1, TRIES + 1):
-        if passes <= 2 or off**2 > last * enough:
+        renew = passes <= 2 or off**2 > last * enough
+        if renew:
             count = rates(law, known)
-            changes = equations(matrix, entries, count, factor)
-            places = factorised(factor, len(changes)) if len(changes) <= FEW else places
-        for k in range(size):
-            rest[k] = free[k] - law.guess[rows[k]]
-        rest += matrix @ wanted
-        change = newton_change(rest, (entries, count), (factor, changes, places))
+        take_in(columns, compliance, wanted, entries[0], count)
+        if renew:
+            exchanges = prepared(columns, entries, count, factor)
+        rest = free - chosen(law.guess, columns.rows)
+        add_gaps(columns, wanted, rest)
+        change = newton_change(rest, (entries, count), (columns, factor, exchanges))
         last, off = off, _moved(law, problem, free, (own, wanted, change), passes >= WHOLE)
         if off <= enough or last <= off <= ROUNDED * enough:
             return passes
@@ -271,7 +268,7 @@ def _moved(law, problem, free, forces, careful):  # type: ignore
 
     Args:
         law: `PathLaw`.
-        problem: F (k, k), its rows, and what is known of them.
+        problem: F (p, p), the rows' columns of it, and what is known of them.
         free: z₀ (k,).
         forces: λ and what is wanted there, both changed, and the change of that (k,).
         careful: whether to go less far where λ errs more than it did.
@@ -279,11 +276,14 @@ def _moved(law, problem, free, forces, careful):  # type: ignore
     Returns:
         Its error [N].
     """
-    (matrix, rows, known), (own, wanted, change) = problem, forces
+    (_, columns, known), (own, wanted, change) = problem, forces
     move, before, share = wanted + change - own, np.sum((wanted - own) ** 2), 1.0
+    was, held = wanted.copy(), np.empty(len(own))
     while True:
-        trial = own + share * move
-        _go(law, (rows, known), free + matrix @ trial, wanted)
+        trial, z = own + share * move, free.copy()
+        holding(was, trial, held)
+        add_gaps(columns, trial, z)
+        _go(law, (columns.rows, known), z, wanted)
         error = wanted - trial
         if not careful or share <= LEAST or np.sum(error**2) <= (1.0 - FALLS * share) * before:
             own[:] = trial

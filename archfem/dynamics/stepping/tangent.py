@@ -25,7 +25,8 @@ from archfem.dynamics.stepping.panel_lu import Panels, panels_of
 from archfem.dynamics.stepping.path_law import PathLaw, pairs_of
 from archfem.dynamics.stepping.sparse_rows import trimmed
 from archfem.dynamics.stepping.strategy import Reordered
-from archfem.dynamics.stepping.tangent_newton import Pairs, Room, sought
+from archfem.dynamics.stepping.tangent_newton import sought
+from archfem.dynamics.stepping.tangent_pass import Pairs, Room
 
 ENTRY = 2e-5
 """What ordering and factorising take, for each entry of the mass matrix [s]."""
@@ -95,7 +96,7 @@ class Tangent(Reordered):
         )[order][:, order].tocsr()
         pairs, changed = _blocks(linear.opening, pairs_of(law)[0])
         panels = panels_of(closed, self._elimination, changed)
-        room = Room.of(law, len(order), len(panels.base), len(pairs.rows))
+        room = Room.of(law, panels, len(pairs.rows))
         return TangentSystem(linear, panels, pairs._replace(places=panels.added), room)
 
 

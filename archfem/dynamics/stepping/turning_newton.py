@@ -10,7 +10,8 @@ import numba
 import numpy as np
 
 from archfem.dynamics.stepping.band_lu import eliminate
-from archfem.dynamics.stepping.panel_lu import back, renewed
+from archfem.dynamics.stepping.panel_lu import renewed
+from archfem.dynamics.stepping.panel_solution import back
 from archfem.dynamics.stepping.sparse_rows import row_times
 from archfem.joints.moving.compiled import computing
 from archfem.joints.moving.moved import pass_joints
