@@ -4,7 +4,7 @@ import builtins
 import tomllib
 from pathlib import Path
 
-from mutants.__main__ import KNOWN, _chosen
+from mutants.__main__ import DEFAULTS, KNOWN, _chosen
 from mutants.changes import changed, changes, marked
 
 ROOT = Path(__file__).parents[1]
@@ -17,6 +17,8 @@ def f(x: float = 2) -> float:
     if x < 0:
         raise ValueError(f"{x + 1}")
     return max(x, -LIMIT) * 3
+def g(x):
+    return x.reshape(-1, 2)
 '''
 
 
@@ -29,6 +31,7 @@ def test_every_number_and_operator_of_the_physics_is_changed_once():
         "f: return max(x, -LIMIT) * 3 → return max(x, -LIMIT) / 3",
         "f: return max(x, -LIMIT) * 3 → return max(x, LIMIT) * 3",
         "f: return max(x, -LIMIT) * 3 → return min(x, -LIMIT) * 3",
+        "g: return x.reshape(-1, 2) → return x.reshape(-1, 3)",
     ]
     for number in range(len(words)):
         text = changed(SOURCE, number)
@@ -43,8 +46,8 @@ def test_a_marked_module_tells_to_which_changes_it_comes(monkeypatch):
     exec(marked(SOURCE, "own.py"), space)
     assert came == []
     assert space["f"](1.0) == 3.0
-    assert came == [("own.py", 8)]
-    assert {each.statement and each.statement.lineno for each in changes(SOURCE)} == {None, 8}
+    assert came == [("own.py", 6), ("own.py", 8)]  # the first statement, and one with changes
+    assert {each.statement and each.statement.lineno for each in changes(SOURCE)} == {None, 8, 10}
 
 
 def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_first():
@@ -59,6 +62,14 @@ def test_a_change_meets_its_own_tests_and_those_that_come_to_it_the_shortest_fir
     }
     first = ["tests/joints/test_law.py::own", "tests/a/test_any.py::short"]
     assert _chosen(path, change, tests) == [first, ["tests/a/test_any.py::long"]]
+
+
+def test_a_default_meets_the_tests_of_defaults_though_they_come_to_no_statement():
+    path, default = Path("archfem/joints/law.py"), changes("def f(x=2):\n    return x\n")[0]
+    own, other = f"{DEFAULTS}::own", "tests/a/test_any.py::idle"
+    assert default.statement is None
+    assert (ROOT / DEFAULTS).exists()
+    assert _chosen(path, default, {own: (0.1, []), other: (0.1, [])}) == [[own]]
 
 
 def test_what_changes_no_number_is_still_there_and_has_a_reason():

@@ -320,7 +320,7 @@ class Motion(Shown, picture="motions.draw_motion"):
         return replace(self, transverse=other.horizontal)
 
     def _check_step(self, other: "Motion") -> None:
-        if not np.isclose(other.dt, self.dt, rtol=1e-6):
+        if not np.isclose(other.dt, self.dt, rtol=1e-6, atol=0.0):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 

@@ -157,8 +157,8 @@ def band_passed(samples: Array, dt: float, low: float, high: float, *, order: in
 def resampled(samples: Array, dt: float, new_dt: float) -> Array:
     """Return samples taken anew by straight lines, with every peak kept.
 
-    Each turning point of the old samples is put on the nearest new one; where several meet, the
-    largest stays. Peaks move by half a new step at most and keep their values.
+    Each turning point of the old samples, and either end, is put on the nearest new one; where
+    several meet, the largest stays. Peaks move by half a new step at most and keep their values.
 
     Args:
         samples: accelerations (n,) [m/s²].
@@ -177,8 +177,9 @@ def resampled(samples: Array, dt: float, new_dt: float) -> Array:
     new_dt = float(new_dt)
     count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
     new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
-    rises = np.diff(samples, prepend=samples[0] + 1.0, append=samples[-1] + 1.0) > 0.0
-    turns = np.flatnonzero((rises[1:] != rises[:-1]) & (samples != 0.0))
+    rises = np.diff(samples) > 0.0
+    turned = np.concatenate(([True], rises[1:] != rises[:-1], [True]))[: len(samples)]
+    turns = np.flatnonzero(turned & (samples != 0.0))
     turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
     new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
     return new

@@ -213,6 +213,8 @@ def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
     grown = abs(last - before) * _shortness(displacements)
     if grown <= FLAT * abs(last):
         return last, FLAT * abs(last)
+    if len(factors) == 2:  # one step tells no curve
+        return float("nan"), float("nan")
     half = min(int(np.searchsorted(displacements, 0.5 * displacements[-1])), len(factors) - 2)
     x = np.maximum(displacements, displacements[1]) ** -0.5
     beyond = (last - float(factors[half])) * x[-1] / (x[half] - x[-1])

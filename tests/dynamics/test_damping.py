@@ -1,10 +1,18 @@
 """Damping by the modes that are effective along x."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.damping import effective_damping, effective_range, first_effective
+from archfem.dynamics.damping import (
+    EffectiveRange,
+    _modes_up_to,
+    effective_damping,
+    effective_range,
+    first_effective,
+)
 from archfem.dynamics.stepping.choice import stepper_for
 
 SAME = 1e-9
@@ -160,3 +168,35 @@ def test_the_first_effective_mode_has_five_percent(breadth, number):
     found = first_effective(model, af.dead_load(model))
     assert found.number == number
     assert found.modes.mass_ratios[0, 0] == pytest.approx(0.05, abs=0.0012)
+
+
+@pytest.mark.parametrize(
+    ("reached", "counts"), [(3, [3]), (4, [3, 6]), (10, [3, 6, 10]), (99, [3, 6, 10])]
+)
+def test_twice_as_many_modes_are_computed_until_they_have_the_share(
+    reached, counts, monkeypatch, caplog
+):
+    """Of a model with as many coordinates, whose modes have their share from some number on."""
+    asked = []
+
+    def modes(model, count, about):
+        asked.append(count)
+        ratios = np.zeros((count, 2))
+        ratios[min(reached, count) - 1, 0] = 0.91 if reached <= count else 0.5
+        return SimpleNamespace(mass_ratios=ratios, frequencies=1.0 + np.arange(count))
+
+    monkeypatch.setattr("archfem.dynamics.damping.modes", modes)
+    found, total = _modes_up_to(SimpleNamespace(size=50), None, 0.9, 3, 10)
+    assert asked == counts
+    assert len(total) == len(found.frequencies) == counts[-1]
+    assert bool(caplog.text) is (reached == 99)
+
+
+def test_four_modes_of_large_mass_are_named_in_their_order():
+    ratios = np.zeros((6, 2))
+    ratios[:, 0] = 0.3, 0.02, 0.25, 0.05, 0.2, 0.1
+    given = SimpleNamespace(mass_ratios=ratios, frequencies=np.arange(1.0, 7.0))
+    text = EffectiveRange(given, 1, 6).text
+    assert text.endswith(
+        "1 (1.00 Hz, 30.0 %), 3 (3.00 Hz, 25.0 %), 5 (5.00 Hz, 20.0 %), 6 (6.00 Hz, 10.0 %)"
+    )

@@ -47,3 +47,21 @@ def test_growth_of_a_difference_that_is_known(slender):
     found = parted(run, other)
     assert found.growth == pytest.approx(20.0, rel=0.01)
     assert found.until == pytest.approx(np.log(1e3) / 20.0, abs=0.006)
+
+
+@pytest.mark.parametrize(("share", "same"), [(0.98, True), (1.02, False)])
+def test_histories_are_the_same_to_a_millionth_of_the_largest_force(slender, share, same):
+    """Which any joint may exceed, to either side; growth is told from a hundred nudges on."""
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    run = af.time_history(slender, motion, dt=0.005, damping=DAMPED)
+    largest = np.abs(run.joints["N"].values).max()
+    off = np.zeros(run.joints["N"].shape)
+    off[50:100, 2] = 0.9e-8 * largest  # below a hundred times 1e-10: not told of
+    off[100:, 2] = 1.1e-8 * largest * np.exp(10.0 * (run.time[100:] - run.time[100]))
+    off[150:, 2] = -share * 1e-6 * largest
+    found = parted(run, af.History(run.dataset.assign(N=run.dataset["N"] + off)))
+    assert found.until == (np.inf if same else run.time[150])
+    assert found.difference == pytest.approx(share * 1e-6)
+    known = np.log(share * 1e-6 / 1.1e-8) / (run.time[150] - run.time[100])
+    assert found.growth == pytest.approx(known, rel=1e-4)
+    assert found.peaks == 0.0

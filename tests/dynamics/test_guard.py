@@ -117,3 +117,82 @@ def test_numbers_that_overflow_end_in_an_error(method):
     ):
         af.time_history(model, MOTION, start=state, method=method, scheme=scheme, dt=0.005)
     assert caught.value.history.outcome.startswith("failed at 0 s")
+
+
+def looked(model, q=None, energy=(0.0, 0.0, 0.0, 0.0), damps=False):
+    """A guard that has seen a step of a megajoule to some state, and energies beside it."""
+    q = np.zeros(model.size) if q is None else np.asarray(q, dtype=float)
+    state, rows = af.dynamics.State(0.0, q, *np.zeros((2, model.size))), np.array([energy])
+    none, one = np.zeros((1, len(model.structure.joints), 3)), np.array([1.0])
+    start = af.dynamics.Batch(one, none, 1 + 0 * one, one, np.zeros((1, 4)), lambda _: state)
+    guard = Guard(model, start, damps=damps)
+    seen = np.array([af.models.Gauges.on(model).read(q)])
+    guard.add(replace(start, energy=rows), seen)
+    return guard
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_drift_is_doubted_from_a_twentieth_on_and_wrong_from_a_half(stack, side):
+    """Two per cent to either side of each; kinetic energy is the largest exchanged."""
+    model = af.build(stack, fidelity="rigid")
+    for share, doubted in ((0.049, False), (0.051, True), (0.49, True)):
+        work, lost = (1e6 * (1.0 - share), 0.0) if side > 0.0 else (1e6, -1e6 * share)
+        guard = looked(model, energy=(1e6, 0.0, work, lost))
+        guard.judge()
+        assert guard.worst == pytest.approx(side * share)
+        assert bool(guard.doubts) is doubted
+    guard = looked(model, energy=(1e6, 0.0, *((0.49e6, 0.0) if side > 0.0 else (1e6, -0.51e6))))
+    with pytest.raises(af.DidNotConverge, match=r"51% of the energy had (come from|gone) nowhere"):
+        guard.judge()
+
+
+def test_turns_and_moves_are_doubted_where_they_are_no_longer_small(stack):
+    """A joint that turns by 0.01, blocks that move by a joint's depth, or by all their size."""
+    model = af.build(stack, fidelity="rigid")
+    size = model.structure.size
+    for turn, said in ((0.0098, []), (-0.0098, []), (0.0102, ["turn"]), (-0.0102, ["turn"])):
+        guard = looked(model, [0, 0, 0, 0, 0, turn])
+        guard.judge()
+        assert guard.largest_turn == pytest.approx(abs(turn))
+        assert ["turn" for words in guard.doubts if "a joint had turned by" in words] == said
+    for far, doubted in ((0.99, False), (1.01, True), (0.99 * size, True)):
+        guard = looked(model, [0, far, 0, 0, far, 0])
+        guard.judge()
+        assert guard.largest_displacement == pytest.approx(far)
+        assert any("more than a joint is deep, 1 m" in words for words in guard.doubts) is doubted
+    with pytest.raises(af.DidNotConverge, match="it has fallen apart"):
+        looked(model, [0, 1.01 * size, 0, 0, 1.01 * size, 0]).judge()
+
+
+@pytest.mark.parametrize(("slip", "doubted"), [(0.098, False), (0.102, True), (0.98, True)])
+def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, doubted):
+    model = af.build(stack, fidelity="rigid", displacements="large")
+    monkeypatch.setattr(type(model), "mismatch", lambda self, q: (slip, "joint 1"))
+    guard = looked(model)
+    guard.judge()
+    assert any("had slid by" in words and "'joint 1'" in words for words in guard.doubts) is doubted
+    monkeypatch.setattr(type(model), "mismatch", lambda self, q: (1.02, "joint 1"))
+    with pytest.raises(af.DidNotConverge, match=r"'joint 1' had slid by 1 of a facet"):
+        looked(model).judge()
+
+
+def test_between_looks_the_middles_of_blocks_are_watched(stack):
+    """Every 32nd step all points are looked at: the first, and the 33rd."""
+    model = af.build(stack, fidelity="rigid")
+    gauges, far = af.models.Gauges.on(model), np.array([0.0, 0.3, 0.0, 0.0, 0.4, 0.0])
+    guard = looked(model)
+    asked = []
+
+    def state(k):
+        asked.append(k)
+        return af.dynamics.State(0.0, np.zeros(model.size), *np.zeros((2, model.size)))
+
+    count = 40
+    none, times = np.zeros((count, len(stack.joints), 3)), np.arange(2.0, 2.0 + count)
+    rows = np.zeros((count, 4))
+    steps = af.dynamics.Batch(times, none, 0 * times, times, rows, state)
+    readings = np.array([gauges.read(k / (count - 1.0) * far) for k in range(count)])
+    guard.add(steps, readings)
+    assert guard.largest_displacement == pytest.approx(0.4)
+    assert asked[0] == 31  # the 33rd of all, since one had come before
+    assert set(asked[1:]) == {count - 1}

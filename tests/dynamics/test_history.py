@@ -130,3 +130,16 @@ def test_the_history_that_a_failure_carries(run):
     with pytest.raises(af.DidNotConverge, match="before the first step") as caught:
         history_of(early)
     assert caught.value is early
+
+
+@pytest.mark.parametrize(("held", "counts"), [(2, False), (9, False), (10, True)])
+def test_a_mechanism_counts_from_a_millisecond_on_and_is_known_before(ring, held, counts):
+    """Four joints that slide for some records of a tenth of a millisecond."""
+    resultants = np.zeros((40, 18, 3))
+    resultants[..., 0] = 1000.0
+    resultants[5 : 5 + held, [0, 6, 12, 17], 1] = 700.0
+    run = af.History(af.joints.joint_dataset(ring, resultants, 1e-4 * np.arange(40.0)))
+    assert run._first_of_any_duration["by count"].time == 5e-4
+    assert (run._first["by count"] is not None) is counts
+    longer = af.History(af.joints.joint_dataset(ring, resultants, 1e-3 * np.arange(40.0)))
+    assert longer._first_of_any_duration == longer._first

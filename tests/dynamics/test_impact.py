@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import archfem as af
-from archfem.dynamics.impact import restitution, restitution_damping
+from archfem.dynamics.impact import _Block, _slowed, restitution, restitution_damping
 from archfem.dynamics.stepping.choice import stepper_for
 from archfem.dynamics.stepping.equation import Equation
 
@@ -207,3 +207,72 @@ def test_blocks_that_cannot_be_meant(change, words):
     given = {"breadth": BREADTH, "height": HEIGHT, "contact": contact(), "material": STONE}
     with pytest.raises(af.InvalidInput, match=words):
         restitution_damping(0.95, **{**given, **change})
+
+
+def test_a_block_on_its_joint_by_closed_forms():
+    """Bounce, turning on the closed base, Housner's r, and the start on an edge that bears it."""
+    block = _Block(BREADTH, HEIGHT, contact(), STONE)
+    bounce = np.sqrt(1e9 / (WEIGHT / 9.81 * HEIGHT))
+    assert block.bounce == pytest.approx(bounce)
+    inertia = (BREADTH**2 + HEIGHT**2) / 3.0 * BREADTH * HEIGHT * WEIGHT / 9.81
+    turning = np.sqrt(1e9 * BREADTH**3 / 12.0 / inertia)
+    assert block.rocking == pytest.approx(turning / (2.0 * np.pi))
+    assert block.housner == pytest.approx(1.0 - 1.5 * np.sin(np.arctan(BREADTH / HEIGHT)) ** 2)
+    assert block.tilt == pytest.approx(0.5 * np.arctan(0.25))
+    lag = 2.0 * 0.3 / bounce
+    assert block.damping(0.3).stiffness == pytest.approx(lag)
+    weight = WEIGHT * BREADTH * HEIGHT
+    x, y, turn = block.tilted(weight)
+    ends = y + turn * np.array([-BREADTH / 2.0, BREADTH / 2.0])
+    assert x == pytest.approx(-turn * HEIGHT / 2.0)  # no slip at the base
+    assert turn == pytest.approx(-block.tilt)
+    assert pressed(*ends)[0] == pytest.approx(-weight / 1e9)
+
+
+@pytest.mark.parametrize(
+    ("given", "rocks"),
+    [
+        ({"height": 1.19 * BREADTH}, False),
+        ({"height": 1.21 * BREADTH}, True),
+        ({"contact": contact(friction=0.175)}, False),
+        ({"contact": contact(friction=0.178)}, True),
+    ],
+)
+def test_which_blocks_rock(given, rocks):
+    """1.2 times as high as broad; pushed by μ: 3/4 sin α cos α slides first (Housner's pivot)."""
+    whole = {"breadth": BREADTH, "height": HEIGHT, "contact": contact(), "material": STONE} | given
+    assert 0.175 < 0.75 * BREADTH * HEIGHT / (BREADTH**2 + HEIGHT**2) < 0.178
+    if rocks:
+        assert _Block(**whole).height == whole["height"]
+    else:
+        with pytest.raises(af.InvalidInput, match=r"does not rock|slides before"):
+            _Block(**whole)
+
+
+def test_turning_is_slowed_by_what_is_left_at_the_largest_tilts():
+    """Energies 1, 0.9 and 0.64 at the turning points: the fourth root of 0.64 an impact."""
+    angle = np.array([0.2, 0.3, 0.1, -0.1, -0.25, -0.1, 0.1, 0.2, 0.15])
+    energy = np.array([7.0, 1.0, 7.0, 7.0, 0.9, 7.0, 7.0, 0.64, 7.0])
+    assert _slowed(angle, energy) == pytest.approx(0.64**0.25)
+    assert _slowed(angle[:6], energy[:6]) == 0.0  # it came to rest before
+
+
+@pytest.mark.parametrize("size", [0.1, 10.0])
+def test_a_block_is_followed_for_two_impacts_and_a_half(size, monkeypatch):
+    """From tilt to level it takes √(2 θ I / M) under the moment M of its weight about the edge."""
+    asked = []
+
+    class Stepper:
+        @staticmethod
+        def batches(start, dt, end):
+            asked.append((dt, end))
+            return []
+
+    monkeypatch.setattr("archfem.dynamics.impact.stepper_for", lambda *_: Stepper)
+    block = _Block(size * BREADTH, size * HEIGHT, contact(), STONE)
+    assert block.restitution(None) == 0.0  # it never comes to an impact here
+    mass = WEIGHT / 9.81 * size**2 * BREADTH * HEIGHT
+    inertia = mass * size**2 * (BREADTH**2 + HEIGHT**2) / 3.0
+    swing = np.sqrt(2.0 * block.tilt * inertia / (mass * 9.81 * size * BREADTH / 2.0))
+    fine = 2.0 * np.pi / np.sqrt(1e9 / (WEIGHT / 9.81 * size * HEIGHT)) / 20.0
+    assert asked == [(pytest.approx(min(1e-3, fine)), pytest.approx(4.5 * swing))]

@@ -8,10 +8,13 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem.dynamics.collapse_scale import CollapseScale, collapse_scale
 from archfem.dynamics.scales import (
+    COLLAPSE,
     DEFINITIONS,
     MechanismScales,
     ScaledRun,
+    largest_scale,
     mechanism_scales,
     search,
 )
@@ -210,3 +213,53 @@ def test_refusals(on_piers, motion):
         mechanism_scales(on_piers, motion, precision=0.0)
     with pytest.raises(af.InvalidInput, match="the smaller first"):
         mechanism_scales(on_piers, motion, between=(2.0, 1.0))
+
+
+def test_a_search_makes_forty_runs_at_most():
+    found = searched({name: beyond(0.7) for name in DEFINITIONS}, precision=1e-12)
+    assert len(found.runs) == 40
+    assert found["verified"].lower < 0.7 <= found["verified"].upper
+
+
+def fallen(*scales):
+    """Runs at some scales, those of a negative one fallen."""
+    made = (af.dynamics.Fall("fallen" if s < 0 else "stands", {}, 0.1, None, True) for s in scales)
+    runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))
+    return MechanismScales((COLLAPSE,), tuple(runs))
+
+
+def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
+    found = CollapseScale({0.01: fallen(1.0, -2.0, 3.0, -4.0), 0.005: fallen(0.5, 1.5, -2.5, 2.7)})
+    assert (found.lower, found.upper) == (1.0, 2.5)
+    assert found.above == (2.7, 3.0)
+    assert found.bracket(0.005).upper == 2.5
+    never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
+    assert (never.lower, never.upper, never.above) == (1.0, inf, ())
+
+
+@pytest.mark.parametrize(
+    ("between", "limits"),
+    [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
+)
+def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, monkeypatch):
+    """Five g, of a motion of 20 m/s²; one scale where the least of those asked for is beyond."""
+    asked = []
+    monkeypatch.setattr(
+        "archfem.dynamics.collapse_scale.search",
+        lambda shaken, what, precision, found: asked.append(found),
+    )
+    block = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(block, fidelity="rigid", displacements="large")
+    strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
+    collapse_scale(model, strong, between=between)
+    assert asked == [pytest.approx(limits)] * 2
+
+
+def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
+    """However weak they are; one that is none may be multiplied by anything."""
+    weak, strong = np.array([0.0, 0.01, -0.02]), np.array([0.0, 0.03, -0.05])
+    five_g = 5.0 * 9.80665
+    assert largest_scale(af.Motion(weak, 0.01)) == pytest.approx(five_g / 0.02)
+    for others in ({"vertical": strong}, {"transverse": strong}):
+        assert largest_scale(af.Motion(weak, 0.01, **others)) == pytest.approx(five_g / 0.05)
+    assert largest_scale(af.Motion(0.0 * weak, 0.01)) == inf

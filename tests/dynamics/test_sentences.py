@@ -7,7 +7,7 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.sentences import extremes
+from archfem.dynamics.sentences import extremes, in_a_line
 from archfem.limit.episodes import episode
 
 
@@ -174,3 +174,9 @@ def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, m
     before = halted.time[len(halted.time) - len(held) - 1]
     assert held[-1] - before >= 1e-3 * (1.0 - 1e-6)
     assert len(held) == 1 or held[-2] - before < 1e-3
+
+
+def test_a_run_in_a_line(run):
+    largest = float(np.nanmax(np.abs(run.joints["eccentricity"].values)))
+    said = in_a_line(run.dataset)
+    assert f"{len(run.time)} records to {run.time[-1]:.4g} s, |e| ≤ {largest:.3f}; " in said

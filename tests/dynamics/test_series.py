@@ -3,8 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import archfem as af
+from archfem.dynamics.series import _kind, frames
+from archfem.models.exchange.solids import Solids
 
 h5py = pytest.importorskip("h5py")
 meshio = pytest.importorskip("meshio")
@@ -147,3 +150,35 @@ def test_what_cannot_be_written(run, tmp_path):
     other = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
     with pytest.raises(af.InvalidInput, match="the model has 3"):
         history.to_vtk(other, tmp_path / "run.pvd")
+
+
+def test_frames_of_a_fall_turn_blocks_about_their_centroids():
+    """Every point by a rotation of complex numbers; loose blocks bear nothing."""
+    ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=3)
+    model = af.build(ring, fidelity="full", cells=(2, 1))
+    poses = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(ring.blocks), 3))
+    run = xr.Dataset(
+        {
+            "q": (("frame", "n"), np.zeros((1, model.size))),
+            "fall_pose": (("fall_frame", "block", "pose"), poses),
+        },
+        {"frame_time": ("frame", [1.0]), "fall_time": ("fall_frame", [1.5, 1.52])},
+    )
+    solids = Solids(model)
+    shown = list(frames(solids, run))
+    assert [frame.time for frame in shown] == [1.0, 1.5, 1.52]
+    for frame, pose in zip(shown[1:], poses, strict=True):
+        for number, block in enumerate(ring.blocks):
+            own = solids.block == number
+            arm = (solids.places[own] - block.centroid) @ [1.0, 1.0j]
+            to = arm * np.exp(1j * pose[number, 2]) + block.centroid @ [1.0, 1.0j]
+            to += pose[number, :2] @ [1.0, 1.0j]
+            moved = (solids.places[own] + frame.moved[own]) @ [1.0, 1.0j]
+            assert moved == pytest.approx(to, abs=1e-12)
+        assert frame.stress.shape == shown[0].stress.shape
+        assert not frame.stress.any()
+
+
+def test_kinds_of_cells_are_those_of_xdmf():
+    """Its numbers of topologies: 4 a triangle, 5 a quadrilateral, 3 a polygon and its corners."""
+    assert [_kind(size) for size in (3, 4, 5, 17)] == [(4,), (5,), (3, 5), (3, 17)]

@@ -2,9 +2,11 @@
 
 import logging
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import archfem as af
 from archfem.dynamics.ladder import choose
@@ -104,3 +106,23 @@ def test_a_run_whose_joints_turn_is_doubted(caplog):
         run = af.time_history(model, motion, damping=usual_damping(model), dt=0.0025)
     assert float(np.abs(run.joints["rotation"]).max()) > 0.01
     assert "a joint had turned by" in caplog.text
+
+
+@pytest.mark.parametrize(("turn", "looks"), [(-0.98e-4, 1), (1.02e-4, 2)])
+def test_a_second_look_is_taken_from_a_tenth_of_a_milliradian_on(turn, looks, monkeypatch):
+    """Of the joint that turns most, either way; up to there 7 a radian is what it errs by."""
+    made = []
+
+    def shaken(model, motion, **given):
+        made.append(model)
+        rotation = xr.DataArray([[0.0, turn], [0.5 * turn, 0.0]])
+        e = 0.1 if len(made) == 1 else 0.13
+        return SimpleNamespace(joints={"rotation": rotation}, ended=None, peaks=np.array([e, 0.0]))
+
+    monkeypatch.setattr("archfem.dynamics.smallness.time_history", shaken)
+    monkeypatch.setattr("archfem.dynamics.smallness.peaks_of", lambda run: run.peaks)
+    model = af.build(COLUMN, fidelity="rigid")
+    motion = af.Motion(np.zeros(5), 0.01)
+    found = error_of_small(Yardstick(model, motion, None), STEPS)
+    assert found == pytest.approx(7.0 * abs(turn) if looks == 1 else 1.5 * 0.03)
+    assert [isinstance(each, Moving) for each in made] == [False, True][:looks]

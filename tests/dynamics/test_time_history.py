@@ -2,13 +2,15 @@
 
 import os
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.time_history import Record, last_state, time_history
+from archfem.dynamics.history import Ending
+from archfem.dynamics.time_history import Record, _reason, _steps, last_state, time_history
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -137,3 +139,45 @@ def test_refusals(model, motion):
         time_history(model, motion, dt=0.5)
     with pytest.raises(af.InvalidInput, match="record every = 0"):
         Record(every=0)
+
+
+def test_steps_are_those_asked_for_or_foreseen_or_chosen_by_a_tolerance(model):
+    """Between a microsecond and a tenth of a second; 0.005 of |e| where nothing is said."""
+    assert _steps(model, None, None) == (None, 0.005)
+    assert _steps(model, None, 0.02) == (None, 0.02)
+    for dt in (1.01e-6, 0.1):
+        assert _steps(model, dt, None) == (dt, 0.005)
+    for dt in (0.99e-6, 0.101):
+        with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
+            _steps(model, dt, None)
+    told = {"error": 0.0, "in_time": 0.0, "tolerance": 0.01, "considered": ()}
+    paced = model.predicted(af.models.Prediction(dt=None, pace=0.003, **told))
+    stepped = model.predicted(af.models.Prediction(dt=0.002, pace=None, **told))
+    assert _steps(paced, None, None) == (None, 0.003)
+    assert _steps(stepped, None, None) == (0.002, 0.005)
+    assert _steps(stepped, 0.004, None) == (0.004, 0.005)
+
+
+@pytest.mark.parametrize(
+    ("event", "parting", "said"),
+    [
+        (None, None, (Ending.FINISHED, None, 4)),
+        (2, None, (Ending.EVENT, "enough", 3)),
+        (2, 1, (Ending.PARTED, "the blocks coming loose: apart", 2)),
+        (2, 2, (Ending.EVENT, "enough", 3)),
+        (0, 3, (Ending.EVENT, "enough", 1)),
+        (None, 0, (Ending.PARTED, "the blocks coming loose: apart", 1)),
+    ],
+)
+def test_what_comes_first_ends_a_run_within_a_batch(event, parting, said):
+    """Each step has its length, the first from where the batch before ended."""
+    lengths = []
+
+    def watch(resultants, step):
+        lengths.append(step)
+        return "enough" if resultants == event else None
+
+    apart = SimpleNamespace(step=lambda batch: None if parting is None else (parting, "apart"))
+    batch = SimpleNamespace(times=np.array([1.1, 1.2, 1.4, 1.5]), resultants=[0, 1, 2, 3])
+    assert _reason((watch, apart), batch, 1.0) == said
+    assert lengths == pytest.approx([0.1, 0.1, 0.2, 0.1][: len(lengths)])

@@ -3,6 +3,7 @@
 import io
 import logging
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -81,3 +82,29 @@ def test_models_that_agree_promise_no_more_than_impacts_leave(pga, rocks, caplog
     assert ("impacts decide" in caplog.text) is rocks
     assert any("impacts decide" in words for words in model.doubts) is rocks
     assert told.of_chance > 0.002 if rocks else told.of_chance < 1e-4
+
+
+def test_motions_near_by_are_one_and_two_per_cent_weaker_and_stronger(monkeypatch):
+    """Each run is made once, and told of; steps half as long have a quarter of the tolerance."""
+    asked, told = [], []
+
+    def run(model, motion, *, damping, dt, tolerance, start):
+        asked.append((motion.pga, dt, tolerance))
+        return SimpleNamespace(joints={"rotation": np.array([0.1, -0.2])})
+
+    monkeypatch.setattr("archfem.dynamics.yardstick.time_history", run)
+    monkeypatch.setattr("archfem.dynamics.yardstick.peaks_of", lambda run: np.zeros(1))
+    monkeypatch.setattr("archfem.dynamics.yardstick.dead_load", lambda model: None)
+    motion = af.Motion(np.array([0.0, 1.0, 0.0]), 0.01)
+    measure = Yardstick("finest", motion, None, lambda: told.append(1))
+    for _ in range(2):
+        assert measure.by_chance("other", STEPS) == 0.0
+    assert sorted(pga for pga, *_ in asked) == pytest.approx([0.98, 0.99, 1.0, 1.01, 1.02])
+    assert len(told) == 5
+    measure.in_time(Steps(None, 0.004))
+    assert asked[5:] == [(1.0, None, 0.004), (1.0, None, 0.001)]
+    assert measure.turn(Steps(None, 0.004)) == 0.2
+    assert len(asked) == 7
+    assert Steps(0.01, None).halved == Steps(0.005, None)
+    assert Steps(0.01, None).label == "steps of 10 ms"
+    assert Steps(None, 0.004).label == "steps for 0.004 in |e|"

@@ -16,6 +16,7 @@ from archfem.joints.criteria import (
     flagged,
     judged,
     longest_duration,
+    ratio_at_sliding,
 )
 
 
@@ -192,3 +193,33 @@ def test_a_hinge_lies_within_its_joint(hinge):
 def test_criteria_that_cannot_be_meant(given):
     with pytest.raises(af.errors.InvalidInput, match=f"criteria {next(iter(given))}"):
         Criteria(**given)
+
+
+@pytest.mark.parametrize(("e", "face"), [(0.459, 0), (0.461, 1), (-0.459, 0), (-0.461, -1)])
+def test_a_joint_hinges_from_46_hundredths_on(ring, e, face):
+    resultants = np.zeros((18, 3))
+    resultants[:, 0], resultants[4, 2] = 1000.0, e * 1000.0 * 0.55
+    assert af.joints.joint_dataset(ring, resultants)["hinge"].values.tolist() == [
+        face if k == 4 else 0 for k in range(18)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("e", "closed"), [(0.0, 1.0), (1.0 / 6.0, 1.0), (-0.3, 0.6), (0.49, 0.03), (0.6, 0.0)]
+)
+def test_cohesion_holds_where_a_joint_is_closed(e, closed):
+    """μ N + c A with A = 3 (1/2 - |e|) h w of the middle third on; 1 % of cohesion is left out."""
+    normal, cohesion = np.array([2e3, 4e3, 0.0]), np.array([1e3, 0.0, 1e3])
+    found = ratio_at_sliding(normal, np.full(3, e), np.array([0.6, 0.5, 0.6]), cohesion)
+    assert found[:2] == pytest.approx([0.6 + 0.99 * closed * 0.5, 0.5], rel=1e-12)
+    assert np.isnan(found[2])
+
+
+def test_four_hinges_make_a_mechanism_and_three_do_not(ring):
+    assert (Criteria().failures, Criteria().duration) == (4, 1e-3)
+    resultants = np.zeros((18, 3))
+    resultants[:, 0] = 1000.0
+    for count in (3, 4):
+        resultants[:count, 1] = 700.0
+        found = af.limit.counted_mechanism(af.joints.joint_dataset(ring, resultants))
+        assert (found is not None) is (count == 4)

@@ -36,3 +36,18 @@ def test_a_joint_pressed_by_the_least_of_numbers_has_no_eccentricity():
         eccentricity, friction = ratios(resultants, np.array([0.4, 0.5]))
     assert np.isnan([eccentricity[0], friction[0]]).all()
     assert (eccentricity[1], friction[1]) == (0.1, 0.1)
+
+
+def test_faces_that_slid_are_judged_by_what_still_lies_on_the_other(ring):
+    """e is of the length h - |slip|, to either side; what has slid off has none."""
+    resultants = np.tile([1000.0, 0.0, 55.0], (18, 1))
+    faces = np.zeros((3, 18))
+    faces[2, :3] = 0.11, -0.275, 0.6
+    moved, built = (
+        af.joints.joint_dataset(ring, resultants, faces=faces, moved=each)["eccentricity"].values
+        for each in (True, False)
+    )
+    assert built == pytest.approx(0.1)
+    assert moved[:2] == pytest.approx([0.055 / 0.44, 0.055 / 0.275])
+    assert np.isnan(moved[2])
+    assert moved[3:] == pytest.approx(0.1)

@@ -9,6 +9,7 @@ import archfem as af
 from archfem.limit.counted import (
     counted_mechanism,
     counted_mechanisms,
+    counts_as_mechanism,
     definitions_met,
     demirel_aldemir_mechanism,
     mechanism_kind,
@@ -139,6 +140,20 @@ def test_what_is_shorter_than_a_mechanism_lasts_does_not_count_by_any_definition
     assert times(0.0) == {2e-4}
     assert times(1e-3) == times(1.1e-3) == {1.6e-3}
     assert times(1.2e-3) == {None}
+
+
+def test_as_many_fail_as_make_a_mechanism_from_four_on(ring):
+    """Over time, three, four and five that slide; of some other number as the criteria say."""
+    resultants = np.zeros((3, 18, 3))
+    resultants[..., 0] = 1000.0
+    for step, count in enumerate((3, 4, 5)):
+        resultants[step, :count, 1] = 700.0
+    joints = af.joints.joint_dataset(ring, resultants, np.arange(3.0))
+    assert counts_as_mechanism(joints).values.tolist() == [False, True, True]
+    strict = af.joints.joint_dataset(
+        ring, resultants, np.arange(3.0), criteria=af.Criteria(failures=5)
+    )
+    assert counts_as_mechanism(strict).values.tolist() == [False, False, True]
 
 
 def test_definitions_are_met_at_an_instant_where_counting_finds_a_mechanism():

@@ -1,10 +1,13 @@
 """A vehicle over a bridge: each place against the collapse of its axles there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from backfilled import SOIL, arch_bridge, fill_of
 
 import archfem as af
+from archfem.limit.moving import _without_dilatancy
 from archfem.limit.programme import Programme
 
 EXACT = 1e-6
@@ -207,3 +210,32 @@ def test_what_cannot_be_meant_is_refused(given, says):
     options = {"structure": arch_bridge(), "axles": 1e5, "fill": GRAVEL} | given
     with pytest.raises(af.InvalidInput, match=says):
         af.moving_load(**options)
+
+
+def test_of_what_is_found_at_a_place_the_weakest_is_kept(monkeypatch):
+    """There and back again: each search begins with what was found beside it just before."""
+    values, asked = iter([0.1, 0.3, None, None, 0.2, 0.4]), []
+
+    def weakest_from(programme, starts):
+        asked.append((programme, list(starts)))
+        value = next(values)
+        return None if value is None else SimpleNamespace(value=value, forces=f"{value}")
+
+    def some_starts(programme, start, number, seed):
+        return [f"{start} {number} {seed}"]
+
+    monkeypatch.setattr("archfem.limit.moving.weakest_from", weakest_from)
+    monkeypatch.setattr("archfem.limit.moving.some_starts", some_starts)
+    felt = {"a": 1, "b": 2, "c": 3}
+    found = _without_dilatancy(felt, {"a": "at a", "b": "at b", "c": "at c"})
+    assert {row: state and state.value for row, state in found.items()} == {
+        **{"a": 0.4, "b": 0.3, "c": None}
+    }
+    assert asked == [
+        (1, ["at a 2 0"]),
+        (2, ["0.1", "at b 2 1"]),
+        (3, ["0.3", "at c 2 2"]),
+        (3, []),
+        (2, []),
+        (1, ["0.3"]),
+    ]

@@ -5,6 +5,8 @@ import pytest
 from mechanisms import WEIGHT, beside, filled, piers
 
 import archfem as af
+from archfem.limit.blocks import RigidBlocks
+from archfem.limit.screen import Screen
 
 
 def random_state(structure, rng):
@@ -38,3 +40,28 @@ def test_loops_rule_out_only_what_the_programme_rules_out(structure):
     assert agreed[True] > 10
     assert agreed[False] > 10
     assert sum(agreed.values()) >= 59  # hinges almost in a line are left to the programme
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("wall", "moves"), [((1.0, 1.0), True), ((0.0, 0.0), False)])
+def test_a_block_on_ice_slides_away_from_a_wall(side, wall, moves):
+    """Its bed lets it slide either way, and a wall beside it open: it goes away from the wall."""
+
+    def box(x, y, name, fixed=False):
+        corners = ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))
+        return af.Block(corners, af.STONE, name, fixed, part="pier", role="pier")
+
+    beside = (1.0, 1.5) if side > 0.0 else (-1.5, -1.0)
+    blocks = (
+        box((-1.5, 1.5), (-0.5, 0.0), "ground", True),
+        box((-1.0, 1.0), (0.0, 1.0), "block"),
+        box(beside, (0.0, 1.0), "wall", True),
+    )
+    contact, x = af.masonry.STONE_TO_STONE, side * 1.0
+    joints = (
+        af.Joint((0, 1), (-1.0, 0.0), (1.0, 0.0), contact, "bed", "pier", "pier"),
+        af.Joint((1, 2), (x, 0.0), (x, 1.0), contact, "side", "pier", "pier"),
+    )
+    screen = Screen(RigidBlocks(af.Structure(blocks, joints)), ("pier",))
+    freedoms = np.array([0.0, wall[0], 0.0, wall[1], 2.0, 0.0])  # openings at both ends, slips
+    assert screen.permit(freedoms) is moves

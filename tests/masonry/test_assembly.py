@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.assembly import assembled, by_materials, touching
+from archfem.masonry.assembly import _turned, assembled, by_materials, touching
 
 EXACT = 1e-12
 """Ends are corners of the blocks, to round-off of coordinates of a few metres."""
@@ -222,3 +222,14 @@ def test_contacts_by_materials():
         of(stone, brick)
     with pytest.raises(af.errors.InvalidInput, match="'stone' is no pair"):
         by_materials(af.masonry.STONE_TO_STONE, {"stone": af.masonry.STONE_TO_STONE})
+
+
+@pytest.mark.parametrize(
+    ("step", "first"),
+    [((0.09, -1.0), 1), ((0.11, -1.0), 0), ((-0.09, 1.0), 0), ((-0.11, 1.0), 1), ((1.0, 0.0), 0)],
+)
+def test_a_line_begins_on_the_left_or_where_it_stands_at_its_foot(step, first):
+    """It stands up to a tenth off the vertical."""
+    line = np.array([[2.0, 3.0], [2.0 + step[0], 3.0 + step[1]]])
+    assert _turned(line)[0].tolist() == line[first].tolist()
+    assert _turned(line[::-1])[0].tolist() == line[first].tolist()

@@ -352,3 +352,21 @@ def test_gravity_width_and_material_are_passed_on():
 def test_parts_that_do_not_go_together(change, says):
     with pytest.raises(af.errors.InvalidStructure, match=says):
         af.bridge(**PAIR | change)
+
+
+@pytest.mark.parametrize(("cover", "fits"), [(0.0205, True), (0.0195, False)])
+def test_fill_is_two_centimetres_thick_at_least(cover, fits):
+    fill = {"arches": [ARCH], "backfill": af.shapes.Backfill(cover=cover)}
+    if fits:
+        assert "backfill" in [block.name for block in af.bridge(**fill).blocks]
+    else:
+        with pytest.raises(af.errors.InvalidStructure, match=r"the fill is 0\.0[12]\d m above"):
+            af.bridge(**fill)
+
+
+def test_foundations_are_twenty_centimetres_deep():
+    pier = af.shapes.Pier(name="pier", gap=0.9, height=2.4)
+    made = af.bridge(**PAIR | {"piers": [pier]}, sidewalls=walls())
+    low = [b.points[:, 1] for b in made.blocks if b.fixed and "foundation" in b.name]
+    assert len(low) >= 3
+    assert [float(np.ptp(y)) for y in low] == pytest.approx([0.2] * len(low))

@@ -161,3 +161,53 @@ def test_a_semicircle_by_any_shape_has_its_least_thickness(shape):
 def test_what_is_no_arch_is_refused(make, says):
     with pytest.raises((af.InvalidStructure, af.InvalidInput), match=says):
         make()
+
+
+LENGTHS = {"span": 4.0, "thickness": 0.5, "voussoirs": 5}
+RINGS = {
+    "pointed": lambda n: shapes.pointed_arch(rise=3.0, chords=n, **LENGTHS),
+    "elliptical": lambda n: shapes.elliptical_arch(rise=1.5, chords=n, **LENGTHS),
+    "flat": lambda n: shapes.flat_arch(skewback=20.0, **LENGTHS),
+    "along": lambda n: shapes.arch_along(
+        [(-2.0, 0.0), (-1.0, 1.2), (0.0, 1.6), (1.0, 1.2), (2.0, 0.0)],
+        thickness=0.5, voussoirs=5, chords=n,
+    ),
+    "circular": lambda n: shapes.circular_arch(
+        radius=2.0, thickness=0.5, embrace=150.0, voussoirs=5, chords=n
+    ),
+    "sectors": lambda n: shapes.circular_arch(
+        radius=2.0, thickness=0.5, embrace=150.0, voussoirs=5
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("chords", [1, 2, 3])
+@pytest.mark.parametrize("kind", RINGS)
+def test_corners_of_stones_are_the_ends_of_their_joints(kind, chords):
+    """The first and third side along the faces, the others on the joints; anticlockwise."""
+    ring = RINGS[kind](chords)
+    for number in ring.free:
+        block = ring.blocks[number]
+        a, b, c, d = block.points[list(block.corners)]
+        own = [joint for joint in ring.joints if number in joint.blocks]
+        found = {frozenset(map(tuple, joint.ends.round(9).tolist())) for joint in own}
+        beds = {frozenset(map(tuple, np.round(each, 9).tolist())) for each in ([b, c], [d, a])}
+        assert found == beds
+        least = 4 if kind in ("flat", "sectors") else 2 * (chords + 1)
+        assert len(block.outline) == least or kind == "pointed"  # its keystone has more
+        turn = (b - a)[0] * (c - b)[1] - (b - a)[1] * (c - b)[0]
+        assert turn > 0.0
+
+
+@pytest.mark.parametrize("kind", RINGS)
+def test_abutments_lie_behind_the_springings(kind):
+    """Half as deep as the first joint, and as broad as theirs."""
+    ring = RINGS[kind](2)
+    deep = 0.5 * ring.depths[0]
+    for joint, name in ((ring.joints[0], "left abutment"), (ring.joints[-1], "right abutment")):
+        block = ring.blocks[ring.block_number(name)]
+        normal = np.array([-joint.tangent[1], joint.tangent[0]])
+        off = (block.points - joint.middle) @ normal
+        assert np.ptp(off) == pytest.approx(deep)
+        assert np.abs(off).min() == pytest.approx(0.0, abs=1e-9)
+        assert block.area == pytest.approx(deep * joint.depth)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.direction import Direction, directions_of
+from archfem.masonry.direction import Direction, _through, directions_of
 
 
 def lines(structure):
@@ -37,3 +37,24 @@ def test_what_lies_straight_runs_to_the_right_and_points_upwards():
     assert way.outward(np.array([3.0, 1.0])).tolist() == [0.0, 1.0]
     assert way.along(np.array([3.0, 1.0])) == 3.0
     assert way.separates(np.array([[1.0, 0.0], [1.2, 0.5]]))
+
+
+@pytest.mark.parametrize(("spread", "straight"), [(0.0049, True), (0.0051, False)])
+@pytest.mark.parametrize("upright", [False, True])
+def test_a_row_is_straight_up_to_a_spread_of_five_thousandths(spread, straight, upright):
+    """Four stones on a cross, whose spread is that of its arms; a pier is straight whatever."""
+    places = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, spread], [0.0, -spread]])
+    places = places[:, ::-1] if upright else places
+    way = _through(places, "ring")
+    assert (way.centre is None) is straight
+    assert way.upright is upright
+    assert _through(places, "pier").centre is None
+
+
+def test_a_ring_of_few_stones_is_found_from_them_too():
+    """Of two stones one joint lies between: a circle through its middle and both centroids."""
+    ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=90.0, voussoirs=2)
+    way = directions_of(ring.blocks, lines(ring))["arch"]
+    x, y = max((block.centroid for block in ring.blocks if not block.fixed), key=lambda c: c[0])
+    assert way.centre == pytest.approx([0.0, 0.5 * (4.0 - y**2 - x**2) / (2.0 - y)], abs=1e-9)
+    assert way.middle == pytest.approx([0.0, (2.0 + 2.0 * y) / 3.0])

@@ -7,6 +7,7 @@ import pytest
 from drawn import assert_same, dxf, geojson, layers_of, square
 
 import archfem as af
+from archfem.masonry.survey.drawings import outlines_in
 
 
 @pytest.mark.parametrize(
@@ -133,3 +134,28 @@ def test_dxf_without_a_unit(tmp_path, stack):
     path = dxf(tmp_path / "none.dxf", stack, units=0)
     with pytest.raises(af.errors.InvalidInput, match=r"does not say its unit \(\$INSUNITS\)"):
         af.read_outlines(path)
+
+
+@pytest.mark.parametrize(
+    ("size", "sound"), [(0.0205, True), (0.0195, False), (19.5, True), (20.5, False)]
+)
+def test_a_block_is_between_two_centimetres_and_twenty_metres_large(tmp_path, size, sound):
+    """Its diagonal, of half of all blocks: of three here two count."""
+    edge = size / 2**0.5
+    outlines = {"a": square(0, 0, edge), "b": square(0, edge, edge), "c": square(edge, 0, 0.1)}
+    path = geojson(tmp_path / "any.geojson", outlines)
+    if sound:
+        assert len(outlines_in(path)) == 3
+    else:
+        with pytest.raises(af.InvalidInput, match=f"typically {size:.3g} m large: give the unit"):
+            outlines_in(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"), [((179.9, 89.9), True), ((180.1, 0), False), ((0, 90.1), False)]
+)
+def test_small_blocks_within_the_globe_may_be_in_degrees(tmp_path, place, said):
+    path = geojson(tmp_path / "any.geojson", {"a": square(*place, 1e-5)})
+    with pytest.raises(af.InvalidInput) as caught:
+        outlines_in(path)
+    assert ("degrees (CRS84)" in str(caught.value)) is said

@@ -4,9 +4,10 @@ from math import radians, sqrt, tan
 
 import numpy as np
 import pytest
+import shapely
 
 import archfem as af
-from archfem.masonry.fill import jointed_fill
+from archfem.masonry.fill import RADIUS, SLIVER, _incentre, _merged, _Piece, _tiling, jointed_fill
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
 from archfem.masonry.softness import soft_blocks, yielding_blocks
 from archfem.statics.pushover import Stop
@@ -257,3 +258,40 @@ def test_fill_is_cut_once():
     cut = smooth_box(30.0, 1)
     with pytest.raises(af.InvalidInput, match="into pieces already"):
         jointed_fill(cut, 0.5, angle=30.0)
+
+
+def test_pieces_are_halves_of_equilateral_triangles():
+    """Sides of 1, √3/2 and 1/2 of the longest; the circle in one touches all three."""
+    size = 0.8
+    pieces = list(_tiling(np.zeros(2), np.array([3.0, 1.2]), 1.5, size))
+    for corners in pieces:
+        sides = np.roll(corners, -1, axis=0) - corners
+        lengths = np.linalg.norm(sides, axis=1)
+        assert sorted(lengths) == pytest.approx([0.4, 0.4 * sqrt(3.0), 0.8])
+        arm = np.array(_incentre(corners)) - corners
+        away = (sides[:, 0] * arm[:, 1] - sides[:, 1] * arm[:, 0]) / lengths
+        assert away == pytest.approx(RADIUS * size)
+    whole = np.concatenate(pieces)
+    assert whole[:, 1].min() == 0.0
+    assert whole[:, 1].max() == pytest.approx(1.2)
+    assert whole[:, 0].min() <= 0.0
+    assert whole[:, 0].max() >= 3.0
+    assert np.abs(whole[:, 0] - 1.5).min() < 1e-12  # an upright line through the middle
+
+
+@pytest.mark.parametrize(("part", "pieces"), [(0.29, 1), (0.31, 2)])
+def test_slivers_are_joined_to_their_neighbour(part, pieces):
+    """Of three tenths of a whole piece on."""
+    least = SLIVER * 1.0
+    whole = shapely.box(0.0, 0.0, 1.0, 1.0)
+    rest = shapely.box(1.0, 0.0, 1.0 + part, 1.0)
+    found = _merged([_Piece(whole, (0.5, 0.5)), _Piece(rest, (1.5, 0.5))], least, 1e-9)
+    assert len(found) == pieces
+    assert sum(each.polygon.area for each in found) == pytest.approx(1.0 + part)
+
+
+def test_pieces_are_a_thousand_times_as_stiff_as_what_they_stand_for():
+    slick = af.Contact(1e13, 1e13, 0.0)
+    fill = jointed_fill(box(3.0, slick, slick), 1.0, angle=30.0)
+    young = {block.material.young for block in fill.blocks if block.grain}
+    assert [*young] == [pytest.approx(6.25e9)]

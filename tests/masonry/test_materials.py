@@ -42,5 +42,38 @@ def test_presets_are_those_of_table_2():
         assert contact.shear_stiffness == pytest.approx(1e9 * shear)
         assert contact.friction == 0.60
     stone, backfill = af.STONE, BACKFILL
+    assert (stone.young, stone.poisson, stone.unit_weight, stone.strength) == (
+        3e10,
+        0.2,
+        2e4,
+        5.6e7,
+    )
     assert (backfill.young, backfill.poisson, backfill.unit_weight) == (6.25e6, 0.2, 18e3)
-    assert backfill.young < 1e-3 * stone.young
+    assert backfill.strength is None
+
+
+BOUNDS = [
+    (lambda x: af.Material(x, 0.2, 2e4), 1e3, 1e13),
+    (lambda x: af.Material(3e10, x, 2e4), -1.0, 0.5),
+    (lambda x: af.Material(3e10, 0.2, x), 1e-3, 1000.0),
+    (lambda x: af.Material(3e10, 0.2, x), 4000.0, 250e3),
+    (lambda x: af.Material(3e10, 0.2, 2e4, x), 1e3, None),
+    (lambda x: af.Contact(x, 3e8), 1e3, 1e16),
+    (lambda x: af.Contact(1.48e9, x), 1e3, 1e16),
+    (lambda x: af.Contact(1.48e9, 3e8, x), 0.0, 10.0),
+    (lambda x: af.Contact(1.48e9, 3e8, 0.6, cohesion=x), 0.0, 1e9),
+    (lambda x: af.Contact(1.48e9, 3e8, 0.6, dilatancy=x), 0.0, 0.6),
+    (lambda x: af.Contact(1.48e9, 3e8, None, tension=x), 0.0, 1e9),
+    (lambda x: af.Contact(1.48e9, 3e8, 0.5, cohesion=1e6, tension=x), 0.0, 2e6),
+]
+
+
+@pytest.mark.parametrize(("make", "least", "most"), BOUNDS)
+def test_what_can_be_meant_ends_where_it_is_said_to(make, least, most):
+    """By a hundredth to either side of each bound, and of zero by as little as is told from it."""
+    for bound, outward in ((least, -1.0), (most, 1.0)):
+        if bound is not None:
+            step = 0.01 * abs(bound) or 1e-9
+            make(bound - outward * step)
+            with pytest.raises(af.InvalidInput):
+                make(bound + outward * step)

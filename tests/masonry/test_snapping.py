@@ -7,6 +7,7 @@ import pytest
 from drawn import assert_same, geojson, square
 
 import archfem as af
+from archfem.masonry.survey.snapping import _area
 
 
 @pytest.mark.parametrize(("error", "snap"), [(0.5e-3, 2e-3), (2e-3, 8e-3), (8e-3, 0.03)])
@@ -91,3 +92,47 @@ def test_gaps_that_are_meant_are_left(tmp_path):
     )
     names = [joint.name for joint in af.masonry.surveyed(path).joints]
     assert names == ["rock to a", "rock to b", "rock to c"]
+
+
+@pytest.mark.parametrize(("gap", "meant"), [(4.9e-3, False), (5.1e-3, True)])
+def test_a_gap_is_meant_from_five_times_the_tolerance_on(tmp_path, gap, meant):
+    """Two stones side by side on a rock, and along how much of an edge they may touch it."""
+    rock = [[0, -1], [4, -1], [4, 0], [0, 0]]
+    apart = geojson(
+        tmp_path / "gap.geojson", {"rock": rock, "a": square(0, 0), "b": square(1 + gap, 0)}
+    )
+    short = geojson(
+        tmp_path / "short.geojson",
+        {"rock": rock, "a": [[4 - gap, 0], [5, 0], [5, 1], [4 - gap, 1]]},
+    )
+    if meant:
+        assert len(af.masonry.surveyed(apart).joints) == 2
+        assert af.masonry.surveyed(short).joints[0].depth == pytest.approx(gap)
+    else:
+        with pytest.raises(af.errors.InvalidStructure, match=r"'b' are 4.9 mm apart"):
+            af.masonry.surveyed(apart)
+        with pytest.raises(af.errors.InvalidStructure, match=r"touch along 4.9 mm only"):
+            af.masonry.surveyed(short)
+
+
+@pytest.mark.parametrize(("step", "refused"), [(0.95e-3, True), (0.75e-3, False)])
+def test_vertices_move_by_twice_the_tolerance_at_most(tmp_path, step, refused):
+    """Six in a row become one in their middle, two and a half steps from the ends."""
+    row = [[step * k, 0.0] for k in range(6)]
+    path = geojson(tmp_path / "row.geojson", {"a": [*row, [1, 0], [1, 1], [0, 1]]})
+    if refused:
+        words = r"vertex of 'a' at .* would move by 2.38 mm"
+        with pytest.raises(af.errors.InvalidStructure, match=words):
+            af.read_outlines(path)
+    else:
+        assert af.read_outlines(path).moved == pytest.approx(2.5 * step)
+
+
+def test_areas_have_the_sense_of_their_outline():
+    """Of a triangle, a square and an angle, wherever they are, by Green's theorem by hand."""
+    angle = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]], float)
+    outlines = {4.5: [[0, 0], [3, 0], [1, 3]], 1.0: square(0, 0), 4.0: angle}
+    for area, outline in outlines.items():
+        points = np.array(outline, float) + np.array([100.0, -50.0])
+        assert _area(points) == pytest.approx(area)
+        assert _area(points[::-1]) == pytest.approx(-area)

@@ -38,3 +38,20 @@ def test_a_ring_never_yields_however_soft():
     ring = af.circular_arch(radius=3, thickness=0.5, embrace=120, voussoirs=9, material=pulp)
     assert len(soft_blocks(ring)) == 9
     assert yielding_blocks(ring) == ()
+
+
+@pytest.mark.parametrize(("young", "soft", "yields"), [(1.04, False, False), (0.96, True, True)])
+def test_from_where_a_block_counts_as_soft(young, soft, yields):
+    """Its first mode at ten times 25 Hz, and E / L at k_n, each met to 4 % of Young's modulus."""
+    edge = 1.0
+    shear = (250.0 * 2.0 * edge) ** 2 * 2e4 / 9.81  # c_s / (2 L) = 250 Hz
+    tuned = af.Material(young * 2.4 * shear, 0.2, 2e4)
+    shape = af.column(breadth=edge, heights=[edge], material=tuned)
+    assert soft_blocks(shape) == ((1,) if soft else ())
+    as_stiff = af.Material(young * 1.48e9 * edge, 0.2, 2e4)
+    fill = replace(af.column(breadth=edge, heights=[edge]).blocks[1], material=as_stiff)
+    shape = af.column(breadth=edge, heights=[edge])
+    blocks = tuple(replace(each, role="other") for each in (shape.blocks[0], fill))
+    joints = tuple(replace(each, role="other") for each in shape.joints)
+    other = replace(shape, blocks=blocks, joints=joints)
+    assert yielding_blocks(other) == ((1,) if yields else ())

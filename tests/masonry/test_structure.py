@@ -96,3 +96,33 @@ def test_a_material_or_contact_by_name_is_refused():
         af.column(breadth=1.0, heights=[1.0], material="stone")
     with pytest.raises(af.InvalidInput, match="contact = 'stone to stone' is a str: give Contact"):
         af.column(breadth=1.0, heights=[1.0], contact="stone to stone")
+
+
+def test_a_structure_in_a_line():
+    """Its diagonal is that of 1 m by 3.2 m, its support included; 3 m³ weigh 60 kN."""
+    tower = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0])
+    assert repr(tower) == (
+        "Structure 'column': 3 blocks that move, 1 fixed, 3 joints; "
+        f"size {np.hypot(1.0, 3.2):.3g} m, width 1 m, weight 60 kN"
+    )
+
+
+def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
+    """Of the lower of two blocks the height; loads and names do not matter."""
+
+    def pair(height, zero=0.0, **more):
+        boxes = {"base": (zero, 3.0, -1.0, zero), "tall": (0, 1, 0, 3), "low": (2, 3, 0, height)}
+        blocks = [
+            af.Block(((x, y), (r, y), (r, top), (x, top)), af.STONE, name, name == "base")
+            for name, (x, r, y, top) in boxes.items()
+        ]
+        return af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE, **more)
+
+    told, size = pair(1.0).fingerprint, 5.0
+    assert pair(1.0).size == size
+    assert pair(1.0 + 3e-10 * size).fingerprint == told
+    assert pair(1.0 + 1e-9 * size).fingerprint != told
+    assert pair(1.0, name="another", gravity=5.0).fingerprint == told
+    assert pair(1.0, zero=-0.0).fingerprint == told
+    assert pair(1.0, width=1.0 + 2e-9).fingerprint == told
+    assert pair(1.0, width=1.0 + 2e-8).fingerprint != told

@@ -150,3 +150,18 @@ def test_check_command(capsys):
     assert "51 blocks, 89 joints" in capsys.readouterr().out
     assert main(["check", str(SHIPPED), *changes, "--set", "structure.snap=1 mm"]) == 1
     assert "raise snap if the survey is rougher" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("turn", "bend", "four"),
+    [(44.0, 0.0, False), (46.0, 0.0, True), (90, 9.0, True), (90, 11.0, False)],
+)
+def test_corners_turn_by_45_degrees_and_what_is_none_by_less_than_ten(tmp_path, turn, bend, four):
+    """A rhombus of that turn at two of its vertices, one of whose sides bends in its middle."""
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    off = 0.5 * np.tan(np.radians(bend / 2.0))
+    outline = [[0, 0], [1, 0], [1 + c, s], [c, s]]
+    outline = [outline[0], [0.5, -off], *outline[1:]] if bend else outline
+    path = geojson(tmp_path / "any.geojson", {"a": outline})
+    (block,) = af.read_outlines(path).blocks
+    assert (block.corners is not None) is four

@@ -1,9 +1,12 @@
 """A user's own tagged mesh as a survey, and what is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.masonry.survey import survey
 from archfem.masonry.survey.tagged import part_of, physical_surfaces
 
 gmsh = pytest.importorskip("gmsh")
@@ -111,3 +114,21 @@ def test_edges_of_a_mesh_follow_an_arc(tmp_path):
     assert [joint.name for joint in again.joints] == [joint.name for joint in ring.joints]
     turn = np.radians(150.0) / 3 / 4
     assert again.weight == pytest.approx(ring.weight * np.sin(turn) / turn, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ends", "off", "named"),
+    [
+        ((-0.49, 0.49), 0.0, True),
+        ((-0.49, 0.51), 0.0, False),
+        ((-0.51, 0.1), 0.0, False),
+        ((0.2, 0.3), 1e-5, False),
+        ((0.2, 0.3), 1e-7, True),
+    ],
+)
+def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, ends, off, named):
+    """Told by the middles of its edges: all between the joint's ends, and none beside it."""
+    middles = np.array([[x, 1.0 + off] for x in ends])
+    monkeypatch.setattr(survey, "physical_curves", lambda path, factor: [("mine", middles)])
+    found = survey._named_by_curves(stack, Path("any.msh"), None)
+    assert [joint.name == "mine" for joint in found.joints] == [False, named]

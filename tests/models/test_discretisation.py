@@ -69,3 +69,10 @@ def test_a_case_that_leaves_the_choice_may_still_say_its_mesh():
     case = af.Case.read(BRIDGE, ["model.cells=[2, 2]"])
     assert case.model["fidelity"] == "auto"
     assert case.discretisation == Discretisation(cells=(2, 2))
+
+
+def test_a_thousand_cells_may_be_meant():
+    assert af.models.Discretisation(cells=(1000, 1000)).through == 1000
+    for cells in ((1001, 1), (1, 1001), (0, 1)):
+        with pytest.raises(af.InvalidInput, match="cells"):
+            af.models.Discretisation(cells=cells)

@@ -1,10 +1,15 @@
 """Into how many cells edges are cut: alike on both sides, and dealt evenly."""
 
+from itertools import pairwise
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import archfem as af
-from archfem.models.fem.division import divided
+from archfem.models.fem.division import Sizes, _check_room, _graded, _wanted, divided
+from archfem.models.fem.edges import edges_of
 
 
 def one_arch(**parts):
@@ -48,3 +53,103 @@ def test_cells_forced_by_another_side_are_dealt_evenly():
     faces = division.edges.sides[keystone]
     found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
     assert sorted(found) == [[2], [2], [2, 2, 2], [2, 2, 2]]
+
+
+def slab(length, height=1.0, corners=(1, 2, 3, 0)):
+    """A slab on a support as long."""
+    outline = ((0.0, 0.0), (length, 0.0), (length, height), (0.0, height))
+    below = ((0.0, -0.5), (length, -0.5), (length, 0.0), (0.0, 0.0))
+    given = {"part": "wall", "role": "pier"}
+    base = af.Block(below, af.STONE, "base", True, corners=(1, 2, 3, 0), **given)
+    made = af.Block(outline, af.STONE, "slab", corners=corners, **given)
+    contact = af.masonry.STONE_TO_STONE
+    return af.Structure((base, made), (af.Joint((0, 1), *outline[:2], contact, "bed", **given),))
+
+
+@pytest.mark.parametrize(
+    ("length", "along"), [(3.9, 2), (4.0, 2), (4.0 + 1.5e-6, 2), (4.1, 3), (0.24, 1), (6.1, 4)]
+)
+def test_cells_are_twice_as_long_as_a_stone_is_thick_at_most(length, along):
+    """Of a slab a metre high, one cell through its thickness: a millionth of a cell makes none.
+
+    Where it is less than half a metre long, it is its height that is cut: at 0.24 m by three.
+    """
+    edges = edges_of(slab(length), [1, 1])
+    asked = af.models.Discretisation(cells=(1, 1))
+    wanted = _wanted(edges, 1, asked)
+    assert sorted(wanted) == sorted([along, 1] if length > 0.5 else [1, 3])
+    assert _wanted(edges, 0, asked) == [1, 1]  # a support does not deform
+    assert sorted(_wanted(edges, 1, af.models.Discretisation(cells=(5, 7)))) == [5, 7]
+
+
+def test_a_mesh_has_a_million_cells_at_most():
+    """Those of the slab, and of its support, which has one along; free ones by their size."""
+    edges = edges_of(slab(2.0), [1, 1])
+    _check_room(edges, af.models.Discretisation(cells=(1000, 999)))
+    with pytest.raises(af.errors.MeshError, match=r"a mesh of 1e.06 cells, and there is room for"):
+        _check_room(edges, af.models.Discretisation(cells=(1000, 1000)))
+    free = edges_of(slab(2.0, corners=None), [1, 1])
+    for size, fits in ((0.0014144, True), (0.0014140, False)):
+        asked = af.models.Discretisation(cells=(1, 1), coarse=size)
+        if fits:
+            _check_room(free, asked)
+        else:
+            with pytest.raises(af.errors.MeshError, match="a mesh of 1e"):
+                _check_room(free, asked)
+
+
+def test_cells_grow_with_the_distance_from_fine_ones():
+    """By 0.35 of the distance from the end of the nearest, up to the largest size."""
+    sizes = Sizes(np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.2, 0.4]), 1.0)
+    places = np.array([[0.05, 0.0], [0.1, 0.0], [1.1, 0.0], [9.0, 0.0], [5.0, 0.0], [0.0, -1.1]])
+    known = [0.2, 0.2, 0.2 + 0.35, 0.4 + 0.35 * 0.8, 1.0, 0.2 + 0.35]
+    assert sizes.at(places) == pytest.approx(known)
+
+
+def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
+    """∫ ds over the size, by SciPy; the largest is half of the mean thickness, A / P."""
+    structure = slab(3.0, 2.0, corners=None)
+    asked = af.models.Discretisation(cells=(8, 1), cell="triangle")
+    made = divided(structure, asked)
+    edges, size = made.edges, made.sizes[1]
+    assert size.coarse == pytest.approx(6.0 / 10.0)
+    assert size.lengths == pytest.approx(3.0 / 8.0)
+    assert sorted(size.middles[:, 0]) == pytest.approx(3.0 * (np.arange(8) + 0.5) / 8.0)
+    for edge in edges.around[1]:
+        ends = edges.points[edges.ends[edge]]
+        if (ends[:, 1] == 0.0).all():
+            continue
+        length = np.linalg.norm(ends[1] - ends[0])
+
+        def density(s, ends=ends, length=length):
+            return length / float(size.at(ends[0] + s * (ends[1] - ends[0])))
+
+        fit = quad(density, 0.0, 1.0, limit=200)[0]
+        stations = made.stations[edge]
+        assert len(stations) - 1 == round(fit)
+        for first, last in pairwise(stations):
+            share = quad(density, first, last, limit=200)[0] * (len(stations) - 1) / fit
+            assert share == pytest.approx(1.0, abs=0.01)  # of 500 pieces each
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_an_edge_between_blocks_has_the_cells_of_the_finer(order):
+    """Whichever comes first; those through a structured block are not theirs to cut."""
+    edges = SimpleNamespace(
+        structured=[2],
+        around={0: np.array([0, 1]), 1: np.array([1, 2]), 2: np.array([2])},
+        points=np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]]),
+        ends=np.array([[0, 1], [1, 2], [2, 0]]),
+        lengths=np.array([1.0, 3.0, 10.0**0.5]),
+    )
+    sizes = {
+        number: SimpleNamespace(
+            at=lambda places, size=(0.5, 0.2)[number]: np.full(len(places), size)
+        )
+        for number in order
+    }
+    found = _graded(edges, sizes)
+    assert {edge: through[-1] for edge, through in found.items()} == pytest.approx(
+        {0: 1.0 / 0.5, 1: 3.0 / 0.2}
+    )
+    assert np.diff(found[1], 2) == pytest.approx(0.0, abs=1e-12)

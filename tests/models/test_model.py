@@ -1,5 +1,6 @@
 """The waist: what every rung answers, and what is no model."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -35,3 +36,19 @@ def test_what_is_no_model_is_refused(stack, given):
     for each in (given, stack):
         with pytest.raises(af.InvalidInput, match=f"model is a {type(each).__name__}: build one"):
             check_model(each)
+
+
+def test_a_prediction_in_words():
+    told = Prediction(
+        **{"error": 0.0049, "in_time": 0.001, "tolerance": 0.005, "dt": 0.0025, "pace": None},
+        **{"considered": (("rigid", 0.02), ("faces", 0.0049)), "of_small": 0.003},
+        of_chance=0.0021,
+    )
+    assert told.met
+    assert not replace(told, error=0.0051).met
+    assert told.text == (
+        "predicted to err by 0.0049 in the largest |e|, of which 0.001 by steps of 2.5 ms, and by "
+        "0.003 because displacements are taken as small; 0.005 was asked for (tried: rigid: 0.02; "
+        "faces: 0.0049); impacts leave 0.0021 to chance"
+    )
+    assert "by steps of a length for 0.004 in |e|" in replace(told, dt=None, pace=0.004).text

@@ -128,3 +128,16 @@ def test_a_fill_hands_over_its_momentum(structures):
     held = mass * found.start.velocities[number, :2]
     turn = found.start.velocities[number, 2]
     assert held == pytest.approx(momentum, rel=1e-3, abs=1e-3 * mass * abs(turn))
+
+
+def test_how_far_faces_have_slid_is_told_in_facets():
+    """A stone whose face may bend, moved along its bed: over facets of 0.3 m, to either side."""
+    tower = af.column(breadth=0.6, heights=[0.5, 0.5])
+    model = af.build(tower, fidelity="full", displacements="large", cells=(2, 1))
+    first = int(model.cells.turns[model.cells.block == 2][0]) - 2
+    for slip in (0.06, -0.06):
+        q = np.zeros(model.size)
+        q[first] = slip
+        assert model.mismatch(q) == (pytest.approx(0.2), "joint 1")
+    plane = af.build(tower, fidelity="rigid", displacements="large")
+    assert plane.mismatch(np.full(plane.size, 0.1)) == (0.0, "")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion.matching import matched, misfit
+from archfem.motion import oscillator
+from archfem.motion.matching import _memory, _wavelet, matched, misfit
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
 CASE_STUDY = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
@@ -100,3 +101,63 @@ def test_real_records_match(name):
     match = matched(af.Motion.read(RECORDS / name, column=1), CASE_STUDY)
     assert match.misfit["horizontal"] < 0.05
     assert match.motion.displacement()[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("period", "damping"), [(0.3, 0.05), (0.8, 0.2)])
+def test_what_each_sample_adds_to_a_response_is_the_response(period, damping):
+    """Of a smooth motion, against the exact oscillator; the sum of rectangles errs by (ω Δt)²."""
+    dt, times = 0.002, 0.002 * np.arange(600)
+    samples = np.sin(5.0 * times) * times * np.exp(-times)
+    moved = oscillator.displacement(samples, dt, period, damping)
+    for at in (150, 599):
+        memory = _memory(period, at * dt, damping, dt=dt, count=600)
+        expected = -((2.0 * np.pi / period) ** 2) * moved[at]
+        assert memory @ samples == pytest.approx(expected, rel=5e-3)
+        assert not memory[at + 1 :].any()
+    assert _memory(0.0, 0.2, damping, dt=dt, count=600) @ samples == samples[100]
+
+
+@pytest.mark.parametrize("centre", [5.0, 0.3, 9.8])
+def test_a_wavelet_moves_the_ground_by_a_cosine_under_a_bell(centre):
+    """Of size one; away from the ends the second differences of a closed form, and no drift.
+
+    Where it is brought to zero far from its middle it has faded to 1e-7.
+    """
+    period, dt, count = 0.5, 0.01, 1001
+    wave = _wavelet(period, centre, dt, count)
+    assert np.abs(wave).max() == pytest.approx(1.0)
+    assert np.abs(np.cumsum(wave)).max() > 0.1
+    assert np.abs([np.cumsum(wave)[-1], np.cumsum(np.cumsum(wave))[-1]]).max() < 1e-10
+    time = dt * np.arange(-1, count + 1) - centre
+    bell = np.exp(-((time / (1.178 * period**0.93)) ** 2)) * np.cos(2.0 * np.pi * time / period)
+    inner = slice(*{5.0: (52, 949), 0.3: (52, 600), 9.8: (400, 949)}[centre])
+    known = np.diff(bell, 2)[inner]
+    scale = (wave[inner] @ known) / (known @ known)
+    assert wave[inner] == pytest.approx(scale * known, abs=2e-7)
+    assert scale > 0.0
+
+
+def test_wavelets_that_reach_an_end_are_brought_to_zero_within_a_period():
+    """The ramp 3 x² - 2 x³ on the displacement, at the first sample and from a period on."""
+    period, dt, count = 0.5, 0.01, 1001
+    moved = np.cumsum(np.cumsum(_wavelet(period, 0.2, dt, count)))
+    time = dt * np.arange(1, 100) - 0.2
+    bell = np.exp(-((time / (1.178 * period**0.93)) ** 2)) * np.cos(2.0 * np.pi * time / period)
+    share = np.clip((np.arange(1, 100) - 1.0) / (period / dt), 0.0, 1.0)
+    known = bell * share**2 * (3.0 - 2.0 * share)
+    scale = (moved[:99] @ known) / (known @ known)
+    assert moved[:99] == pytest.approx(scale * known, abs=1e-8 * np.abs(moved).max())
+
+
+def test_the_misfit_is_taken_evenly_in_log_period():
+    """Of a motion against half of its own spectrum up to a period and all of it beyond."""
+    motion = af.Motion.synthetic(duration=6.0, dt=0.01, seed=3)
+    own = af.response_spectrum(motion, np.geomspace(0.05, 2.0, 400)) / af.units.STANDARD_GRAVITY
+
+    class Target:
+        @staticmethod
+        def horizontal(periods):
+            found = np.interp(periods, np.geomspace(0.05, 2.0, 400), own)
+            return np.where(periods < 0.05 * 40.0**0.25, 0.5 * found, found)
+
+    assert misfit(motion, Target) == pytest.approx(0.5, abs=0.01)  # a quarter errs by 1

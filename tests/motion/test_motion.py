@@ -176,3 +176,29 @@ def test_each_file_is_read_by_its_own_units_and_step(tmp_path):
         af.Motion.read(upright, units="g")
     with pytest.raises(af.errors.InvalidInput, match=r"level\.txt"):  # states no unit itself
         af.Motion.read(upright, vertical=plain)
+
+
+def test_small_numbers_are_numbers(shaking):
+    """A peak of a millimetre per second squared, and a step that differs by a millionth."""
+    weak = shaking.scaled_to_pga(1e-3)
+    assert weak.pga == pytest.approx(1e-3)
+    assert weak.scaled_to_pga(0.05).pga == pytest.approx(0.05)
+    for pga in (0.0, -1.0):
+        with pytest.raises(af.InvalidInput, match="both must be > 0"):
+            shaking.scaled_to_pga(pga)
+    for change, same in ((0.9e-6, True), (1.2e-6, False)):
+        other = af.Motion(sine(), shaking.dt * (1.0 + change))
+        if same:
+            assert shaking.with_vertical(other).dt == shaking.dt
+        else:
+            with pytest.raises(af.InvalidInput, match="bring one to the other"):
+                shaking.with_vertical(other)
+
+
+def test_cuts_fall_on_samples_to_a_millionth_of_one(shaking):
+    dt = shaking.dt
+    for off, first in ((1e-7, 100), (-1e-7, 100), (1e-3, 101), (-1e-3, 100)):
+        part = shaking.cut((100 + off) * dt, (200 + off) * dt)
+        last = 199 if off == -1e-3 else 200
+        assert part.horizontal.tolist() == shaking.horizontal[first : last + 1].tolist()
+    assert len(shaking.cut(100 * dt, 100 * dt).horizontal) == 1

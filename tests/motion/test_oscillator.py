@@ -56,3 +56,32 @@ def test_interpolation_keeps_the_samples_and_the_straight_lines():
 def test_what_no_oscillator_has_is_refused(periods, damping, message):
     with pytest.raises(af.errors.InvalidInput, match=message):
         oscillator.peak_responses(STEP, DT, np.array(periods), damping)
+
+
+@pytest.mark.parametrize(
+    ("period", "parts"), [(0.4, 1), (0.39, 2), (0.2, 2), (0.05, 8), (4e-4, 1000), (3e-4, 1000)]
+)
+def test_an_oscillation_has_forty_samples_up_to_a_thousand_a_step(period, parts, monkeypatch):
+    """Of a record in steps of 10 ms, divided into no more parts than that takes."""
+    asked = []
+
+    def displacement(samples, dt, period, damping):
+        asked.append((len(samples), dt))
+        return np.ones(len(samples))
+
+    monkeypatch.setattr(oscillator, "displacement", displacement)
+    oscillator.peak_responses(np.ones(5), 0.01, np.array([period]), 0.05)
+    assert asked == [(4 * parts + 1, pytest.approx(0.01 / parts))]
+
+
+def test_the_top_of_a_parabola_through_three_samples():
+    """a - b (t - t₀)², sampled beside its top, of either sense; a flat row, and one that grows."""
+    for sense in (-1.0, 1.0):
+        row = sense * (3.0 - 0.2 * (np.arange(7) - 3.3) ** 2)
+        peak, place = oscillator._parabola_peak(row)
+        assert (peak, place) == (pytest.approx(3.0 * sense), pytest.approx(3.3))
+    assert oscillator._parabola_peak(np.array([0.0, 1.0, 1.0, 1.0, 0.0])) == (
+        pytest.approx(1.125),
+        pytest.approx(1.5),
+    )
+    assert oscillator._parabola_peak(np.array([1.0, 2.0, 4.0])) == (4.0, 2.0)

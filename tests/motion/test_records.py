@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.motion.records import afad, cosmos, csmip, esm, knet, peer, smc
 from archfem.motion.records.read import read_channels, read_components
+from archfem.motion.records.text import RecordText
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -345,3 +347,143 @@ def test_damaged_files_raise_no_foreign_error(tmp_path):
             refused += path.name in str(error)
     # Not every change damages; most do.
     assert 50 < refused < 200
+
+
+PEAK = DAMAGE["PEAK"]
+KNET, AFAD = f"(gal)   {PEAK:.3f}", f"(U-D) {PEAK}"
+
+
+@pytest.mark.parametrize(
+    ("form", "was", "becomes", "accepted"),
+    [
+        # K-NET's peak was taken after another estimate of the offset: 2 %
+        ("knet", KNET, f"(gal)   {1.018 * PEAK:.3f}", True),
+        ("knet", KNET, f"(gal)   {1.022 * PEAK:.3f}", False),
+        # AFAD's before the offset was taken out: a half
+        ("afad", AFAD, f"(U-D) {1.96 * PEAK}", True),
+        ("afad", AFAD, f"(U-D) {2.04 * PEAK}", False),
+        ("afad", AFAD, f"(U-D) {0.52 * PEAK}", True),
+        ("afad", AFAD, f"(U-D) {0.48 * PEAK}", False),
+        # ESM's duration by two steps and a millisecond, to either side
+        ("esm", "S: 0.40", "S: 0.420", True),
+        ("esm", "S: 0.40", "S: 0.3795", True),
+        ("esm", "S: 0.40", "S: 0.422", False),
+        ("esm", "S: 0.40", "S: 0.378", False),
+        # COSMOS tells whole seconds: by one and a step; -999 is a peak that is not known
+        ("cosmos", "approx    0", "approx    1", True),
+        ("cosmos", "approx    0", "approx    2", False),
+        ("cosmos", f"{PEAK:15.6f}", f"{-999.0:15.6f}", True),
+        ("cosmos", f"{PEAK:15.6f}", f"{-998.0:15.6f}", False),
+        ("cosmos", f"{PEAK:15.6f}", f"{-1098.9:15.6f}", False),
+        # SMC: a number beyond 1e38 is one that is not known
+        ("smc", f"{DAMAGE['WAVE'].max() * 100.0:15.7E}", f"{1.02e38:15.7E}", True),
+        ("smc", f"{DAMAGE['WAVE'].max() * 100.0:15.7E}", f"{0.98e38:15.7E}", False),
+    ],
+)
+def test_headers_are_believed_up_to_their_bounds(write, form, was, becomes, accepted):
+    assert SAMPLES[form].count(was) == 1
+    path = write(SAMPLES[form].replace(was, becomes))
+    if accepted:
+        for channel in read_channels(path):
+            assert channel.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+    else:
+        with pytest.raises(af.InvalidInput, match=r"states a peak of|do not last"):
+            read_channels(path)
+
+
+@pytest.mark.parametrize(
+    ("form", "was", "becomes", "direction", "sense"),
+    [
+        ("cosmos", f"{90:8d}", f"{400:8d}", "Up", 1.0),
+        ("cosmos", f"{90:8d}", f"{401:8d}", "Down, turned up", -1.0),
+        ("cosmos", f"{90:8d}", f"{402:8d}", "Vertical", 1.0),
+        ("cosmos", f"{90:8d}", f"{403:8d}", "HNE", None),
+        ("smc", f"{90:10d}{360:10d}", f"{0:10d}{360:10d}", "UP", 1.0),
+        ("smc", f"{90:10d}{360:10d}", f"{180:10d}{360:10d}", "DOWN, turned up", -1.0),
+        ("smc", f"{90:10d}{360:10d}", f"{1:10d}{360:10d}", "360", None),
+        ("knet", "Dir.              E-W", "Dir.              3", "U-D", 1.0),
+        ("knet", "Dir.              E-W", "Dir.              6", "U-D", 1.0),
+        ("knet", "Dir.              E-W", "Dir.              5", "5", None),
+    ],
+)
+def test_directions_that_are_numbers(write, form, was, becomes, direction, sense):
+    """Codes of the formats' descriptions: what points up, what down, and what is level."""
+    assert SAMPLES[form].count(was) == 1
+    (found,) = read_channels(write(SAMPLES[form].replace(was, becomes)))
+    assert (found.direction, found.is_vertical) == (direction, sense is not None)
+    assert found.samples == pytest.approx((sense or 1.0) * DAMAGE["WAVE"], abs=2e-4)
+
+
+@pytest.mark.parametrize(("words", "direction"), [("ABCDEFGHIJKL", True), ("ABCDEFGHIJKLM", False)])
+def test_a_direction_of_peer_has_twelve_letters_at_most(write, words, direction):
+    head = TITLE.replace("Tolmezzo, 0", f"Tolmezzo, {words}")
+    (found,) = read_channels(write(head + "NPTS= 4, DT= .01 SEC\n" + VALUES))
+    assert found.direction == (words if direction else "")
+
+
+@pytest.mark.parametrize(("jitter", "uniform"), [(0.24, True), (0.26, False)])
+def test_times_may_stray_by_a_quarter_of_a_step(write, jitter, uniform):
+    """Of many steps one time is off, which hardly moves the line through all of them."""
+    times = 0.01 * np.arange(400.0)
+    times[200] += 0.01 * jitter
+    rows = "".join(f"{time:.7f} {k % 7}\n" for k, time in enumerate(times))
+    path = write("# gal\n" + rows)
+    if uniform:
+        assert read_channels(path)[0].dt == pytest.approx(0.01, rel=1e-4)
+    else:
+        with pytest.raises(af.InvalidInput, match=r"time is not uniform: 2\.0026 to 2\.01 s"):
+            read_channels(path)
+
+
+def test_a_step_that_is_told_twice_is_the_same_to_a_hundredth(write):
+    rows = "1\n-2\n3\n"
+    for told, same in ((0.009905, True), (0.00989, False), (0.010095, True), (0.0102, False)):
+        path = write(f"# gal, dt = {told} s\n" + rows)
+        if same:
+            assert read_channels(path, dt=0.01)[0].dt == 0.01
+        else:
+            with pytest.raises(af.InvalidInput, match="told twice"):
+                read_channels(path, dt=0.01)
+
+
+def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
+    """Of twenty steps one goes back, which is then told of; with three it is another component."""
+    for back, says in (([9], "time is not uniform"), ([5, 9, 13], "2 columns could be")):
+        times = np.arange(21.0) * 0.01
+        times[back] = times[[k - 1 for k in back]]
+        rows = "".join(f"{time:.3f} {k % 7}\n" for k, time in enumerate(times))
+        with pytest.raises(af.InvalidInput, match=says):
+            read_channels(write("# gal, dt = 0.01 s\n" + rows))
+
+
+def test_columns_of_afad_are_named_on_their_last_line(write):
+    """Another line that names three directions, before the peaks, tells nothing."""
+    head, peaks = SAMPLES["afad"].split("RAW PGA")
+    (first, *others) = read_channels(write(f"{head}  U-D  N-S  E-W\r\nRAW PGA{peaks}"))
+    assert [each.direction for each in (first, *others)] == ["N-S", "E-W", "U-D"]
+    assert first.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
+KEYS = [
+    (smc, "2 CORRECTED ACCELEROGRAM", "*", 11),
+    (afad, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),
+    (afad, "NUMBER OF DATA : 40", "SAMPLING INTERVAL (sec) : 0.01", 40),
+    (csmip, "", "   40 POINTS OF ACCEL DATA EQUALLY SPACED AT  .010 SEC.", 120),
+    (cosmos, "", "Corrected acceleration (Format v01.20", 3),
+    (cosmos, "", " 100 Integer-header values follow", 40),
+    (esm, "", "NDATA: 40", 80),
+    (esm, "", "SAMPLING_INTERVAL_S: 0.01", 80),
+    (knet, "", "Scale Factor      7845(gal)/8000000", 20),
+    (knet, "", "Sampling Freq(Hz) 100Hz", 20),
+    (peer, "NPTS= 40", "DT= .01 SEC", 12),
+    (peer, "DT= .01 SEC", "NPTS= 40", 12),
+]
+"""A first line, another by which a format then is known, and how far down that may stand."""
+
+
+@pytest.mark.parametrize(("form", "first", "key", "last"), KEYS)
+def test_a_format_is_known_by_lines_of_its_header(form, first, key, last):
+    for place, known in ((2, True), (last, True), (last + 1, False)):
+        text = RecordText(Path("any"), (first, *["x"] * (place - 2), key, "x"), True)
+        assert form.recognises(text) is known
+    assert not form.recognises(RecordText(Path("any"), (first, "x"), True))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import archfem as af
 from archfem.motion import signals
@@ -101,3 +102,48 @@ def test_significant_duration_holds_nine_tenths_of_the_energy(shaking):
         af.Motion(np.zeros(9), 0.01).significant()
     with pytest.raises(af.errors.InvalidInput, match="fractions from 0 to 1"):
         signals.significant_window(shaking.horizontal, shaking.dt, 0.9, 0.1)
+
+
+def test_what_can_be_asked_for_ends_where_it_is_said_to():
+    """The least degree, order and number of samples, all of the energy, and bands up to half."""
+    rng = np.random.default_rng(3)
+    samples, dt = rng.normal(size=40), 0.01
+    for degree, count in ((3, 40), (6, 7)):
+        corrected = signals.baseline_corrected(samples[:count], dt, degree)
+        assert signals.displacement(corrected, dt)[-1] == pytest.approx(0.0, abs=1e-12)
+    assert signals.band_passed(samples, dt, 0.02, 49.9, order=1).shape == (40,)
+    for low, high in ((0.0, 10.0), (5.0, 5.0), (5.0, 50.0), (6.0, 5.0)):
+        with pytest.raises(af.InvalidInput, match="expected 0 < low < high < 50 Hz"):
+            signals.band_passed(samples, dt, low, high)
+    assert signals.significant_window(samples, dt, 0.0, 1.0) == (0.0, pytest.approx(0.39))
+    for low, high in ((-0.05, 0.5), (0.5, 1.05), (0.5, 0.5)):
+        with pytest.raises(af.InvalidInput, match="fractions from 0 to 1"):
+            signals.significant_window(samples, dt, low, high)
+
+
+def test_a_filter_meets_zeros_at_both_ends():
+    """As SciPy filters the record between so many zeros that they no longer matter."""
+    dt, samples = 0.01, np.random.default_rng(5).normal(size=300)
+    for order, low in ((4, 0.5), (2, 2.0)):
+        pad = round(1.5 * order / low / dt)
+        sections = scipy.signal.butter(order, (low, 10.0), "bandpass", fs=1.0 / dt, output="sos")
+        wide = scipy.signal.sosfiltfilt(sections, np.pad(samples, pad), padlen=0)[pad:-pad]
+        found = signals.band_passed(samples, dt, low, 10.0, order=order)
+        assert found == pytest.approx(wide, abs=1e-12)
+
+
+def test_resampling_puts_turning_points_on_the_nearest_new_sample():
+    """By hand: the largest of two that meet stays; after the end there is nothing."""
+    samples = np.array([1.0, 3.0, -2.0, -1.0, 0.0, 4.0])
+    assert signals.resampled(samples, 0.1, 0.25) == pytest.approx([3.0, -2.0, 4.0])
+    assert signals.resampled(samples, 0.1, 0.2) == pytest.approx([3.0, -2.0, 4.0, 0.0])
+    assert signals.resampled(samples, 0.1, 0.1).tolist() == samples.tolist()
+    assert signals.resampled(np.array([5.0, 3.0, 4.0, 1.0]), 0.1, 0.5).tolist() == [5.0, 1.0]
+    assert signals.resampled(np.array([2.0]), 0.1, 0.3).tolist() == [2.0]
+    assert len(signals.resampled(samples, 0.1, 0.5)) == 2
+    assert len(signals.resampled(samples, 0.1, 0.49)) == 3
+
+
+def test_the_last_instant_may_come_late_by_a_millionth_of_a_sample():
+    found = signals.between(np.array([1.0, 3.0]), 1.0 + np.array([0.9e-6, 1.05e-6]))
+    assert found.tolist() == [pytest.approx(3.0), 0.0]

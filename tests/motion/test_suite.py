@@ -49,3 +49,22 @@ def test_reversed_suite_turns_every_pair():
     for before, after in zip(suite.pairs, suite.reversed().pairs, strict=True):
         assert np.array_equal(after.horizontal, -before.horizontal)
         assert np.array_equal(after.vertical, before.vertical)
+
+
+def test_a_synthetic_suite_counts_its_seeds_up(monkeypatch):
+    """Before it is matched: horizontals of one seed after another, shared verticals the first."""
+    monkeypatch.setattr(af.Suite, "matched", lambda suite, spectrum: suite)
+    build = {"horizontals": 4, "verticals": 2, "duration": 2.0, "reduction": 3.0}
+    suite = af.Suite.synthetic(CASE_STUDY, seed=11, **build)
+    known = [af.Motion.synthetic(seed=seed, duration=2.0) for seed in (11, 12, 13, 14)]
+    levels = [
+        np.flatnonzero([np.array_equal(p.horizontal, k.horizontal) for k in known]).tolist()
+        for p in suite.pairs
+    ]
+    uprights = [
+        np.flatnonzero([np.array_equal(p.vertical, k.vertical) for k in known]).tolist()
+        for p in suite.pairs
+    ]
+    assert levels == [[0], [1], [2], [3]]
+    assert uprights == [[0], [0], [1], [1]]
+    assert (suite.reduction, suite.scale) == (3.0, 1.0)

@@ -54,3 +54,46 @@ def test_the_horizontal_does_not_depend_on_the_vertical():
     assert nothing is None
     assert np.array_equal(level, alone)
     assert np.abs(upright).max() == pytest.approx(1.0)
+
+
+def test_the_least_that_can_be_asked_for():
+    """Fifty steps, a peak of a millimetre per second squared."""
+    level, upright = synthetic.accelerogram(0.5, 0.01, pga=1e-3, ratio=0.05, seed=0)
+    assert len(level) == 51
+    assert np.abs(level).max() == pytest.approx(1e-3)
+    assert np.abs(upright).max() == pytest.approx(5e-5)
+    for given in ({"duration": 0.49}, {"pga": 0.0}, {"ratio": -0.05}):
+        options = {"duration": 0.5, "pga": 1.0, "ratio": 0.5} | given
+        with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
+            synthetic.accelerogram(options.pop("duration"), 0.01, seed=0, **options)
+
+
+@pytest.mark.parametrize(("component", "ground"), [("horizontal", 15.0), ("vertical", 25.0)])
+def test_noise_has_the_spectrum_of_kanai_tajimi_and_clough_and_penzien(
+    component, ground, monkeypatch
+):
+    """What an impulse becomes, from the real and imaginary parts of both filters by hand.
+
+    Firm ground by Clough and Penzien: 15 rad/s and 60 %; the high-pass is at a tenth of that.
+    """
+    count, dt = 200, 0.02
+
+    class Impulse:
+        @staticmethod
+        def standard_normal(size):
+            assert size == 2 * count
+            return np.eye(1, size)[0]
+
+    monkeypatch.setattr(synthetic, "baseline_corrected", lambda samples, dt: samples)
+    monkeypatch.setattr(synthetic, "envelope", np.ones)
+    found = synthetic.enveloped_noise(count, dt, random=Impulse, component=component)
+    response = np.zeros(count)
+    for k in range(count + 1):
+        omega = 2.0 * np.pi * k / (2 * count * dt)
+        s, damped = 1.0j * omega, 2.0 * 0.6
+        soft, hard = 0.1 * ground, ground
+        value = (hard**2 + damped * hard * s) / (hard**2 + damped * hard * s + s**2)
+        value *= s**2 / (soft**2 + damped * soft * s + s**2)
+        both = 1.0 if k in (0, count) else 2.0
+        response += both * (value * np.exp(1.0j * np.pi * k * np.arange(count) / count)).real
+    assert found == pytest.approx(response / np.abs(response).max(), abs=1e-9)

@@ -68,8 +68,8 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return what may be changed in a module.
 
-    Words of errors and of the log, annotations, imports and what a function that only refuses does
-    are left out.
+    Words of errors and of the log, annotations, imports, what a function that only refuses does and
+    sizes of a shape that are to be found are left out.
 
     Args:
         source: of the module.
@@ -94,7 +94,8 @@ def marked(source: str, name: str) -> str:
     """Return a module that says which statements with changes it comes to.
 
     Each is told to the function `_reached` among the built-in names, where there is one, as the
-    module's name and the statement's line.
+    module's name and the statement's line; so is the first statement of each function, which may
+    read what is kept as the module is read.
 
     Args:
         source: of the module.
@@ -102,6 +103,7 @@ def marked(source: str, name: str) -> str:
     """
     tree = ast.parse(source)
     marks = {id(found): found for each in _found(tree) if (found := each.statement) is not None}
+    marks |= {id(first): first for first in _first_statements(tree)}
     for node in list(ast.walk(tree)):
         for field in ("body", "orelse", "finalbody"):
             block = getattr(node, field, None)
@@ -115,6 +117,13 @@ def marked(source: str, name: str) -> str:
     start = "import builtins; _reached = getattr(builtins, '_reached', bool)"
     tree.body[first:first] = ast.parse(start).body
     return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _first_statements(tree: ast.AST) -> Iterator[ast.stmt]:
+    """What each function begins with, after its docstring."""
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            yield from function.body[int(ast.get_docstring(function) is not None) :][:1]
 
 
 def _found(tree: ast.AST) -> list[Change]:
@@ -136,10 +145,21 @@ def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list
                 continue
             if isinstance(node, ast.If) and isinstance(node.body[-1], ast.Raise):
                 continue
+            if field == "args" and _is_reshape(tree) and ast.unparse(node) == "-1":
+                continue
             if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("logger."):
                 continue
             yield node, around
             yield from _places(node, around)
+
+
+def _is_reshape(call: ast.AST) -> bool:
+    """Whether it gives a shape, in which -1 stands for a size that is to be found."""
+    return (
+        isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr == "reshape"
+    )
 
 
 def _changed(node: ast.AST) -> ast.expr | None:

@@ -9,7 +9,10 @@ import pytest
 import archfem as af
 from archfem.limit.closed import closed_cohesion
 from archfem.masonry.materials import BACKFILL
+from archfem.statics import following
 from archfem.statics.ends import CRAWL, Stop, finished
+from archfem.statics.following import follow
+from archfem.statics.path import LoadPath
 from archfem.statics.pushover import _extrapolated
 
 SIDEWAYS = af.BodyForce(1.0)
@@ -110,15 +113,98 @@ def test_a_path_that_crawls_at_its_limit_ends_and_says_so():
     assert push.factor == pytest.approx(0.27481, rel=2.0 * REACHED)
 
 
-@pytest.mark.parametrize(("step", "crawls"), [(1e-5, True), (1e-2, False)])
-def test_what_hardly_moves_in_many_steps_crawls(step, crawls):
-    way = 1.0 + step * np.arange(CRAWL + 1)
+@pytest.mark.parametrize(
+    ("moved", "grown", "steps", "crawls"),
+    [
+        (0.99e-2, 1.95e-3, CRAWL, True),
+        (1.01e-2, 0.0, CRAWL, False),  # a hundredth of the way
+        (0.0, 2.05e-3, CRAWL, False),  # two thousandths of the load
+        (0.0, -2.05e-3, CRAWL, False),
+        (0.0, 0.0, CRAWL - 1, False),
+    ],
+)
+def test_what_hardly_moves_in_many_steps_crawls(moved, grown, steps, crawls):
+    """Shares are of the last displacement and factor; what lies before those steps is all one."""
+    part = np.append(0.0, np.linspace(0.0, 1.0, CRAWL))[-steps - 1 :]
+    way, factors = 3.0 - 3.0 * moved * (1.0 - part), 0.5 - 0.5 * grown * (1.0 - part)
+    way[0], factors[0] = 0.0, 0.0
     path = SimpleNamespace(
-        displacements=way, factors=list(1.0 + 1e-4 * way), units="1", moving="load", states=way
+        displacements=way, factors=list(factors), units="1", moving="load", states=way
     )
     path.model = SimpleNamespace(structure=SimpleNamespace(size=1e3))
     reason = finished(path, Stop(), af.Criteria(), np.array([1.0, 0.1]))
     assert (reason is not None and reason.startswith("it crawls")) == crawls
+    assert not crawls or "moved by no more than 1% of 3 m" in reason
+
+
+@pytest.mark.parametrize(("control", "each", "growth"), [("path", 4, 1.4), ("path", 5, 1.1),
+                                                         ("force", 4, 1.1)])  # fmt: skip
+def test_steps_along_the_path_grow_faster_where_they_are_easy(control, each, growth):
+    asked = []
+    path = SimpleNamespace(displacements=np.zeros(1), factors=[0.0], iterations=[0], states=[0])
+    path.model = SimpleNamespace(structure=SimpleNamespace(size=1e9))
+    path.unit, path.units, path.moving = (1.0, 1.0), "1", "load"
+
+    def advance(border, distance):
+        asked.append(distance)
+        path.displacements = np.append(path.displacements, path.displacements[-1] + distance)
+        for values, new in ((path.factors, path.displacements[-1]), (path.iterations, each)):
+            values.append(new)
+        path.states.append(0)
+        return True
+
+    path.advance = advance
+    follow(path, control, Stop(steps=4), af.Criteria())
+    assert asked == pytest.approx(growth ** np.arange(4.0))
+
+
+class Slow(LoadPath):
+    """A path that creeps on where it is told to."""
+
+    displacements = np.array([0.0, 2.0])
+
+    def __init__(self, creeps=()):
+        self.creeps, self.asked, self.states = list(creeps), [], [0, 0]
+        self.factors, self.unit = [0.0, 0.4], (1.0, 0.1)
+
+    def creep(self, grown, farthest):
+        self.asked.append((grown, farthest))
+        return self.creeps.pop(0)
+
+
+def test_creep_takes_the_place_of_failed_steps_and_the_seldomer_the_oftener_in_vain(monkeypatch):
+    """After 1, 2 and 3 trials in vain, 1, 3 and 7 steps must fail; after a success, none."""
+    monkeypatch.setattr(following, "sliding", lambda path, criteria: ["bed 3"])
+    path = Slow([False, False, False, True, False])
+    creeping = following._Creeping(path, af.Criteria(), 9.0)
+    tried = []
+    for k in range(17):
+        before = len(path.asked)
+        creeping.on(np.array([0.0, 1.0]), 1.0)
+        if len(path.asked) > before:
+            tried.append(k)
+    assert tried == [0, 2, 6, 14, 15]
+
+
+def test_creep_brings_as_much_load_as_the_step_would_have_brought(monkeypatch):
+    """Along the last step, (2, 4) units; at least two thousandths of the load there is."""
+    slides = ["bed 3"]
+    monkeypatch.setattr(following, "sliding", lambda path, criteria: slides)
+    for border, distance, grown in (
+        ([0.0, 1.0], 0.5, 0.05),
+        ([1.0, 0.0], 0.5, 0.1),
+        ([0.6, 0.8], 0.5, 0.5 * 4.0 / 4.4 * 0.1),
+        ([0.0, 1.0], 1e-3, 0.002 * 0.4),
+    ):
+        path = Slow([True])
+        assert following._Creeping(path, af.Criteria(), 9.0).on(np.array(border), distance)
+        assert path.asked == [(pytest.approx(grown), 9.0)]
+    falling, fresh, settled = Slow(), Slow(), SimpleNamespace(states=[0, 0])
+    falling.factors, fresh.states = [0.4, 0.4], [0]
+    for path in (falling, fresh, settled):
+        assert not following._Creeping(path, af.Criteria(), 9.0).on(np.array([0.0, 1.0]), 1.0)
+    slides.clear()
+    assert not following._Creeping(Slow(), af.Criteria(), 9.0).on(np.array([0.0, 1.0]), 1.0)
 
 
 def test_a_last_step_that_is_short_does_not_look_flat():

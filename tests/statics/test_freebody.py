@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.statics.freebody import forces_on
+from archfem.statics.freebody import FreeBody, forces_on
 
 BALANCED = 1e-9
 """Newton's method stops at 1e-10 of the load, and forces on a block are of its order."""
@@ -103,3 +103,16 @@ def test_what_cannot_be_cut_free_is_refused(stack):
     over_time = af.joints.joint_dataset(stack, np.ones((4, 2, 3)), np.arange(4.0))
     with pytest.raises(af.InvalidInput, match=r"give one instant of the 2 joints"):
         forces_on(stack, over_time, "block 1")
+
+
+def test_what_is_left_is_told_of_the_largest_force():
+    body = FreeBody(
+        af.column(breadth=1.0, heights=[1.0]).blocks[1],
+        ("joint 0", "joint 1", "weight"),
+        (0, 1),
+        np.array([[1.0, 0.0], [0.0, 2.0], [0.0, 0.0]]),
+        np.array([[0.0, 5.0], [3.0, -1.0], [0.0, 0.0]]),
+    )
+    assert body.sizes == pytest.approx([5.0, np.sqrt(10.0), 0.0])
+    assert body.closing_error == pytest.approx(np.hypot(3.0, 4.0) / 5.0)
+    assert body.moment == pytest.approx(5.0 - 6.0)

@@ -12,7 +12,7 @@ from glued import glued
 from scipy.linalg import eigh
 
 import archfem as af
-from archfem.statics.modes import modes
+from archfem.statics.modes import _sense, modes
 
 GRAVITY = 9.81
 DENSITY = 2000.0
@@ -180,3 +180,29 @@ def test_table():
     assert head.split("  ")[0] == "mode"
     cells = ["2", "72.64 Hz", "0.01377 s", "0.0%", "100.0%", "75.3%", "100.0%"]
     assert re.split(r"\s{2,}", second) == cells
+
+
+def test_modes_in_a_line():
+    """Of the block: sway has no mass along y, and the two lowest have all of that."""
+    found = modes(block(), 2)
+    structure = found.model.structure
+    share = f"{found.effective_masses[:, 0].sum() / of_blocks(structure):.0%}"
+    said = f"2 from 8.88 to 72.64 Hz, with {share} of the mass along x and 100% along y"
+    assert repr(found) == f"Modes of '{structure.name}': {said}"
+
+
+@pytest.mark.parametrize(
+    ("along", "sense"),
+    [
+        ((0.05, -1.0), 1.0),  # 0.0025 of the mass along x
+        ((-0.05, 1.0), -1.0),
+        ((0.03, -0.05), -1.0),  # 0.0009 along x: the sense along y
+        ((0.03, 0.05), 1.0),
+        ((-0.03, -0.03), -1.0),  # neither: the first component of half the largest size
+    ],
+)
+def test_shapes_have_the_sense_in_which_they_follow_the_ground(along, sense):
+    """From a thousandth of the mass on, along x before y."""
+    shape = np.array([[0.49], [-0.51], [1.0]])
+    assert _sense(shape, np.array([along]), np.ones(2)).tolist() == [sense]
+    assert _sense(-shape, np.array([[0.0, 0.0]]), np.ones(2)).tolist() == [1.0]

@@ -53,3 +53,20 @@ def test_an_error_within_a_solve_is_not_swallowed(error):
 
     with pytest.raises(type(error)):
         Solver(1).solve(residual, lambda q: sparse.csr_matrix([[1.0]]), np.zeros(1), 1.0)
+
+
+def test_rounding_is_that_of_the_stiffest_coordinate():
+    """A soft spring that goes a kilometre far, beside one that is stiff and hardly moves.
+
+    With 1e12 N/m rounding, 8 eps K q, is 1.8 N under a load of 1 N; with less it is nothing.
+    """
+    load = np.array([1.0, 1e-3])
+    for stiff, found in ((1e-3, True), (1e3, True), (1e12, False)):
+        matrix = sparse.diags([1e-3, stiff]).tocsr()
+        solver, given = Solver(2), (lambda q, m=matrix: m @ q - load, lambda q, m=matrix: m)
+        if found:
+            solved = solver.solve(*given, np.zeros(2), 1.0)
+            assert solved.q == pytest.approx([1e3, 1e-3 / stiff])
+        else:
+            with pytest.raises(af.DidNotConverge, match=r"rounding holds it|iterations"):
+                solver.solve(*given, np.zeros(2), 1.0)

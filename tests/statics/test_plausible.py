@@ -1,6 +1,7 @@
 """What is found at rest, but cannot be meant: friction that nothing has, slips that nobody drew."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -39,6 +40,33 @@ def test_slips_and_coefficients_that_nobody_means():
     slid, smooth = dead_load_doubts(resting(embrace=7.0, voussoirs=3, friction=1e-3))
     assert "joints slide by up to 1.18 mm" in slid
     assert "the least coefficient of friction is 0.001" in smooth
+
+
+@pytest.mark.parametrize(
+    ("read", "least", "factor"), [("friction", 1.0, 1.0), ("slip", 1e-3, 1e3), ("slip", -1e-3, 1e3)]
+)
+def test_doubts_begin_where_they_are_said_to(read, least, factor):
+    """By two per cent to either side: V / N of one, a slip of a millimetre either way."""
+    dead = resting()
+    for share, doubted in ((0.98, False), (1.02, True)):
+        found = dead.joints.copy(deep=True)
+        found[read].values[3] = share * least
+        said = dead_load_doubts(SimpleNamespace(model=dead.model, joints=found))
+        assert len(said) == doubted
+        assert all(f"{share * abs(least) * factor:.3g} " in words for words in said)
+
+
+def test_joints_of_stone_are_not_smooth():
+    assert dead_load_doubts(SimpleNamespace(**smooth(0.102))) == ()
+    (words,) = dead_load_doubts(SimpleNamespace(**smooth(0.098)))
+    assert words == "the least coefficient of friction is 0.098: joints of stone have 0.6 to 0.75"
+
+
+def smooth(friction):
+    """A block that rests on a level joint, which needs no friction."""
+    block = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(1e9, 4e8, friction))
+    dead = af.dead_load(af.build(block, fidelity="rigid"))
+    return {"model": dead.model, "joints": dead.joints}
 
 
 def test_what_limit_analysis_does_not_let_stand():

@@ -1,7 +1,9 @@
 """Pushover: it rises to the limit of rigid blocks, whichever way it is controlled."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +11,9 @@ from glued import glued
 
 import archfem as af
 from archfem.limit.blocks import RigidBlocks
-from archfem.statics.pushover import CONTROLS, Stop, pushover
+from archfem.statics.ends import finished
+from archfem.statics.following import follow
+from archfem.statics.pushover import CONTROLS, Stop, _extrapolated, pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
@@ -153,6 +157,7 @@ def test_curve_starts_at_the_dead_load_and_never_falls():
     found = pushed("eccentric", "displacement")
     assert float(found.curve["factor"][0]) == 0.0
     assert float(found.curve["displacement"][0]) == 0.0
+    assert int(found.curve["iterations"][0]) == 0
     assert float(found.curve["displacement"].diff("step").min()) > 0.0
     assert float(found.curve["factor"].diff("step").min()) > -1e-6 * found.factor
     dead = found.joints["eccentricity"].isel(step=0)
@@ -262,14 +267,27 @@ def test_spreading_supports_bring_meshed_rungs_to_the_least_thrust(rung):
     assert found.factor < 0.8 * float(found.curve["factor"][0])  # the thrust of the dead load
 
 
-def test_work_on_a_settlement_is_the_thrust_on_the_support():
-    found = pushover(
-        rigid(RING), af.Settlement("left abutment", (-2.0, 0.0, 0.0)), stop=Stop(steps=3)
-    )
+@pytest.mark.parametrize("motion", [(-2.0, 0.0, 0.0), (-1.0, -0.3, 0.4)])
+def test_work_on_a_settlement_is_the_thrust_on_the_support(motion):
+    """Of N and V on the point at M / N from mid-depth, which moves and turns with the support."""
+    found = pushover(rigid(RING), af.Settlement("left abutment", motion), stop=Stop(steps=3))
     joint, last = RING.joints[0], found.joints.isel(step=-1, joint=0)
-    thrust = float(last["N"]) * RING.normals[0, 0] - float(last["V"]) * joint.tangent[0]
-    assert found.factor == pytest.approx(2.0 * thrust, rel=1e-9)
+    support = RING.blocks[RING.block_number("left abutment")]
+    place = joint.middle + float(last["M"]) / float(last["N"]) * joint.tangent
+    x, y = place - support.centroid
+    way = np.array([motion[0] - motion[2] * y, motion[1] + motion[2] * x])
+    work = float(last["V"]) * joint.tangent @ way - float(last["N"]) * RING.normals[0] @ way
+    assert found.factor == pytest.approx(work, rel=1e-9)
     assert float(found.curve["displacement"][-1]) > 0.0
+    assert int(found.curve["iterations"][0]) == 0
+
+
+def test_a_pushover_in_a_line():
+    found, endless = pushed("eccentric", "displacement"), pushed("sideways", "force")
+    steps = len(found.curve["factor"]) - 1
+    assert repr(found).startswith(f"Pushover: factor {found.factor:.4g} after {steps} steps, tends")
+    unknown = replace(endless, limit=np.nan)
+    assert f"steps, {len(endless.hinges)} hinges; " in repr(unknown)
 
 
 def test_joints_turn_as_the_mechanism_of_limit_analysis():
@@ -298,3 +316,106 @@ def test_openings_over_a_settlement_are_those_of_its_equilibria():
         got = found.joints[name].isel(step=step).values
         assert got == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
     assert float(found.joints["opening"].isel(step=step).max()) > 1e-4
+
+
+def test_a_limit_is_extrapolated_from_the_last_doubling():
+    """Of a curve that is λ - C d^-1/2: exact; flat to a millionth, or too steep, by hand."""
+    moved = np.concatenate([[0.0], np.geomspace(1e-6, 1e-3, 40)])
+    factors = np.concatenate([[0.0], 0.3 - 1e-5 * moved[1:] ** -0.5])
+    found, off = _extrapolated(moved, factors)
+    assert found == pytest.approx(0.3, rel=1e-9)
+    assert off == pytest.approx(0.3 - factors[-1])
+    for growth, flat in ((0.95e-6, True), (1.05e-6, False)):
+        last = np.array([0.0, 0.1, 0.2, 0.2 / (1.0 - growth)])
+        found, off = _extrapolated(np.array([0.0, 1.0, 2.0, 4.0]), last)
+        assert bool(found == last[-1]) is flat
+        assert off == pytest.approx(1e-6 * last[-1]) or not flat
+    for share, known in ((0.19, True), (0.21, False)):
+        root = 2.0**-0.5  # of the displacement half as large, which the last one lies beyond
+        rise = share * (1.0 - root) / root
+        found, off = _extrapolated(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0 - rise, 1.0]))
+        assert np.isfinite(found) == known
+        assert off == pytest.approx(share) or not known
+
+
+class Steps:
+    """A path that fails where it is told to, and otherwise rises evenly."""
+
+    moving, units = "load", "1"
+
+    def __init__(self, fails=(), iterations=9):
+        self.fails, self.asked, self.each = list(fails), [], iterations
+        self.borders = []
+        self.unit, self.states, self.iterations = (1.0, 1.0), [0], [0]
+        self.displacements, self.factors = np.zeros(1), [0.0]
+        self.model = SimpleNamespace(structure=SimpleNamespace(size=1e9))
+        self.resisted = []
+
+    def advance(self, border, distance):
+        self.asked.append(distance)
+        self.borders.append(border.tolist())
+        if self.fails and self.fails.pop(0):
+            return False
+        self.states.append(0)
+        self.iterations.append(self.each)
+        self.displacements = np.append(self.displacements, self.displacements[-1] + distance)
+        self.factors.append(self.factors[-1] + distance)
+        return True
+
+
+def test_steps_grow_by_a_tenth_and_are_halved_where_they_fail():
+    path = Steps([False, False, True, True, False])
+    said = follow(path, "force", Stop(steps=4), af.Criteria())
+    assert said == "4 steps were taken"
+    known = [1.0, 1.1, 1.21, 0.605, 0.3025, 0.33275]
+    assert path.asked == pytest.approx(known)
+
+
+def test_steps_are_given_up_below_a_thousandth_of_the_first():
+    """2^-9 is still tried, 2^-10 is not: then what slides decides what is said."""
+    path = Steps([True] * 99)
+    with pytest.raises(af.DidNotConverge, match="no equilibrium just after the dead load"):
+        follow(path, "force", Stop(), af.Criteria())
+    assert path.asked == pytest.approx(0.5 ** np.arange(10))
+
+
+def test_rules_end_a_path_where_they_are_met():
+    """Of a slope, a displacement as part of the size, a load that is gone, and so many steps."""
+    path, criteria = Steps(), af.Criteria()
+    path.displacements, path.factors = np.array([0.0, 0.5]), [0.0, 1.0]
+    path.model.structure.size = 5.0
+    path.states = [0, 0]  # that of the dead load, and one step
+    even = np.array([1.0, 1.0])
+    assert finished(path, Stop(displacement=0.101), criteria, even) is None
+    assert finished(path, Stop(displacement=0.099), criteria, even) == "the load moved by 0.5 m"
+    for slope, ends in ((0.98e-6, True), (-0.98e-6, True), (1.02e-6, False)):
+        said = finished(path, Stop(displacement=1.0), criteria, np.array([1.0, slope]))
+        assert (said is not None) is ends
+    assert finished(path, Stop(displacement=1.0, steps=2), criteria, even) is None
+    path.states.append(0)
+    assert finished(path, Stop(displacement=1.0, steps=2), criteria, even) == "2 steps were taken"
+    path.factors = [0.0, -1e-9]
+    assert finished(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
+    path.units = "N m"
+    assert finished(path, Stop(displacement=1.0), criteria, even) is None
+
+
+def test_arc_length_goes_on_in_the_direction_of_the_last_step():
+    """Of length one, half of each at first; the units of both are those of the first step."""
+    path = Steps()
+    path.unit = (0.5, 2.0)
+    follow(path, "arc length", Stop(steps=3), af.Criteria())
+    even, later = 0.5**0.5, np.array([2.0, 0.5]) / np.hypot(2.0, 0.5)
+    assert path.borders[0] == pytest.approx([even, even])
+    assert path.borders[1] == path.borders[2] == pytest.approx(later.tolist())
+    for control, border in (("force", [0.0, 1.0]), ("displacement", [1.0, 0.0])):
+        path = Steps()
+        follow(path, control, Stop(steps=2), af.Criteria())
+        assert path.borders == [border] * 2
+
+
+@pytest.mark.parametrize("load", [af.BodyForce(0.1), af.Settlement("left abutment", (-1.0, 0, 0))])
+def test_the_first_step_is_a_millionth_of_the_structure(load):
+    found = pushover(rigid(RING), load, stop=Stop(steps=1))
+    moved = found.curve["displacement"].values
+    assert moved == pytest.approx([0.0, 1e-6 * RING.size], rel=1e-6)

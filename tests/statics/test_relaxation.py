@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
 from archfem.joints.resultants import joint_dataset
 from archfem.statics.equilibrium import self_weight
-from archfem.statics.newton import Solver
+from archfem.statics.newton import Solved, Solver
 from archfem.statics.path import LoadPath
-from archfem.statics.relaxation import relaxed
+from archfem.statics.relaxation import _crept, relaxed
 
 REST = 1e-10
 """Out of balance relative to the load, to which equilibria are found."""
@@ -124,3 +125,121 @@ def test_a_load_on_fill_in_pieces_goes_on_by_creep(bridge):
     assert at_most_coulomb(fill, joints, 10e3)
     assert not path.creep(0.01, farthest=1e-6)  # it moves farther than that
     assert path.factors == [0.0, 0.1]
+
+
+def counting(monkeypatch):
+    """How many iterations each solve has made, as a list that grows."""
+    made, solve = [], Solver.solve
+
+    def counted(solver, *given, **more):
+        solved = solve(solver, *given, **more)
+        made.append(solved.iterations)
+        return solved
+
+    monkeypatch.setattr(Solver, "solve", counted)
+    return made
+
+
+def test_iterations_that_are_told_are_those_made(stack, ring, monkeypatch):
+    """By creep, under dead load at once and in stages, on a support that moves, and by a push."""
+    model, made = af.build(stack, fidelity="rigid"), counting(monkeypatch)
+    _, solved = relaxed(Solver(model.size), model, self_weight(model), np.zeros(model.size))
+    assert solved.iterations == sum(made) > 0
+    for stages in (None, af.masonry.usual_stages(stack)):
+        made.clear()
+        assert af.dead_load(model, stages=stages).iterations == sum(made) > 0
+    settled = model.settled(af.Settlement("base", (0.0, -0.01, 0.0)))
+    made.clear()
+    found = af.dead_load(settled)
+    assert found.iterations == sum(made) > 0
+    assert found.steps == len(made)
+
+
+def test_where_newton_fails_a_step_of_creep_is_made_with_given_limits(stack, monkeypatch):
+    """Six times, each from limits of the one before; what they all took is told."""
+    asked = []
+
+    def dragged(solver, model, load, starts, drag, searches):
+        asked.append((starts, searches, getattr(model, "operator", model)))
+        if len(asked) == 1:
+            raise af.DidNotConverge("made to fail")
+        return Solved(starts[1] + 1.0, len(asked), 0.5)
+
+    monkeypatch.setattr("archfem.statics.relaxation._dragged", dragged)
+    model = af.build(stack, fidelity="rigid")
+    load, start = self_weight(model), np.zeros(model.size)
+    solved = _crept(Solver(model.size), model, load, start, model.closed())
+    assert solved.iterations == sum(range(2, 8))
+    assert [float(guess[0]) for (_, guess), _, _ in asked] == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert all(not first.any() for (first, _), _, _ in asked)
+    assert [searches for _, searches, _ in asked] == [("basic",)] + [("basic", "cp")] * 6
+    assert (solved.q == 6.0).all()
+
+
+class Creeping:
+    """A model of one coordinate, whose force nears the load by a part of what is left a step."""
+
+    operator, memory = None, np.zeros(1)
+
+    def __init__(self, part, left=1.0):
+        self.part, self.left = part, left
+
+    def closed(self):
+        return sparse.csr_matrix([[1.0]])
+
+    def tangent(self, q):
+        return sparse.csr_matrix([[0.0]])
+
+    def remembered(self, q):
+        return self.left * (1.0 - self.part)
+
+    def remembering(self, left):
+        return Creeping(self.part, left)
+
+    def force(self, q):
+        return np.array([1.0 - self.left])
+
+
+@pytest.fixture
+def drags(monkeypatch):
+    """The drag of each step; a step takes what `iterations` says, or fails where that is None."""
+    asked, iterations = [], []
+
+    def crept(solver, model, load, start, drag):
+        asked.append(float(drag[0, 0]))
+        taken = iterations.pop(0) if len(iterations) > 1 else iterations[0]
+        if taken is None:
+            raise af.DidNotConverge("made to fail")
+        return Solved(start, taken, 0.0)
+
+    monkeypatch.setattr("archfem.statics.relaxation._crept", crept)
+    return asked, iterations
+
+
+def creep(part):
+    return relaxed(Solver(1), Creeping(part), np.ones(1), np.zeros(1))
+
+
+def test_drag_falls_after_easy_steps_and_grows_after_failed_ones(drags):
+    """By four; eight iterations are easy, nine are not. It is given up beyond 256."""
+    asked, iterations = drags
+    iterations += [8, 9, 9, None, 8]
+    _, solved = creep(0.9999)
+    assert asked == [1.0, 0.25, 0.25]
+    assert solved.iterations == 8 + 9 + 9
+    asked.clear()
+    iterations[:] = [None]
+    with pytest.raises(af.DidNotConverge, match="in 0 steps of creep"):
+        creep(0.5)
+    assert asked == [1.0, 4.0, 16.0, 64.0, 256.0]
+
+
+@pytest.mark.parametrize(("part", "steps"), [(0.05, 12), (0.07, 100)])
+def test_creep_goes_on_while_what_is_left_halves_in_twelve_steps(drags, part, steps):
+    """0.95¹¹ is 0.57, 0.93¹¹ is 0.45; a hundred steps are made at most."""
+    asked, iterations = drags
+    iterations += [9]
+    with pytest.raises(af.DidNotConverge, match=f"in {steps} steps of creep") as caught:
+        creep(part)
+    assert len(asked) == steps
+    assert f"{(1.0 - part) ** steps:.2e} of 1.00e+00 stays" in str(caught.value)

@@ -1,11 +1,14 @@
 """Dead load by stages: closed forms of columns, balance of forces, and what comes after."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.errors import InvalidInput
 from archfem.masonry.stages import Stage, usual_stages
+from archfem.models.unfinished import Unfinished
 from archfem.statics.equilibrium import self_weight
 
 ROUND_OFF = 1e-9
@@ -193,3 +196,46 @@ def test_what_cannot_stand_until_the_rest_is_placed_is_told(bridge):
     ring = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17, chords=1)
     with pytest.raises(af.DidNotConverge, match="'centring struck'"):
         af.dead_load(af.build(ring, fidelity="rigid"), stages=usual_stages(ring))
+
+
+@pytest.mark.parametrize(("friction", "tension"), [(None, 0.0), (0.6, 2e4)])
+def test_forces_on_what_stands_are_the_slope_of_its_energy(column, friction, tension):
+    """By central differences: two courses of three whose joints open and shear, and do not slide.
+
+    A millionth of the largest force: steps of 1e-9 m lose 1e-16 of the energy over 1e-9 m.
+    """
+    contact = af.Contact(1.48e9, 0.30e9, friction, cohesion=5e4, tension=tension)
+    joints = tuple(replace(joint, contact=contact) for joint in column.joints)
+    site = Unfinished(af.build(replace(column, joints=joints), fidelity="rigid"))
+    site = site.placed([1], np.zeros(site.size)).placed([2], np.zeros(site.size))
+    q = 1e-6 * np.array([1.0, -20.0, 1.0, 2.0, -19.0, -9.0, 0.0, 0.0, 0.0])
+    steps = 1e-9 * np.eye(site.size)[:6]
+    slope = [(site.energy(q + step) - site.energy(q - step)) / 2e-9 for step in steps]
+    force = site.force(q)
+    assert slope == pytest.approx(force[:6], abs=1e-6 * np.abs(force).max())
+    assert np.abs(force[:6]).min() > 1e-3 * np.abs(force).max()
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(5, "'block 4', 'block 5']: every"), (7, "'block 5'] and 2 more: every")]
+)
+def test_blocks_that_no_stage_places_are_named_up_to_five(count, words):
+    tower = af.column(breadth=1.0, heights=[1.0] * (count + 1))
+    stages = [Stage(blocks=(count + 1,))]
+    with pytest.raises(InvalidInput) as caught:
+        af.dead_load(af.build(tower, fidelity="rigid"), stages=stages)
+    assert "no stage places ['block 1', 'block 2', 'block 3', 'block 4'" in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_fill_is_placed_in_layers_of_equal_height(bridge):
+    """By the heights of its pieces, from the lowest to the highest of them."""
+    soil = {n: bridge.blocks[n].centroid[1] for n in bridge.free if bridge.blocks[n].grain}
+    low, high = min(soil.values()), max(soil.values())
+    layers = [each for each in usual_stages(bridge, layers=3) if "layer" in each.name]
+    assert sum(len(each.blocks) for each in layers) == len(soil)
+    for k, each in enumerate(layers):
+        own = [(soil[n] - low) / (high - low) for n in each.blocks]
+        assert k / 3 <= min(own) + 1e-12
+        assert max(own) <= (k + 1) / 3 + 1e-12
+    assert [each.centring for each in usual_stages(bridge)].count(True) == 1

@@ -8,7 +8,7 @@ from cells import one_cell
 from scipy import sparse
 
 import archfem as af
-from archfem.statics.stress import at_corners, principal
+from archfem.statics.stress import _fit, at_corners, principal
 
 
 @pytest.mark.parametrize("angle", [-80.0, -30.0, 0.0, 20.0, 65.0])
@@ -38,3 +38,15 @@ def test_a_linear_stress_is_recovered_exactly_at_corners(ring, cell):
     at_centres = centre @ slope.T + np.sin(cells.owner)[:, None]
     found = (at_corners(own) @ at_centres.ravel()).reshape(-1, 3)
     assert found == pytest.approx(cells.places @ slope.T + step, abs=1e-9)
+
+
+def test_a_corner_takes_in_neighbours_where_fewer_than_four_cells_meet():
+    """Inside a stone of 4 by 4 cells exactly four do; at its faces two, at its corners one."""
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="full", cells=(4, 4))
+    cells, fit = model.cells, _fit(model.cells)
+    meet = np.bincount(np.concatenate(cells.polygons), minlength=len(cells.places))
+    taken = np.diff(fit.indptr)
+    assert sorted(set(meet.tolist())) == [1, 2, 4]
+    assert (taken[meet == 4] == 4).all()
+    assert set(taken[meet == 2].tolist()) == {6, 8}  # less beside a corner
+    assert (taken[meet == 1] == 4).all()

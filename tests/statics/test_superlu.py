@@ -8,7 +8,7 @@ from scipy import sparse
 
 import archfem as af
 from archfem.packages import FENICSX
-from archfem.statics import dense_eigen, eigen, modes, newton
+from archfem.statics import dense_eigen, eigen, modes, newton, superlu
 from archfem.statics.newton import Newton, Solver
 
 
@@ -96,3 +96,16 @@ def test_what_only_rounding_holds_is_no_equilibrium(library, request):
     load = np.array([0.0, 1e5])
     with pytest.raises(af.DidNotConverge, match=r"rounding holds it|singular|iterations"):
         Solver(2).solve(lambda q: stiff @ q - load, lambda q: stiff, np.zeros(2), 1e5)
+
+
+@pytest.mark.parametrize(
+    ("zero", "share"), [(0.3, 0.3), (1.0, 1.0), (700.0, 700.0), (6e5, 0.0), (5e5, 5e5)]
+)
+def test_the_lowest_place_along_a_step(zero, share):
+    """Where the slope vanishes: a step may be doubled twenty times, to 2^19 = 524288 of it."""
+    assert superlu._lowest(lambda along: along - zero) == pytest.approx(share, rel=1e-9)
+
+
+def test_where_energy_rises_no_step_is_taken():
+    assert superlu._lowest(lambda along: 0.0) == 0.0
+    assert superlu._lowest(lambda along: along + 1.0) == 0.0

@@ -85,3 +85,19 @@ def test_what_cannot_be_written(tmp_path):
         write_state(model, np.zeros(3), tmp_path / "column.words")
     with pytest.raises(af.InvalidInput, match="the model has 3"):
         write_state(model, np.zeros(4), tmp_path / "column.dxf")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu"])
+@pytest.mark.parametrize(
+    ("cell", "kind", "count"), [("triangle", "triangle", 12), ("quadrilateral", "quad", 6)]
+)
+def test_cells_are_of_their_kind(tmp_path, suffix, cell, kind, count):
+    """Triangles or quadrilaterals of the block, and one quadrilateral of what it stands on."""
+    column = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(column, fidelity="full", cells=(2, 3), cell=cell)
+    path = write_state(model, np.zeros(model.size), tmp_path / f"state{suffix}")
+    kinds = [(each.type, len(each.data)) for each in meshio.read(path).cells]
+    assert sum(n for name, n in kinds if name == kind) == count + (kind == "quad")
+    assert sum(n for _, n in kinds) == count + 1
+    area = pyvista.read(path).compute_cell_sizes(length=False, volume=False)["Area"]
+    assert area.sum() == pytest.approx(1.0 + column.blocks[0].area)

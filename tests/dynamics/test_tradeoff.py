@@ -1,0 +1,52 @@
+"""Speed against error: what is tried and compared, by runs that are known."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.tradeoff import Run, compared, references_of, settings_of
+
+
+@pytest.fixture
+def settings(ring):
+    return [*references_of(ring), *list(settings_of(ring, ("rigid", "faces")))[:4]]
+
+
+def test_the_reference_is_the_finest_and_its_doubt_half_of_it(ring):
+    labels = [each.label for each in references_of(ring)]
+    assert labels == ["condensed 12×12 exact 1.25 ms", "condensed 6×6 exact 2.5 ms"]
+
+
+def test_each_scene_is_tried_once(ring):
+    """Three rungs, meshes and steps by four rules; rigid joints with exact facets have no mesh."""
+    labels = [each.label for each in settings_of(ring)]
+    assert len(labels) == len(set(labels)) == 3 * (3 * 3 * 4) - 2 * 3
+    assert labels[0] == "rigid 2×2 nodal 10 ms"
+    assert [each for each in labels if each.startswith("rigid 1×1")] == [
+        "rigid 1×1 exact 10 ms",
+        "rigid 1×1 exact 5 ms",
+        "rigid 1×1 exact 2.5 ms",
+    ]
+    assert labels[-1] == "condensed 8×8 exact 2.5 ms"
+
+
+def test_errors_are_the_largest_difference_to_the_reference(settings):
+    """The front has what none beats in both; of it the fastest within the tolerance is chosen."""
+    peaks = [[0.30, 0.2], [0.31, 0.2], [0.30, 0.25], [0.303, 0.2], None, [0.3, 0.202]]
+    seconds = [9.0, 5.0, 0.5, 2.0, 0.1, 3.0]
+    runs = [
+        Run(7, each, None if peak is None else np.array(peak))
+        for each, peak in zip(seconds, peaks, strict=True)
+    ]
+    found = compared(settings, runs, 10.0, 0.003)
+    assert found.doubt == pytest.approx(0.01)
+    assert [each.error for each in found.trials] == pytest.approx([0.05, 0.003, np.inf, 0.002])
+    assert [each.seconds for each in found.front] == [0.1, 0.5, 2.0, 3.0]
+    assert found.chosen.seconds == 3.0  # 0.303 - 0.3 rounds to more than the tolerance
+    assert compared(settings, runs, 10.0, 0.0031).chosen.seconds == 2.0
+    assert compared(settings, runs, 10.0, 0.001).chosen is None
+    fastest, second, *_ = found.table().splitlines()[-4:]
+    assert "failed" in fastest
+    assert "20" in second.split()
+    with pytest.raises(af.DidNotConverge, match=r"the reference, condensed 12×12 exact 1\.25 ms"):
+        compared(settings, [Run(7, 1.0, None), *runs[1:]], 10.0, 0.003)

@@ -1,0 +1,63 @@
+"""Outlines that overlap: how deep, where, and between which blocks it matters."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.masonry.overlaps import check_apart, check_simple
+
+NAMES = ["a", "b"]
+
+
+def box(x, y, width=1.0, height=1.0):
+    return np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+
+
+@pytest.mark.parametrize(("share", "apart"), [(0.98, True), (1.02, False)])
+def test_an_overlap_is_none_up_to_a_millionth_of_all_outlines(share, apart):
+    """Of a strip d by 1 m, 2 A / P = d / (1 + d); all of them are 2 m by 1 m large."""
+    deep = share * 1e-6 * np.hypot(2.0, 1.0)
+    outlines = [box(0.0, 0.0), box(1.0 - deep, 0.0)]
+    if apart:
+        check_apart(outlines, NAMES)
+    else:
+        with pytest.raises(af.errors.InvalidStructure, match="'a' and 'b' overlap by"):
+            check_apart(outlines, NAMES)
+
+
+def test_an_overlap_is_told_by_its_depth_and_its_place():
+    """A strip of 2 cm by 1 m, 2 A / P = 0.0196 m deep, a third of the way up the other block."""
+    outlines = [box(0.0, 0.0), box(0.98, 0.0), box(5.0, 0.0)]
+    for slight, remedy in ((0.0195, False), (0.0197, True)):
+        with pytest.raises(af.errors.InvalidStructure) as caught:
+            check_apart(outlines, [*NAMES, "c"], slight)
+        words = str(caught.value)
+        assert "overlap by 200 cm², about 19.6 mm deep at (0.990, 0.500)" in words
+        assert ("raise snap above that" in words) is remedy
+
+
+@pytest.mark.parametrize(("share", "same"), [(1.0 - 0.5e-6, True), (1.0 - 2e-6, False)])
+def test_outlines_are_the_same_to_a_millionth_of_their_area(share, same):
+    words = "are the same: leave one out" if same else "overlap by"
+    with pytest.raises(af.errors.InvalidStructure, match=words):
+        check_apart([box(0.0, 0.0), box(0.0, 0.0, share)], NAMES)
+
+
+@pytest.mark.parametrize(
+    ("fixed", "refused"), [([True, True], False), ([True, False], True), (None, True)]
+)
+def test_it_does_not_matter_between_supports(fixed, refused):
+    outlines = [box(0.0, 0.0), box(0.5, 0.0)]
+    if refused:
+        with pytest.raises(af.errors.InvalidStructure, match="overlap"):
+            check_apart(outlines, NAMES, fixed=fixed)
+    else:
+        check_apart(outlines, NAMES, fixed=fixed)
+
+
+def test_outlines_that_cross_themselves_are_refused_either_way_round():
+    bow = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
+    for outline in (bow, bow[::-1]):
+        with pytest.raises(af.errors.InvalidStructure, match=r"'a' crosses or touches itself"):
+            check_simple(outline, "a")
+    check_simple(box(0.0, 0.0)[::-1], "a")

@@ -1,0 +1,48 @@
+"""A step of blocks that move far: its work is stored or lost, and its tangent is a derivative."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+
+SOFT = af.Material(young=1e9, poisson=0.2, unit_weight=25e3)
+"""Stones that strain by about as much as their joints do."""
+
+ROUND_OFF = 1e-12
+"""Of sums of some hundred works, whose terms are as large as their total."""
+
+
+def moved(fidelity, seed, friction=0.3):
+    """Two stones on a support, somewhere pressed and turned, and where a step takes them [m]."""
+    contact = af.Contact(1e9, 4e8, friction)
+    tower = af.column(breadth=0.5, heights=[0.5, 0.5], material=SOFT, contact=contact)
+    model = af.build(tower, fidelity=fidelity, cells=(2, 2), displacements="large")
+    rng = np.random.default_rng(seed)
+    dead = af.dead_load(model)
+    first = dead.q + 1e-4 * rng.normal(size=model.size)
+    return dead.model, first, first + 1e-4 * rng.normal(size=model.size)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize("late", [0.0, 0.4])
+def test_the_work_of_a_step_is_stored_or_lost(fidelity, late):
+    """F·Δq = ΔE + lost, of joints and of stones that strain; friction gives nothing back."""
+    for seed in range(4):
+        model, first, last = moved(fidelity, seed)
+        passage = model.passage(first, late)
+        after = model.remembering(passage.remembered(last))
+        work, lost = passage.force(last) * (last - first), passage.lost(last)
+        scale = np.abs(work).sum()
+        stored = after.energy(last) - model.energy(first)
+        assert work.sum() == pytest.approx(stored + lost, abs=ROUND_OFF * scale)
+        assert lost >= -ROUND_OFF * scale
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity):
+    """Along the step, by central differences: places of Gauss that move leave 2e-6."""
+    model, first, last = moved(fidelity, 1, friction=None)
+    passage, way = model.passage(first, 0.4), last - first
+    slope = (passage.force(last + 1e-5 * way) - passage.force(last - 1e-5 * way)) / 2e-5
+    known = passage.tangent(last) @ way
+    assert known == pytest.approx(slope, abs=1e-5 * np.abs(slope).max())

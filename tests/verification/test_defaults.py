@@ -1,0 +1,145 @@
+"""What is meant where nothing is said: numbers that arguments of the physics have by default.
+
+A script that leaves an argument out relies on its default as on any other number. The tables are a
+second copy: who changes a default changes what scripts compute, and is to say so here too.
+"""
+
+import inspect
+from importlib import import_module
+
+import pytest
+
+G = 9.81
+
+STRUCTURE = {"width": 1.0, "gravity": G}
+STEPS = {"cells": ((2, 2), (4, 4), (8, 8)), "steps": (0.01, 0.005, 0.0025)}
+PERCENT = {"damping": 0.05}
+PIERS = {"course": 0.4, "chords": 1}
+
+MOTION = {
+    "design_spectra.Eurocode8": {"type": 1, **PERCENT},
+    "matching.matched": {"band": (0.05, 2.0), "tolerance": 0.05, **PERCENT},
+    "matching.misfit": {"band": (0.05, 2.0), **PERCENT},
+    "motion.Motion.synthetic": {
+        **{"duration": 20.0, "pga": 0.3 * 9.80665, "seed": 0, "dt": 0.005},
+        "vertical_ratio": 2.0 / 3.0,
+    },
+    "motion.Motion.significant": {"low": 0.05, "high": 0.95},
+    "motion.Motion.baseline_corrected": {"degree": 6},
+    "motion.Motion.band_passed": {"order": 4},
+    "newer_codes.Ntc2018": {"topography": 1.0, **PERCENT},
+    "newer_codes.Eurocode2024": {"topography": 1.0},
+    "signals.baseline_corrected": {"degree": 6},
+    "signals.band_passed": {"order": 4},
+    "signals.significant_window": {"low": 0.05, "high": 0.95},
+    "spectra.response_spectrum": PERCENT,
+    "spectra.scaled_to_spectrum": PERCENT,
+    "suite.Suite": {"scale": 1.0, "reduction": 1.0},
+    "suite.Suite.paired": {"scale": 1.0, "reduction": 1.0},
+    "suite.Suite.synthetic": {
+        **{"horizontals": 6, "verticals": 3, "seed": 0, "duration": 20.0, "reduction": 1.0}
+    },
+    "suite.Suite.spectra": PERCENT,
+}
+
+MASONRY = {
+    "actions.BodyForce": {"vertical": 0.0},
+    "assembly.assembled": STRUCTURE,
+    "block.Block.drawn": {"pieces": 16},
+    "fill.jointed_fill": {"cohesion": 0.0},
+    "materials.Contact": {"friction": 0.6, "cohesion": 0.0, "dilatancy": 0.0, "tension": 0.0},
+    "shapes.arcades.buttressed_arch": PIERS | STRUCTURE,
+    "shapes.arcades.arcade": PIERS | STRUCTURE,
+    "shapes.bridges.bridge": {"chords": 1} | STRUCTURE,
+    "shapes.curves.pointed_arch": {"chords": 4} | STRUCTURE,
+    "shapes.curves.elliptical_arch": {"chords": 4} | STRUCTURE,
+    "shapes.curves.flat_arch": STRUCTURE,
+    "shapes.curves.arch_along": {"chords": 4} | STRUCTURE,
+    "shapes.parts.Pier": {"course": 0.4},
+    "shapes.parts.Sidewall": {"course": 0.4, "above": 0.0, "setback": 0.4},
+    "shapes.parts.Backfill": {"erosion": 0.0, "hump": 1.0, "spandrels": 0.0},
+    "shapes.parts.Paving": {"length": 1.0},
+    "shapes.rings.circular_arch": STRUCTURE,
+    "shapes.rings.column": STRUCTURE,
+    "shapes.rings.arch_on_piers": STRUCTURE,
+    "stages.usual_stages": {"layers": 4},
+    "structure.Structure": STRUCTURE,
+    "survey.survey.read_outlines": {"snap": 1e-3},
+    "survey.survey.surveyed": {"snap": 1e-3} | STRUCTURE,
+}
+
+BLOCKS = {
+    "joints.criteria.Criteria": {"hinge": 0.46, "failures": 4, "duration": 1e-3},
+    "limit.fill.Fill": {"cohesion": 0.0, "mobilisation": 1.0 / 3.0, "active": 1.0, "spread": 30.0},
+    "limit.movement.largest_movement": {"tolerance": 1e-4},
+    "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
+    "models.discretisation.Discretisation": {"cells": (4, 4), "degree": 1},
+    "models.exchange.states.write_state": {"magnification": 1.0},
+    "models.rigid.rigid": {"cells": 4},
+    "models.model.Prediction": {"of_small": 0.0, "of_chance": 0.0},
+    "statics.ends.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
+    "statics.newton.Newton": {"tolerance": 1e-10},
+}
+
+SHAKEN = {
+    "collapse_scale.collapse_scale": {
+        **{"dt": (0.005, 0.0025), "precision": 0.05, "between": (0.1, 10.0)}
+    },
+    "damping.effective_range": {"share": 0.9, "few": 32, "most": 1024},
+    "damping.effective_damping": {"ratio": 0.05, "share": 0.9},
+    "ladder.build": {"cells": (4, 4), "degree": 1, "tolerance": 0.005},
+    "scales.mechanism_scales": {"precision": 0.05, "between": (0.05, 5.0)},
+    "schemes.Newmark": {"beta": 0.25, "gamma": 0.5},
+    "schemes.HHT": {"alpha": -0.1},
+    "time_history.Record": {"every": 1},
+    "tradeoff.accuracy": {"tolerance": 0.005, **STEPS},
+    "tradeoff.settings_of": STEPS,
+}
+
+TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN}
+TOLD = [
+    (f"{room}.{name}".lstrip("."), given)
+    for room, table in TABLES.items()
+    for name, given in table.items()
+]
+
+
+def found(name):
+    """What a path of names stands for."""
+    module, *inner = name.split(".")
+    place = import_module("archfem")
+    for each in (module, *inner):
+        own = f"{getattr(place, '__name__', '')}.{each}"
+        place = (
+            import_module(own) if inspect.ismodule(place) and is_module(own) else vars(place)[each]
+        )
+    return place
+
+
+def is_module(name):
+    try:
+        import_module(name)
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
+def is_number(value):
+    members = value if isinstance(value, tuple) else (value,)
+    return bool(members) and all(
+        is_number(each) if isinstance(each, tuple) else type(each) in (int, float)
+        for each in members
+    )
+
+
+@pytest.mark.parametrize(("name", "given"), TOLD, ids=[name for name, _ in TOLD])
+def test_defaults_are_those_that_are_told(name, given):
+    """All numbers among them: a default that is new is to be told here too."""
+    function = found(name)
+    function = getattr(function, "__func__", function)
+    known = {
+        key: each.default
+        for key, each in inspect.signature(function).parameters.items()
+        if is_number(each.default)
+    }
+    assert known == given
