@@ -57,7 +57,7 @@ class Engine(Protocol):
             equations: whose tangents all have one sparsity pattern.
             start: first guess (n,).
             search: along each step: "basic" takes all of it, "cp" goes where the energy's slope
-                along it vanishes.
+                along it vanishes, "bt" back to where the residual has fallen.
             most: iterations it may take.
 
         Returns:

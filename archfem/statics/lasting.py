@@ -11,7 +11,7 @@ import numpy as np
 from archfem.arrays import Array
 from archfem.errors import DidNotConverge
 from archfem.models.model import Model
-from archfem.statics.newton import SEARCHES, Solved, Solver, magnitude
+from archfem.statics.newton import CONVEX, Solved, Solver, magnitude
 
 ROUNDS = 1000
 """In which joints may slide or break under the same load, each followed by an equilibrium."""
@@ -45,7 +45,7 @@ def lasting(
     model: Model,
     load: Array,
     start: Array,
-    searches: tuple[str, ...] = tuple(SEARCHES),
+    searches: tuple[str, ...] = CONVEX,
 ) -> tuple[Model, Solved]:
     """Find an equilibrium that what the joints remember of it does not upset.
 

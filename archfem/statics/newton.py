@@ -2,7 +2,8 @@
 
 The joint law makes internal forces the gradient of a convex energy, so Newton's full step finds
 the equilibrium in a few iterations from any closed start. Where statuses cycle near collapse, a
-search along the step for the point where the energy's slope vanishes ("cp") settles them.
+search along the step for the point where the energy's slope vanishes ("cp") settles them. Joints
+that slide have no such energy: there a step ends where the residual has fallen ("bt").
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,9 +27,12 @@ HOLLOW = 1e-3
 """Rounding of forces, relative to the load, that must not be taken for equilibrium. Of stones that
 are displaced by a metre it is below 1e-5."""
 
-SEARCHES = {"basic": 12, "cp": 60}
-"""Line searches in the order tried, and the iterations each may take; more than a dozen full
-steps are a cycle of statuses."""
+SEARCHES = {"basic": 12, "cp": 60, "bt": 60}
+"""Line searches, and the iterations each may take; more than a dozen full steps are a cycle of
+statuses."""
+
+CONVEX, SLIDING = ("basic", "cp"), ("basic", "bt")
+"""Searches in the order tried: along an energy, and down the residual where joints slide."""
 
 SYMMETRIC = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
 """Methods that take a matrix for symmetric, by the options of PETSc that choose them."""
@@ -97,7 +101,7 @@ class Solver:
         tangent: Tangent,
         start: Array,
         scale: float,
-        searches: Iterable[str] = tuple(SEARCHES),
+        searches: Iterable[str] = CONVEX,
     ) -> Solved:
         """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm.
 

@@ -24,6 +24,9 @@ DOUBLINGS = 20
 NEARLY = 1e-10
 """Of a step, to which the place of that point is found."""
 
+FALLS, HALVINGS = 1e-4, 40
+"""Part by which a whole step has to lower the residual, and times that it may be halved."""
+
 
 class SuperLU:
     """Newton's method, each tangent factorised by SuperLU."""
@@ -39,7 +42,7 @@ class SuperLU:
             equations: whose tangents all have one sparsity pattern.
             start: first guess (n,).
             search: along each step: "basic" takes all of it, "cp" goes where the energy's slope
-                along it vanishes.
+                along it vanishes, "bt" back to where the residual has fallen.
             most: iterations it may take.
 
         Returns:
@@ -79,7 +82,10 @@ class SuperLU:
             return rest, SINGULAR
         if search == "basic":
             return step, ""
-        share = _lowest(lambda along: float(step @ residual(q + along * step)))
+        if search == "bt":
+            share = _falling(lambda along: float(np.linalg.norm(residual(q + along * step))))
+        else:
+            share = _lowest(lambda along: float(step @ residual(q + along * step)))
         return share * step, "" if share > 0.0 else NO_WAY_DOWN
 
 
@@ -92,4 +98,14 @@ def _lowest(slope: Callable[[float], float]) -> float:
         if slope(share) >= 0.0:
             return float(brentq(slope, 0.0, share, rtol=NEARLY))
         share *= 2.0
+    return 0.0
+
+
+def _falling(size: Callable[[float], float]) -> float:
+    """Share of a step by which a residual falls, halved until it does; 0 where it never does."""
+    whole, share = size(0.0), 1.0
+    for _ in range(HALVINGS):
+        if size(share) <= (1.0 - FALLS * share) * whole:
+            return share
+        share *= 0.5
     return 0.0

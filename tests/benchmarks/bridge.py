@@ -79,7 +79,7 @@ def measured(rung: str, whole: af.Motion, scale: float, folder: Path) -> dict:
         for again in range(2 if rung not in SLOW else 1):  # the first may compile
             watch = stopwatch()
             equation = Equation(model, part.scaled(scale), DAMPING)
-            start = equation.at_rest(dead.q)
+            start = equation.at_rest(dead.q, memory=dead.model.memory)
             stepper = stepper_for(method, equation, start, DT)
             next(iter(stepper.batches(start, DT, DT)))
             setup = watch()[0]

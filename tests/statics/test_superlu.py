@@ -32,7 +32,7 @@ def stiffness(q):
     return sparse.csr_matrix([[2.0 if q[0] < 0.0 else 1e-3]])
 
 
-@pytest.mark.parametrize("search", ["basic", "cp"])
+@pytest.mark.parametrize("search", ["basic", "cp", "bt"])
 def test_a_kink_is_solved_exactly(alone, search):
     solved = Solver(1).solve(kinked, stiffness, np.array([5.0]), 1.0, [search])
     assert solved.q[0] == pytest.approx(-0.5, rel=1e-9)
@@ -65,9 +65,24 @@ def test_what_has_no_solution_says_why(alone, force, tangent, says):
         Solver(1).solve(force, tangent, np.array([0.0]), 1.0, ["basic"])
 
 
-def test_a_step_that_leads_nowhere_down(alone):
+@pytest.mark.parametrize(
+    ("search", "force"), [("cp", lambda q: 1.0 + q**2), ("bt", lambda q: 1.0 + 0.0 * q)]
+)
+def test_a_step_that_leads_nowhere_down(alone, search, force):
     with pytest.raises(af.DidNotConverge, match="no way down"):
-        Solver(1).solve(lambda q: 1.0 + q**2, stiffness, np.array([5.0]), 1.0, ["cp"])
+        Solver(1).solve(force, stiffness, np.array([5.0]), 1.0, [search])
+
+
+def test_a_search_down_the_residual_finds_what_full_steps_go_to_and_fro_over(alone):
+    """arctan from 2, whose full steps grow; it needs no energy, and the root is 0."""
+
+    def slope(q):
+        return sparse.csr_matrix([[1.0 / (1.0 + q[0] ** 2)]])
+
+    with pytest.raises(af.DidNotConverge), np.errstate(over="ignore"):
+        Solver(1).solve(np.arctan, slope, np.array([2.0]), 1.0, ["basic"])
+    solved = Solver(1).solve(np.arctan, slope, np.array([2.0]), 1.0, ["bt"])
+    assert abs(solved.q[0]) < 1e-10  # the tolerance of a solve, relative to a load of 1
 
 
 @pytest.mark.parametrize("least", [-1e6, 1e-9])

@@ -13,7 +13,7 @@ from archfem.dynamics.stepping.newmark import Numbers
 from archfem.dynamics.steps import Batch, State, Step
 from archfem.errors import DidNotConverge
 from archfem.models.model import Passage
-from archfem.statics.newton import Newton, Solved, Solver, magnitude
+from archfem.statics.newton import CONVEX, SLIDING, Newton, Solved, Solver, magnitude
 
 HALVINGS = 8
 """Times that a step may be halved before giving up."""
@@ -164,7 +164,8 @@ class Exact:
                 matrix.data = matrix.data + linear.data / numbers.gain
                 return matrix
 
-            return self._solver.solve(unbalanced, tangent, guess, self._scale)
+            searches = SLIDING if equation.remembers else CONVEX
+            return self._solver.solve(unbalanced, tangent, guess, self._scale, searches)
 
         passage = model.passage(state.q, equation.lag / dt)
         passage, found = _raised(passage, solved, state.q + dt * state.velocity)
