@@ -70,7 +70,7 @@ def finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | 
         count = int((joints["hinge"] != 0).sum())
         if count >= stop.hinges:
             return f"{count} joints hinge"
-    if len(path.states) > CRAWL and _crawls(path):
+    if len(path.states) > CRAWL and _crawls(path) and sliding(path, criteria):
         return (
             f"it crawls: in {CRAWL} steps the {path.moving} moved by no more than {HARDLY:.0%} of "
             f"{reached:.3g} m, and the factor went no further than {path.factors[-1]:.5g}"
@@ -79,7 +79,11 @@ def finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | 
 
 
 def _crawls(path: Path) -> bool:
-    """Whether neither displacement nor factor goes on, although each step finds its state."""
+    """Whether neither displacement nor factor goes on, although each step finds its state.
+
+    So does a path about a hinge that moves on, which goes by small steps for a while; only joints
+    that slide keep it there.
+    """
     moved, factors = path.displacements[[-CRAWL, -1]], np.array(path.factors)[[-CRAWL, -1]]
     grown = abs(factors[1] - factors[0]) / max(abs(factors[1]), TINY)
     return bool(moved[1] - moved[0] <= HARDLY * moved[1] and grown <= KNOWN)

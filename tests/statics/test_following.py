@@ -9,7 +9,7 @@ import pytest
 import archfem as af
 from archfem.limit.closed import closed_cohesion
 from archfem.masonry.materials import BACKFILL
-from archfem.statics import following
+from archfem.statics import ends, following
 from archfem.statics.ends import CRAWL, Stop, finished
 from archfem.statics.following import follow
 from archfem.statics.path import LoadPath
@@ -114,17 +114,20 @@ def test_a_path_that_crawls_at_its_limit_ends_and_says_so():
 
 
 @pytest.mark.parametrize(
-    ("moved", "grown", "steps", "crawls"),
+    ("moved", "grown", "steps", "slides", "crawls"),
     [
-        (0.99e-2, 1.95e-3, CRAWL, True),
-        (1.01e-2, 0.0, CRAWL, False),  # a hundredth of the way
-        (0.0, 2.05e-3, CRAWL, False),  # two thousandths of the load
-        (0.0, -2.05e-3, CRAWL, False),
-        (0.0, 0.0, CRAWL - 1, False),
+        (0.99e-2, 1.95e-3, CRAWL, True, True),
+        (0.99e-2, 1.95e-3, CRAWL, False, False),  # a hinge that moves on
+        (1.01e-2, 0.0, CRAWL, True, False),  # a hundredth of the way
+        (0.0, 2.05e-3, CRAWL, True, False),  # two thousandths of the load
+        (0.0, -2.05e-3, CRAWL, True, False),
+        (0.0, 0.0, CRAWL - 1, True, False),
     ],
 )
-def test_what_hardly_moves_in_many_steps_crawls(moved, grown, steps, crawls):
+def test_what_hardly_moves_in_many_steps_crawls(moved, grown, steps, slides, crawls, monkeypatch):
     """Shares are of the last displacement and factor; what lies before those steps is all one."""
+    names = ["bed"] if slides else []
+    monkeypatch.setattr(ends, "sliding", lambda path, criteria: names)
     part = np.append(0.0, np.linspace(0.0, 1.0, CRAWL))[-steps - 1 :]
     way, factors = 3.0 - 3.0 * moved * (1.0 - part), 0.5 - 0.5 * grown * (1.0 - part)
     way[0], factors[0] = 0.0, 0.0
