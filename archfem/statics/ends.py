@@ -20,7 +20,8 @@ that to which it is halved before giving up: so well is the limit known."""
 TINY = np.finfo(float).tiny
 
 CRAWL, HARDLY = 40, 0.01
-"""Steps in which a path must go on, and the share of all its displacement by which it must."""
+"""Steps in which a path whose joints slide must go on, and the share of all its displacement by
+which it must; others leave small steps behind, as about a hinge that moves on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,11 +80,7 @@ def finished(path: Path, stop: Stop, criteria: Criteria, moved: Array) -> str | 
 
 
 def _crawls(path: Path) -> bool:
-    """Whether neither displacement nor factor goes on, although each step finds its state.
-
-    So does a path about a hinge that moves on, which goes by small steps for a while; only joints
-    that slide keep it there.
-    """
+    """Whether neither displacement nor factor goes on, although each step finds its state."""
     moved, factors = path.displacements[[-CRAWL, -1]], np.array(path.factors)[[-CRAWL, -1]]
     grown = abs(factors[1] - factors[0]) / max(abs(factors[1]), TINY)
     return bool(moved[1] - moved[0] <= HARDLY * moved[1] and grown <= KNOWN)
