@@ -9,9 +9,6 @@ from fuzz.trial import ANSWERED, FOREIGN, NONSENSE, REFUSED, Came
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "random_structures.py"
 tried = runpy.run_path(str(SCRIPT))["tried"]
 
-PATIENCE = 20.0
-"""CPU time after which a trial counts as hung [s]: of 800 steps, which take .1 s as a rule."""
-
 
 def ready() -> None:
     """Load what is compiled."""

@@ -13,9 +13,7 @@ from pathlib import Path
 from fuzz.trial import FOREIGN, HUNG, Came
 
 PATIENCE = 20.0
-"""CPU time after which a trial counts as hung [s]; the machine may be shared. A campaign has its
-own `PATIENCE` whose trials show how far they are.
-"""
+"""CPU time after which a trial counts as hung [s]; the machine may be shared."""
 
 WAIT = 4.5
 """Time after which a trial counts as hung even if it does nothing at all, of that CPU time [-]."""
@@ -58,7 +56,7 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.ended = False
-        self.patience = self.pipe.recv()  # once it has imported what it needs
+        self.pipe.recv()  # once it has imported what it needs
 
     def asked(self, number: int) -> Came:
         """Carry out one trial."""
@@ -66,9 +64,9 @@ class _Worker:
         spent, begun = self._cpu(), time.monotonic()
         while not self.pipe.poll(0.5):
             waited = self._cpu() - spent, (time.monotonic() - begun) / WAIT
-            if max(waited) > self.patience:
+            if max(waited) > PATIENCE:
                 self.end()
-                return Came(HUNG, f"no answer after {self.patience:g} s of CPU, or {WAIT:g} times")
+                return Came(HUNG, f"no answer after {PATIENCE:g} s of CPU, or {WAIT:g} times")
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
@@ -100,7 +98,7 @@ def _serve(pipe: Connection, campaign: str, seed: int) -> None:
     now = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (now + MEMORY, now + MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    pipe.send(getattr(module, "PATIENCE", PATIENCE))
+    pipe.send("ready")
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         while True:
