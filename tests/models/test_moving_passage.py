@@ -38,11 +38,15 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late):
         assert lost >= -ROUND_OFF * scale
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
-def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity):
-    """Along the step, by central differences: places of Gauss that move leave 2e-6."""
+@pytest.mark.parametrize(("fidelity", "left"), [("rigid", 1e-8), ("faces", 5e-5)])
+def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity, left):
+    """Along the step, by central differences, which round to 1e-10.
+
+    Places of Gauss that move with the closed part of a face leave up to 2.5e-5, by the order in
+    which a mesh has its nodes.
+    """
     model, first, last = moved(fidelity, 1, friction=None)
     passage, way = model.passage(first, 0.4), last - first
     slope = (passage.force(last + 1e-5 * way) - passage.force(last - 1e-5 * way)) / 2e-5
     known = passage.tangent(last) @ way
-    assert known == pytest.approx(slope, abs=1e-5 * np.abs(slope).max())
+    assert known == pytest.approx(slope, abs=left * np.abs(slope).max())
