@@ -58,6 +58,13 @@ def test_file_and_back(run, tmp_path):
     assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
 
 
+def test_what_is_kept_over_time_and_joint_is_packed(run, tmp_path):
+    with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
+        assert plain["N"].ndim == 2
+        assert plain["N"].encoding["zlib"]
+        assert not plain["time"].encoding["zlib"]
+
+
 def test_a_history_knows_what_can_move(run, model, motion, tmp_path):
     """The blocks at the counted instant, and the first motion of all: looked for anew."""
     assert run.structure is model.structure
@@ -143,3 +150,6 @@ def test_a_mechanism_counts_from_a_millisecond_on_and_is_known_before(ring, held
     assert (run._first["by count"] is not None) is counts
     longer = af.History(af.joints.joint_dataset(ring, resultants, 1e-3 * np.arange(40.0)))
     assert longer._first_of_any_duration == longer._first
+    uneven = np.concatenate([1e-4 * np.arange(20.0), 2e-3 + 1e-2 * np.arange(20.0)])
+    some = af.History(af.joints.joint_dataset(ring, resultants, uneven))
+    assert some._first_of_any_duration["by count"].time == 5e-4

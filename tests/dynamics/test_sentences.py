@@ -1,13 +1,14 @@
 """What a run means, in words."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.sentences import extremes, in_a_line
+from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
 from archfem.limit.episodes import episode
 
 
@@ -180,3 +181,16 @@ def test_a_run_in_a_line(run):
     largest = float(np.nanmax(np.abs(run.joints["eccentricity"].values)))
     said = in_a_line(run.dataset)
     assert f"{len(run.time)} records to {run.time[-1]:.4g} s, |e| ≤ {largest:.3f}; " in said
+
+
+def test_what_cannot_move_is_only_said_of_a_count_that_nothing_bears_out(run):
+    """Where the blocks that move are known, they are named instead."""
+    found = replace(run.mechanism, blocks=(2, 3))
+    names = [block.name for block in run.structure.blocks]
+    told = {"by count": found, "verified": found}
+    for line in mechanism_lines(run.joints, told, names, told):
+        assert "cannot move" not in line
+        assert line.endswith(f"; moving: {names[2]}; {names[3]}")
+    still = {"by count": run.mechanism}
+    (line,) = mechanism_lines(run.joints, still, None, still)
+    assert "cannot move" not in line

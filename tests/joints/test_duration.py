@@ -36,6 +36,12 @@ def test_the_first_of_what_lasts_is_found(up, least, expected):
     assert bool(ends) == (expected is not None)
 
 
+def test_it_adds_up_from_nothing():
+    unbroken = Unbroken(0.25)
+    told = [(True, 0.2), (True, 0.05), (False, 0.3), (True, 0.2), (True, 0.1)]
+    assert [unbroken.lasts(*each) for each in told] == [False, True, False, False, True]
+
+
 def test_a_single_record_is_a_state_that_stays():
     assert first_lasting([0], np.array([1.0]), 1e-3, lambda instant: instant) == 0
     assert first_lasting([1], np.array([0.0, 1e-3]), 2e-3, lambda instant: instant) is None

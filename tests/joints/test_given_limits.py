@@ -37,3 +37,14 @@ def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
         for e in np.eye(model.size)
     ]
     assert tangent == pytest.approx(np.array(columns).T, abs=1e-6 * np.abs(tangent).max())
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.98, True), (1.02, False)])
+def test_it_holds_along_up_to_its_limit_and_not_at_all_beyond(pushed, share, holds):
+    model, q = pushed
+    elastic = np.abs(model.operator.elastic(q))
+    held = GivenLimits.of(model.operator, elastic / share)
+    across = len(held.law.stiffness(held.felt(q)))
+    along = held.stiffness(q)[across : across + len(elastic)]
+    assert np.all(elastic > 0.0)
+    assert np.array_equal(along, model.operator.points.shear * holds)

@@ -38,6 +38,13 @@ def test_a_joint_pressed_by_the_least_of_numbers_has_no_eccentricity():
     assert (eccentricity[1], friction[1]) == (0.1, 0.1)
 
 
+def test_the_ratios_are_the_same_however_narrow_a_structure_is():
+    resultants = np.array([[1e3, 100.0, 50.0]])
+    for width in (1.0, 1e-6):
+        found = ratios(width * resultants, np.array([0.5]))
+        assert np.ravel(found) == pytest.approx([0.1, 0.1], rel=1e-12)
+
+
 def test_faces_that_slid_are_judged_by_what_still_lies_on_the_other(ring):
     """e is of the length h - |slip|, to either side; what has slid off has none."""
     resultants = np.tile([1000.0, 0.0, 55.0], (18, 1))

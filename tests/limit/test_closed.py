@@ -50,10 +50,10 @@ def test_nothing_is_told_where_no_cohesion_is_lost(held, friction, caplog):
 
 
 def test_what_is_closed_is_three_times_from_the_thrust_to_the_edge():
-    structure = af.column(breadth=1.0, heights=[1.0] * 5, contact=block().joints[0].contact)
+    structure = af.column(breadth=0.5, heights=[1.0] * 5, contact=block().joints[0].contact)
     joints = af.dead_load(af.build(structure, fidelity="rigid")).joints.copy(deep=True)
-    joints["N"][:] = [1.0, 1.0, 1.0, 0.0, 1.0]
-    joints["M"][:] = [0.1, -0.3, 0.5, 0.0, 1.0 / 6.0]
+    joints["N"][:] = [1.0, 1.0, 1.0, 0.0, 0.06]
+    joints["M"][:] = [0.05, -0.15, 0.25, 0.0, 0.005]
     less = closed_cohesion(structure, joints)
     np.testing.assert_allclose(
         less.cohesion / structure.cohesion, [1.0, 0.6, 0.0, 0.0, 1.0], atol=1e-12

@@ -38,6 +38,7 @@ def test_joints_that_slide_are_told_with_their_factor(warned):
     ("shear", "friction", "failing", "count"),
     [
         (23.999, 0.5, {0, 1}, 0),  # c A of what is closed 4 N, and 0.5 of 40 N
+        (24.00002, 0.5, {0, 1}, 0),  # within a millionth of both parts of it
         (24.001, 0.5, {0, 1}, 2),
         (-24.001, 0.5, {0, 1}, 2),
         (24.001, 0.5, {1}, 1),  # others hold

@@ -36,6 +36,12 @@ def test_an_overlap_is_told_by_its_depth_and_its_place():
         assert ("raise snap above that" in words) is remedy
 
 
+def test_of_small_blocks_too():
+    """Centimetres of one and a half: what they share is 1 mm by 1 cm, 2 A / P = 0.909 mm deep."""
+    with pytest.raises(af.errors.InvalidStructure, match=r"by 0.1 cm², about 0.909 mm deep"):
+        check_apart([box(0.0, 0.0, 0.015, 0.01), box(0.014, 0.0, 0.015, 0.01)], NAMES)
+
+
 @pytest.mark.parametrize(("share", "same"), [(1.0 - 0.5e-6, True), (1.0 - 2e-6, False)])
 def test_outlines_are_the_same_to_a_millionth_of_their_area(share, same):
     words = "are the same: leave one out" if same else "overlap by"

@@ -16,3 +16,11 @@ import archfem as af
 def test_build_refuses(ring, given, says):
     with pytest.raises(af.InvalidInput, match=says):
         af.build(ring, **given)
+
+
+@pytest.mark.parametrize("given", [{"dilatancy": 0.02}, {"tension": 1e3}])
+def test_weak_forms_have_no_teeth_and_no_bond(given):
+    contact = af.Contact(1e9, 4e8, 0.5, "toothed", cohesion=5e3, **given)
+    one = af.column(breadth=1.0, heights=[1.0], contact=contact)
+    with pytest.raises(af.InvalidInput, match=r"\['toothed'\] have dilatancy or tension"):
+        af.build(one, fidelity="monolithic", cells=(1, 1))

@@ -1,11 +1,13 @@
 """Signs of large displacements: toward the extrados, on whichever side of the normal that is."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.models.turning_blocks import OwnCoordinates
 
 SOFT = af.Material(young=1e8, poisson=0.2, unit_weight=25e3)
 """Stones that bend by as much as joints give."""
@@ -45,3 +47,30 @@ def test_a_small_push_does_what_it_does_with_small_displacements(structure, fide
             np.testing.assert_allclose(found, known, atol=0.1 * scale, err_msg=name)
         assert (np.sign(found) == np.sign(known))[np.abs(known) > 0.1 * scale].all(), name
     assert large.factor == pytest.approx(small.factor, rel=0.05)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_own_coordinates_are_about_centres_of_mass(fidelity):
+    """There pushing a block does not turn it; modes, which are orthogonal, do not move it."""
+    ring = af.circular_arch(radius=2.0, thickness=0.6, embrace=120.0, voussoirs=3, chords=1)
+    small = af.build(ring, fidelity=fidelity, cells=(2, 2))
+    own = OwnCoordinates.of(small)
+    mass = (own.basis.T @ small.mass @ own.basis).toarray()
+    assert mass == pytest.approx(np.diag(np.diag(mass)), abs=1e-9 * np.abs(mass).max())
+    for span, turns in own.blocks.values():
+        assert turns
+        assert mass[span[0], span[0]] == pytest.approx(mass[span[1], span[1]])
+        assert mass[span[0], span[0]] * 9.81 == pytest.approx(ring.weight / 3.0, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "grain", "turns"),
+    [("rigid", False, True), ("faces", False, False), ("faces", True, True)],
+)
+def test_a_fill_turns_where_it_is_rigid_or_in_grains(fidelity, grain, turns):
+    plain = af.column(breadth=1.0, heights=[1.0], material=af.masonry.BACKFILL)
+    base, block = (replace(each, role="other") for each in plain.blocks)
+    (joint,) = (replace(each, role="other") for each in plain.joints)
+    blocks = (base, replace(block, grain=grain))
+    small = af.build(replace(plain, blocks=blocks, joints=(joint,)), fidelity=fidelity)
+    assert [each for _, each in OwnCoordinates.of(small).blocks.values()] == [turns]

@@ -42,6 +42,11 @@ def test_a_motion_at_rest_measures_nothing():
 def test_housner_intensity_goes_from_a_tenth_to_two_and_a_half_seconds(monkeypatch):
     """Of an even spectrum of 1 m/s² in acceleration: ∫ T / 2π dT, which trapezia do exactly."""
     even = "archfem.motion.measures.response_spectrum"
-    monkeypatch.setattr(even, lambda motion, periods, **_: np.ones_like(periods))
+
+    def one(motion, periods, **_):
+        assert np.diff(periods) == pytest.approx(0.025)  # as the table of measures says
+        return np.ones_like(periods)
+
+    monkeypatch.setattr(even, one)
     found = measures(af.Motion(np.array([0.0, 1.0, 0.0]), 0.01))
     assert found.housner == pytest.approx((2.5**2 - 0.1**2) / (4.0 * np.pi), rel=1e-12)

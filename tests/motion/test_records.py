@@ -464,6 +464,23 @@ def test_columns_of_afad_are_named_on_their_last_line(write):
     assert first.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
 
 
+def test_a_title_of_peer_has_two_commas_or_names_no_direction(write):
+    """A station and a date come before the direction."""
+    for title, direction in (("Friuli, Tolmezzo, 90", "90"), ("Friuli, 90", "")):
+        head = TITLE.replace("Friuli, 5/6/1976, Tolmezzo, 0", title)
+        (found,) = read_channels(write(head + "NPTS= 4, DT= .01 SEC\n" + VALUES))
+        assert found.direction == direction
+
+
+def test_counts_of_knet_are_about_their_mean(write):
+    """An instrument's zero is no acceleration."""
+    *head, _ = SAMPLES["knet"].partition("Memo")
+    counts = np.array(SAMPLES["knet"].split("Memo")[1].split()[-40:], dtype=int) + 5000
+    memo = SAMPLES["knet"].split("Memo")[1].splitlines()[0]
+    (found,) = read_channels(write("".join(head) + memo + "\n" + "\n".join(map(str, counts))))
+    assert found.samples == pytest.approx(DAMAGE["WAVE"] - DAMAGE["WAVE"].mean(), abs=2e-4)
+
+
 KEYS = [
     (smc, "2 CORRECTED ACCELEROGRAM", "*", 11),
     (afad, "SAMPLING INTERVAL (sec) : 0.01", "NUMBER OF DATA : 40", 40),

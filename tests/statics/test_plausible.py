@@ -62,6 +62,14 @@ def test_joints_of_stone_are_not_smooth():
     assert words == "the least coefficient of friction is 0.098: joints of stone have 0.6 to 0.75"
 
 
+def test_one_smooth_joint_among_rough_ones_is_told(stack):
+    rough, other = stack.joints
+    slippery = replace(other, contact=replace(other.contact, friction=0.02))
+    mixed = replace(stack, joints=(rough, slippery))
+    (words,) = dead_load_doubts(af.dead_load(af.build(mixed, fidelity="rigid")))
+    assert words.startswith("the least coefficient of friction is 0.02")
+
+
 def smooth(friction):
     """A block that rests on a level joint, which needs no friction."""
     block = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(1e9, 4e8, friction))

@@ -93,11 +93,19 @@ def test_a_mechanism_has_no_modes(alone, least):
         dense_eigen.lowest(stiff, sparse.identity(3, format="csr"), 2)
 
 
+def test_rounding_is_that_of_the_highest_square_of_one_coordinate():
+    """K / M of each by itself: 4, 3 and 2 per second squared."""
+    stiff, mass = (sparse.diags(each).tocsr() for each in ([4.0, 6.0, 6.0], [1.0, 2.0, 3.0]))
+    one = sparse.identity(3, format="csr")
+    least = dense_eigen.nothing(one, one)
+    assert dense_eigen.nothing(stiff, mass) == pytest.approx(4.0 * least, rel=1e-12)
+
+
 def test_what_only_petsc_and_slepc_can_do_says_how_they_are_had(monkeypatch):
     monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
     with pytest.raises(af.errors.NotInstalled, match="python3-dolfinx"):
         Solver(1, Newton(petsc={"pc_type": "svd"}))
-    many = sparse.identity(dense_eigen.MOST + 1, format="csr")
+    many = sparse.identity(3001, format="csr")
     with pytest.raises(af.errors.NotInstalled, match="conda-forge"):
         dense_eigen.lowest(many, many, 1)
 

@@ -8,6 +8,7 @@ from archfem.motion.records.channel import Channel
 from archfem.motion.records.text import COUNT, NUMBER, RecordText
 from archfem.motion.records.units import units_written
 
+_HEADER = 40  # lines, at most
 _DIRECTION = r"[NSEWUD]-[NSEWUD]"
 _RAW_PEAK = 0.5  # the header's peaks are those before AFAD took the offset out
 
@@ -18,7 +19,7 @@ def recognises(text: RecordText) -> bool:
     Args:
         text: the file.
     """
-    return text.holds(r"^\s*NUMBER OF DATA\s*:", 40) and text.holds(r"SAMPLING INTERVAL", 40)
+    return text.holds(r"^\s*NUMBER OF DATA\s*:", _HEADER) and text.holds(r"SAMPLING INTERVAL", _HEADER)
 
 
 def read(text: RecordText) -> list[Channel]:
@@ -30,13 +31,13 @@ def read(text: RecordText) -> list[Channel]:
     Raises:
         InvalidInput: count, step, unit or directions are missing, or the samples contradict them.
     """
-    count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT})\s*$", stop=40)
-    step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER})\s*$", stop=40)
-    peak_line, peaks = text.find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=40)
+    count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT})\s*$", stop=_HEADER)
+    step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER})\s*$", stop=_HEADER)
+    peak_line, peaks = text.find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=_HEADER)
     names_line, names = text.find(
         rf"^\s*({_DIRECTION})\s+({_DIRECTION})\s+({_DIRECTION})\s*$",
         start=max(count_line, step_line, peak_line),
-        stop=40,
+        stop=_HEADER,
     )
     units = units_written(peaks[1])
     if len(units) != 1:

@@ -29,6 +29,7 @@ def test_a_drawing_of_where_the_blocks_are(tmp_path, magnification):
     for block, own in zip(column.blocks, places, strict=True):
         expected = block.centroid + (0.0 if block.fixed else shift)
         polygon = shapely.Polygon(own)
+        assert polygon.exterior.is_ccw
         assert polygon.area == pytest.approx(block.area, rel=1e-12)
         assert (polygon.centroid.x, polygon.centroid.y) == pytest.approx(expected, abs=1e-12)
     assert {text.dxf.text for text in space.query("TEXT")} == {"base", "block 1", "block 2"}
@@ -72,6 +73,7 @@ def test_rigid_blocks_for_paraview(tmp_path):
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=150.0, voussoirs=5)
     model = af.build(ring, fidelity="rigid")
     grid = pyvista.read(write_state(model, np.zeros(model.size), tmp_path / "ring.vtu"))
+    assert set(grid.celltypes) == {7, 9}  # VTK: polygons, and supports of four corners
     rings = [shapely.Polygon(grid.get_cell(k).points[:, :2]) for k in range(grid.n_cells)]
     turn = np.radians(150.0) / 5 / 16  # each arc is drawn by 16 chords
     inner = sum(ring.area for ring, k in zip(rings, grid.cell_data["block"], strict=True) if k % 6)
