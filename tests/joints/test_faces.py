@@ -1,7 +1,10 @@
 """Opening, rotation and slip of whole joints."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy import sparse
 
 import archfem as af
 from archfem.joints.faces import face_matrix
@@ -81,3 +84,17 @@ def test_supports_that_have_moved_are_told_of(fidelity):
     assert middle[0] == pytest.approx(ring.normals[0] @ up, rel=1e-9)
     assert slip[0] == pytest.approx(ring.tangents[0] @ up, rel=1e-9)
     assert np.abs([*middle[1:], *rotation, *slip[1:]]).max() < 1e-12
+
+
+def test_points_that_are_not_about_the_middle_tell_of_it_all_the_same():
+    """Of faces that part by g_0 - θ a, at three places a of any weights."""
+    arm, weight = np.array([-0.1, 0.3, 0.6]), np.array([1.0, 2.0, 1.0])
+    points = SimpleNamespace(joint=np.zeros(3, int), arm=arm, weight=weight, count=1)
+    gaps, slips = 2e-3 - 1e-2 * arm, np.array([1e-3, 2e-3, 5e-3])
+    columns = sparse.csr_matrix(np.column_stack([gaps, np.zeros(3)]))
+    along = sparse.csr_matrix(np.column_stack([np.zeros(3), slips]))
+    operator = SimpleNamespace(points=points, opening=columns, slip=along, offset=None)
+    matrix, offset = face_matrix(operator)
+    assert matrix.toarray()[:, 0] == pytest.approx([2e-3, 1e-2, 0.0], abs=1e-15)
+    assert matrix.toarray()[:, 1] == pytest.approx([0.0, 0.0, 2.5e-3], abs=1e-15)
+    assert not offset.any()

@@ -7,7 +7,7 @@ import pytest
 from backfilled import SOIL, arch_bridge, fill_of
 
 import archfem as af
-from archfem.limit.moving import _without_dilatancy
+from archfem.limit.moving import _without_dilatancy, _worst
 from archfem.limit.programme import Programme
 
 EXACT = 1e-6
@@ -92,6 +92,12 @@ def test_the_worst_place_is_that_of_the_least_factor():
     assert found.factors.sizes == {"direction": 2, "position": 101}
     assert f"driving {found.direction}" in str(found)
     assert len(found.worst.hinges) == 4
+
+
+def test_where_nothing_is_too_much_the_worst_place_has_most_axles():
+    count = np.array([[1, 2, 0], [2, 3, 1]])
+    assert _worst(np.full((2, 3), np.inf), count) == (1, 1)
+    assert _worst(np.array([[np.inf, 3.0, 2.0], [np.inf, np.inf, 4.0]]), count) == (0, 2)
 
 
 @pytest.mark.slow

@@ -233,3 +233,15 @@ def test_a_line_begins_on_the_left_or_where_it_stands_at_its_foot(step, first):
     line = np.array([[2.0, 3.0], [2.0 + step[0], 3.0 + step[1]]])
     assert _turned(line)[0].tolist() == line[first].tolist()
     assert _turned(line[::-1])[0].tolist() == line[first].tolist()
+
+
+@pytest.mark.parametrize(("share", "touch"), [(0.98, True), (1.02, False)])
+@pytest.mark.parametrize("upright", [False, True])
+def test_blocks_touch_within_a_millionth_of_all_blocks(share, touch, upright):
+    """Of the diagonal of the corners, which span two metres by one, wherever they are."""
+    gap = share * 1e-6 * np.hypot(2.0, 1.0)
+    if upright:
+        blocks = [box(50, 70, 51, 71, "a"), box(50, 71 + gap, 51, 72, "b")]
+    else:
+        blocks = [box(50, 70, 51, 71, "a"), box(51 + gap, 70, 52, 71, "b")]
+    assert len(touching(blocks)) == touch

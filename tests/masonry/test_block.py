@@ -1,5 +1,6 @@
 """Blocks: area, centroid and polar moment."""
 
+import numpy as np
 import pytest
 
 import archfem as af
@@ -21,3 +22,14 @@ def test_sector_measures_are_the_limit_of_its_polygons(ring):
     assert sector.area == pytest.approx(fine.area, rel=1e-8)
     assert sector.centroid == pytest.approx(fine.centroid, rel=1e-7)
     assert sector.polar_moment == pytest.approx(fine.polar_moment, rel=1e-6)
+
+
+def test_arcs_are_about_their_own_centre():
+    """A sector of 90° about (3, 1), between radii of 2 and 1: its arcs, and all its outline."""
+    corners = ((5.0, 1.0), (3.0, 3.0), (3.0, 2.0), (4.0, 1.0))
+    sector = af.Block(corners, af.STONE, "quarter", centre=(3.0, 1.0))
+    for side, radius in ((0, 2.0), (2, 1.0)):
+        points = sector.arc(side, 6)
+        assert points[[0, -1]] == pytest.approx(sector.points[[side, side + 1]])
+        assert np.hypot(*(points - [3.0, 1.0]).T) == pytest.approx(radius)
+    assert sector.area == pytest.approx(0.75 * np.pi)

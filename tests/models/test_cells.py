@@ -5,6 +5,7 @@ import pytest
 from scipy.sparse.linalg import lsqr
 
 import archfem as af
+from archfem.masonry.geometry import area_of_polygon
 from archfem.masonry.rigid_motion import motion_of
 
 
@@ -31,3 +32,14 @@ def test_an_inclined_load_has_the_arm_of_the_arc(rung):
     q = lsqr(model.cells.lift[rows], turned[of_free].ravel(), atol=1e-14, btol=1e-14)[0]
     height = np.sqrt((2.95 + 0.275) ** 2 - 0.7**2)
     assert model.load(push) @ q == pytest.approx(-0.7 * -1.5e3 - height * 2e3, rel=1e-8)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(("cell", "corners"), [("quadrilateral", 4), ("triangle", 3)])
+def test_cells_of_all_nodes_cover_the_blocks_once(cell, corners, degree):
+    """Whatever nodes they have between their corners."""
+    stack = af.column(breadth=1.0, heights=[1.0, 2.0])
+    cells = af.build(stack, cells=(2, 2), cell=cell, degree=degree).cells
+    assert {len(polygon) for polygon in cells.polygons} == {corners}
+    area = sum(area_of_polygon(cells.places[polygon])[0] for polygon in cells.polygons)
+    assert area == pytest.approx(3.0, rel=1e-12)

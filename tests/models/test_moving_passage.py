@@ -50,3 +50,18 @@ def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity, left):
     slope = (passage.force(last + 1e-5 * way) - passage.force(last - 1e-5 * way)) / 2e-5
     known = passage.tangent(last) @ way
     assert known == pytest.approx(slope, abs=left * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+def test_at_an_instant_energy_gives_the_force_and_that_the_tangent(fidelity):
+    """Along a line, by central differences of what rounds to 1e-9 of the largest."""
+    model, first, last = moved(fidelity, 2, friction=None)
+    way, step = last - first, 1e-4
+    ends = (first + step * way, first - step * way)
+    slope = (model.energy(ends[0]) - model.energy(ends[1])) / (2.0 * step)
+    assert model.force(first) @ way == pytest.approx(slope, rel=1e-6)
+    bent = (model.force(ends[0]) - model.force(ends[1])) / (2.0 * step)
+    known = model.tangent(first) @ way
+    assert known == pytest.approx(bent, abs=1e-4 * np.abs(bent).max())
+    assert model.remembered(first) == pytest.approx(model.memory, abs=0.0)
+    assert model.mismatch(last) == (0.0, "")  # all faces are plane

@@ -12,6 +12,9 @@ NAMES |= {"minimum": "maximum", "argmax": "argmin", "argmin": "argmax"}
 FACTOR = 1.1
 """By which a number is multiplied; a whole number grows by one."""
 
+TOLD = ("logger.", "bar.", "tqdm")
+"""What begins a call that tells people of a run and gives nothing back: logs, bars of progress."""
+
 SHOWN = 90
 """Letters of what stands around a change, by which it is told from others of its module."""
 
@@ -68,8 +71,9 @@ class Change:
 def changes(source: str) -> list[Change]:
     """Return what may be changed in a module.
 
-    Words of errors and of the log, annotations, imports, what a function that only refuses does and
-    sizes of a shape that are to be found are left out.
+    Words of errors, logs and bars of progress, annotations, imports, what a function that only
+    refuses does and sizes of a shape that are to be found (any number below zero asks for that)
+    are left out.
 
     Args:
         source: of the module.
@@ -145,16 +149,17 @@ def _places(tree: ast.AST, above: list[ast.AST]) -> Iterator[tuple[ast.AST, list
                 continue
             if isinstance(node, ast.If) and isinstance(node.body[-1], ast.Raise):
                 continue
-            if field == "args" and _is_reshape(tree) and ast.unparse(node) == "-1":
+            if _is_shape(around) and ast.unparse(node) == "-1":
                 continue
-            if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("logger."):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).startswith(TOLD):
                 continue
             yield node, around
             yield from _places(node, around)
 
 
-def _is_reshape(call: ast.AST) -> bool:
-    """Whether it gives a shape, in which -1 stands for a size that is to be found."""
+def _is_shape(around: list[ast.AST]) -> bool:
+    """Whether what stands in these is a size that `reshape` is given, by itself or in a tuple."""
+    call = around[-2] if isinstance(around[-1], ast.Tuple) else around[-1]
     return (
         isinstance(call, ast.Call)
         and isinstance(call.func, ast.Attribute)

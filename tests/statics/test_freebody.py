@@ -116,3 +116,11 @@ def test_what_is_left_is_told_of_the_largest_force():
     assert body.sizes == pytest.approx([5.0, np.sqrt(10.0), 0.0])
     assert body.closing_error == pytest.approx(np.hypot(3.0, 4.0) / 5.0)
     assert body.moment == pytest.approx(5.0 - 6.0)
+
+
+def test_forces_are_those_on_the_whole_width():
+    stack = af.column(breadth=1.0, heights=[1.0, 1.0], width=2.5)
+    model = af.build(stack, fidelity="rigid")
+    body = forces_on(stack, af.dead_load(model).joints, 2)
+    weight = 2.5 * af.STONE.unit_weight
+    assert body.forces == pytest.approx(np.array([[0.0, weight], [0.0, -weight]]), abs=1e-6)
