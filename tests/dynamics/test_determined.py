@@ -65,3 +65,13 @@ def test_histories_are_the_same_to_a_millionth_of_the_largest_force(slender, sha
     known = np.log(share * 1e-6 / 1.1e-8) / (run.time[150] - run.time[100])
     assert found.growth == pytest.approx(known, rel=1e-4)
     assert found.peaks == 0.0
+
+
+def test_a_history_that_ended_earlier_is_compared_as_far_as_it_goes(slender):
+    """And one that is the same grows apart by nothing."""
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    run = af.time_history(slender, motion, dt=0.005, damping=DAMPED)
+    short = af.History(run.dataset.isel(time=slice(0, 50)))
+    for pair in ((run, short), (short, run)):
+        found = parted(*pair)
+        assert (found.until, found.growth, found.difference) == (np.inf, 0.0, 0.0)

@@ -472,6 +472,18 @@ def test_a_title_of_peer_has_two_commas_or_names_no_direction(write):
         assert found.direction == direction
 
 
+def test_channels_of_cosmos_follow_one_another_from_the_first_line_on(write):
+    """Nothing between the end of one and the header of the next, nor before the first."""
+    lines = SAMPLES["cosmos"].splitlines()
+    first = next(k for k, line in enumerate(lines) if "Integer-header" in line)
+    level = "\n".join(lines[first:])
+    upright = level.replace(f"{90:8d}", f"{400:8d}")
+    found = read_channels(write(f"{level}\n{upright}\n{level}\n"))
+    assert [each.is_vertical for each in found] == [False, True, False]
+    for each in found:
+        assert each.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
+
+
 def test_counts_of_knet_are_about_their_mean(write):
     """An instrument's zero is no acceleration."""
     *head, _ = SAMPLES["knet"].partition("Memo")
