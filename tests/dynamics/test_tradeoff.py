@@ -1,9 +1,12 @@
 """Speed against error: what is tried and compared, by runs that are known."""
 
+from time import process_time
+
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.dynamics import tradeoff
 from archfem.dynamics.tradeoff import Run, compared, references_of, settings_of
 
 
@@ -50,3 +53,24 @@ def test_errors_are_the_largest_difference_to_the_reference(settings):
     assert "20" in second.split()
     with pytest.raises(af.DidNotConverge, match=r"the reference, condensed 12×12 exact 1\.25 ms"):
         compared(settings, [Run(7, 1.0, None), *runs[1:]], 10.0, 0.003)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_more_time_is_told_than_has_passed(stack, fails, monkeypatch):
+    model = af.build(stack, fidelity="rigid")
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    if fails:
+        true, calls = tradeoff.time_history, []
+
+        def failing(*given, **more):
+            calls.append(given)
+            if len(calls) > 1:
+                raise af.DidNotConverge("made to fail")
+            return true(*given, **more)
+
+        monkeypatch.setattr(tradeoff, "time_history", failing)
+    begun = process_time()
+    run = tradeoff.timed(model, motion, None, 0.005)
+    assert 0.0 < run.seconds < process_time() - begun
+    assert (run.peaks is None) is fails
+    assert run.size == 6

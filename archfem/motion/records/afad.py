@@ -19,7 +19,9 @@ def recognises(text: RecordText) -> bool:
     Args:
         text: the file.
     """
-    return text.holds(r"^\s*NUMBER OF DATA\s*:", _HEADER) and text.holds(r"SAMPLING INTERVAL", _HEADER)
+    return text.holds(r"^\s*NUMBER OF DATA\s*:", _HEADER) and text.holds(
+        r"SAMPLING INTERVAL", _HEADER
+    )
 
 
 def read(text: RecordText) -> list[Channel]:
