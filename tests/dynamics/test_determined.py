@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.dynamics import determined
 from archfem.dynamics.determined import parted
 
 DAMPED = af.StiffnessDamping(0.05, 8.0)
@@ -38,15 +39,16 @@ def test_steppers_part_when_a_nudge_says_so(slender):
     assert "from then on only statistics are" in nudged.text
 
 
-def test_growth_of_a_difference_that_is_known(slender):
-    """Made by hand: e-fold by e-fold."""
+@pytest.mark.parametrize("begun", [1e-9, 0.95e-8])
+def test_growth_of_a_difference_that_is_known(slender, begun):
+    """Made by hand: e-fold by e-fold, told from 1e-8 on, which the second is at the first step."""
     motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
     run = af.time_history(slender, motion, dt=0.005, damping=DAMPED)
-    off = 1e-9 * np.exp(20.0 * run.time)[:, None] * np.abs(run.joints["N"].values).max()
+    off = begun * np.exp(20.0 * run.time)[:, None] * np.abs(run.joints["N"].values).max()
     other = af.History(run.dataset.assign(N=run.dataset["N"] + off))
     found = parted(run, other)
     assert found.growth == pytest.approx(20.0, rel=0.01)
-    assert found.until == pytest.approx(np.log(1e3) / 20.0, abs=0.006)
+    assert found.until == pytest.approx(np.log(1e-6 / begun) / 20.0, abs=0.006)
 
 
 @pytest.mark.parametrize(("share", "same"), [(0.98, True), (1.02, False)])
@@ -75,3 +77,19 @@ def test_a_history_that_ended_earlier_is_compared_as_far_as_it_goes(slender):
     for pair in ((run, short), (short, run)):
         found = parted(*pair)
         assert (found.until, found.growth, found.difference) == (np.inf, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("given", "dt"), [({}, 0.005), ({"dt": 0.01}, 0.01)])
+def test_steps_are_five_milliseconds_unless_told(stack, given, dt, monkeypatch):
+    asked = []
+
+    def asking(model, motion, **options):
+        asked.append((options["dt"], motion.pga))
+        return af.time_history(model, motion, **options)
+
+    monkeypatch.setattr(determined, "time_history", asking)
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1).cut(0.4, 0.5)
+    model = af.build(stack, fidelity="rigid")
+    assert af.dynamics.predictability(model, motion, **given).until == np.inf
+    assert [each for each, _ in asked] == [dt, dt]
+    assert asked[1][1] == pytest.approx((1.0 + 1e-10) * asked[0][1], rel=1e-13)

@@ -27,6 +27,19 @@ def test_joints_must_lie_between_their_blocks(stack):
         replace(stack, joints=(stack.joints[0], replace(stack.joints[1], blocks=(1, 7))))
 
 
+@pytest.mark.parametrize(("share", "found"), [(0.98, True), (1.02, False)])
+def test_joints_lie_on_faces_to_a_millionth_of_the_size(share, found):
+    tower = af.column(breadth=2.0, heights=[4.0, 4.0])
+    (x, y), (end, _) = tower.joints[1].intrados, tower.joints[1].extrados
+    y += share * 1e-6 * tower.size
+    raised = replace(tower.joints[1], intrados=(x, y), extrados=(end, y))
+    if found:
+        assert replace(tower, joints=(tower.joints[0], raised)).normals[1] @ [0.0, 1.0] == 1.0
+    else:
+        with pytest.raises(af.errors.InvalidStructure, match="share no face"):
+            replace(tower, joints=(tower.joints[0], raised))
+
+
 def test_a_loose_block_is_named(stack):
     with pytest.raises(af.errors.InvalidStructure, match=r"\['block 2'\] rest on nothing"):
         replace(stack, joints=stack.joints[:1])
@@ -126,3 +139,5 @@ def test_a_fingerprint_tells_geometry_to_a_billionth_of_its_size():
     assert pair(1.0, zero=-0.0).fingerprint == told
     assert pair(1.0, width=1.0 + 2e-9).fingerprint == told
     assert pair(1.0, width=1.0 + 2e-8).fingerprint != told
+    # files that are written already are still of their structures
+    assert af.column(breadth=1.0, heights=[1.0, 1.0]).fingerprint == "f33242d1fb0986b7"

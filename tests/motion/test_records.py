@@ -456,6 +456,22 @@ def test_a_first_column_is_time_where_nine_in_ten_steps_grow(write):
             read_channels(write("# gal, dt = 0.01 s\n" + rows))
 
 
+@pytest.mark.parametrize(("bow", "even"), [(0.24, True), (0.26, False)])
+def test_times_begin_anywhere_and_keep_to_their_line_by_a_quarter_of_a_step(write, bow, even):
+    """Two lines that meet in the middle, no step of which is off by more than two per cent.
+
+    Their least squares leave half of the height of the bow at its ends and its top.
+    """
+    count = np.arange(101)
+    times = 5.0 + 0.01 * (count + 2.0 * bow * (1.0 - np.abs(count / 50.0 - 1.0)))
+    path = write("# gal\n" + "".join(f"{t:.7f} {k % 7}\n" for k, t in enumerate(times)))
+    if even:
+        assert read_channels(path)[0].dt == pytest.approx(0.01)
+    else:
+        with pytest.raises(af.InvalidInput, match="time is not uniform"):
+            read_channels(path)
+
+
 def test_columns_of_afad_are_named_on_their_last_line(write):
     """Another line that names three directions, before the peaks, tells nothing."""
     head, peaks = SAMPLES["afad"].split("RAW PGA")

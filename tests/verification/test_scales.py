@@ -42,7 +42,7 @@ def of_joints(joints, force, length, prefix):
 
 
 def at_rest(weight, width, length):
-    """Under its weight and pushed, dry and with bonds, on rigid blocks and with faces that yield."""
+    """Under its weight and pushed, dry and with bonds, of rigid blocks and of such as yield."""
     force, found = weight * width * length**2, {}
     sizes = np.array([length, length, 1.0])
     for cohesion, fidelity in ((0.0, "rigid"), (2e4, "rigid"), (0.0, "faces")):
