@@ -49,6 +49,9 @@ def test_paraview_sees_openings(run, tmp_path):
         series.set_active_time_point(number)
         blocks, joints = series.read()
         assert joints.n_cells == len(model.structure.joints)
+        for k, joint in enumerate(model.structure.joints):
+            corners = joints.get_cell(k).points[:, :2]
+            assert corners == pytest.approx(np.array([*joint.ends, *joint.ends[::-1]]))
         moved = joints["displacement"].reshape(-1, 4, 3)[:, :, :2]
         faces = joints_of(model, history, number)
         assert moved[:, :2] == pytest.approx(faces[:, 0], abs=1e-15)
