@@ -193,7 +193,7 @@ def _found(
     stones, dead = weighed
     fall = dead.unbalanced()
     if not balanced(fall, dead):
-        nothing = replace(fall, forces=np.nan * fall.forces, unknowns=np.nan * fall.unknowns)
+        nothing = _unknown(fall)
         return _result(stones, dead, Outcome.INFEASIBLE, np.nan, nothing)
     support = None
     if isinstance(live, Settlement):
@@ -273,13 +273,20 @@ def _settled(dead: Programme, support: Array) -> Programme:
     return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
 
 
+def _unknown(found: Optimum) -> Optimum:
+    """The same, of which forces are not known."""
+    sizes = found.forces.shape, found.unknowns.shape
+    forces, unknowns = (np.full(size, np.nan) for size in sizes)
+    return replace(found, forces=forces, unknowns=unknowns)
+
+
 def _bracketed(
     stones: Stones, dead: Programme, rest: Optimum, known: WithoutDilatancy, least: bool
 ) -> Collapse:
     """Return the safe end of the bracket, where no solution without dilatancy was found."""
     logger.warning("no state without dilatancy was found; the factor is only a bound: %s", known)
     bound = known.bracket[0 if least else 1]
-    state = replace(rest, forces=np.nan * rest.forces, unknowns=np.nan * rest.unknowns)
+    state = _unknown(rest)
     return replace(_result(stones, dead, Outcome.BRACKETED, bound, state), solutions=known)
 
 

@@ -349,3 +349,19 @@ def test_piers_reach_to_the_ground_and_carry_the_ring():
 def test_input_that_cannot_be_meant_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("way", "hinges", "slides"),
+    [((1.0, 0.0, 0.0), 0, 2), ((0.0, -1.0, 0.0), 2, 1)],
+)
+def test_what_moves_over_a_support_does_not_depend_on_how_far_it_goes(way, hinges, slides):
+    """By a metre, a millimetre or a micrometre: joints slide apart by μ of what they slip."""
+    ring = af.circular_arch(
+        **{"radius": 2.95, "thickness": 0.8, "embrace": 120.0, "voussoirs": 7, "chords": 1},
+        contact=af.Contact(1.48e9, 0.3e9, 0.3),
+    )
+    for far in (1.0, 1e-3, 1e-6):
+        motion = tuple(far * each for each in way)
+        found = af.collapse_factor(ring, live=af.Settlement("right abutment", motion))
+        assert (len(found.hinges), len(found.sliding)) == (hinges, slides)
