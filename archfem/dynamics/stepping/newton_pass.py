@@ -233,9 +233,14 @@ def _substitute(matrix, exchanges, right):  # type: ignore
 
 @numba.njit(cache=True)
 def _gradients(matrix, right):  # type: ignore
-    """Solve a system in place by stabilised biconjugate gradients from zero; whether they do.
+    """Solve a system in place by stabilised biconjugate gradients; nothing if a factor costs less.
 
-    They serve where they are fewer than would cost as much as a factor; else nothing is changed.
+    Args:
+        matrix: of the system (c, c).
+        right: its right side, then the solution (c,).
+
+    Returns:
+        Whether it is solved.
     """
     solution, left = np.zeros(len(right)), right.copy()
     direction, rho = right.copy(), right @ right
