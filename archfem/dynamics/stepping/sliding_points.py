@@ -59,7 +59,7 @@ def _held(law, opening, right):  # type: ignore
     for k in range(len(points)):
         if points[k].group >= 0:
             force[points[k].group] += points[k].elastic * points[k].slid
-    add_rows(opening, np.flatnonzero(force), force, right)
+    add_rows(opening, range(len(force)), force, right)
 
 
 def _largest(law, gap):  # type: ignore
