@@ -114,6 +114,7 @@ def tend(handle: int) -> None:
                 control.sendall(_message(_buried(workers.pop(_number(message)))))
     for process in workers.values():
         _buried(process)
+    _leave(0)
 
 
 def ready() -> None:
@@ -137,6 +138,7 @@ def _forked(control: socket.socket, handle: int) -> int:
     code = 1
     try:
         control.close()
+        os.dup(handle)  # so that the driver sees its end when the process has ended, not before
         _begin(nursery)
         serve(handle)
         code = 0
@@ -161,7 +163,7 @@ def _begin(nursery: int) -> None:
 
 
 def _leave(code: int) -> None:
-    """End a forked process without what its parent has registered for its own end."""
+    """End this process at once, without what its parent has registered for its own end."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()

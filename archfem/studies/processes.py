@@ -7,7 +7,7 @@ up a model that nobody is at: so each is built once, not once a process.
 import os
 import pickle
 from collections import Counter, deque
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -41,7 +41,11 @@ def serially(points: Sequence[tuple[int, Point]], asked: Asked) -> Iterator[tupl
 
 
 def on_processes(
-    points: Sequence[tuple[int, Point]], asked: Asked, workers: int, log: Path | None = None
+    points: Sequence[tuple[int, Point]],
+    asked: Asked,
+    workers: int,
+    log: Path | None = None,
+    meanwhile: Callable[[], object] | None = None,
 ) -> Iterator[tuple[int, Row]]:
     """Answer points on processes of this machine, each on one thread.
 
@@ -50,6 +54,7 @@ def on_processes(
         asked: what is to be found.
         workers: how many processes.
         log: file to which they write what they have to say; None throws it away.
+        meanwhile: what this process does while the others begin.
 
     Yields:
         Number and row of each, as they are finished.
@@ -61,6 +66,9 @@ def on_processes(
     with Path(os.devnull if log is None else log).open("a") as words:
         staff = Staff(workers, words)
         try:
+            staff.take(tasks)
+            if meanwhile is not None:
+                meanwhile()
             while tasks or staff.busy:
                 staff.take(tasks)
                 for worker in staff.ready():
