@@ -88,18 +88,17 @@ class Solver:
     Args:
         size: number of coordinates.
         settings: of the solves.
-        sparing: whether what is small is left to SciPy, unless there are options for PETSc, which
-            takes longer to load than a few solves take.
+        sparing: whether full steps of what is small are left to SciPy, unless there are options
+            for PETSc, which takes longer to load than a few solves take.
 
     Raises:
         NotInstalled: there are options for PETSc, which is not installed.
     """
 
-    def __init__(
-        self, size: int, settings: Newton | None = None, *, sparing: bool = False
-    ) -> None:
+    def __init__(self, size: int, settings: Newton | None = None, *, sparing: bool = False) -> None:
         self.settings = settings or Newton()
-        self._size, self._sparing = size, sparing and size <= SMALL
+        self._size = size
+        self._light = SuperLU() if sparing and size <= SMALL and not self.settings.petsc else None
         if self.settings.petsc:
             _ = self._engine  # which may not be there
         self._scale = 1.0
@@ -132,7 +131,8 @@ class Solver:
         equations = Equations(residual, self._checked(tangent), self._fits)
         iterations = 0
         for search in searches:
-            found = self._engine.attempt(equations, start, search, SEARCHES[search])
+            engine = self._light if self._light and search == "basic" else self._engine
+            found = engine.attempt(equations, start, search, SEARCHES[search])
             iterations += found.iterations
             if not found.failure:
                 return Solved(found.q, iterations, found.rest)
@@ -147,7 +147,7 @@ class Solver:
     @cached_property
     def _engine(self) -> Engine:
         """What solves, loaded when it is first needed: PETSc takes a while, and begins MPI."""
-        if not self.settings.petsc and (self._sparing or find_spec("petsc4py") is None):
+        if find_spec("petsc4py") is None and not self.settings.petsc:
             return SuperLU()
         with needed("PETSc"):
             from archfem.statics.snes import Snes

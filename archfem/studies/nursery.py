@@ -17,8 +17,8 @@ import subprocess
 import sys
 import threading
 import traceback
+from array import array
 from contextlib import suppress
-from multiprocessing.connection import Connection
 from typing import IO, Any
 
 import numpy as np
@@ -34,6 +34,9 @@ THREADLESS = {"JE_ARROW_MALLOC_CONF": "background_thread:false"}
 
 DIE_WITH_PARENT = 1
 """Option of Linux's prctl: the signal that a process gets when its parent ends."""
+
+QUIETLY = getattr(socket, "MSG_NOSIGNAL", 0)
+"""Sends to who is gone without SIGPIPE, which ends a process where gmsh has been at work."""
 
 SIZE = 8
 """Bytes of a message: a whole number."""
@@ -61,16 +64,18 @@ class Nursery:
         theirs.close()
         self._workers = 0
 
-    def worker(self) -> tuple[int, Connection]:
-        """Ask for a worker, and return its number and the pipe to it, without waiting for either.
+    def worker(self) -> tuple[int, socket.socket]:
+        """Ask for a worker, without waiting for it.
 
-        Where the process is gone, the pipe is at its end.
+        Returns:
+            Its number, and the pipe to it, which is at its end where the process is gone.
         """
         ours, theirs = socket.socketpair()
         self._workers += 1
+        handle = socket.SOL_SOCKET, socket.SCM_RIGHTS, array("i", [theirs.fileno()])
         with theirs, suppress(OSError):
-            socket.send_fds(self._control, [_message(self._workers)], [theirs.fileno()])
-        return self._workers, Connection(ours.detach())
+            self._control.sendmsg([_message(self._workers)], [handle], QUIETLY)
+        return self._workers, ours
 
     def buried(self, worker: int) -> int | None:
         """End a worker that has not ended, and return its exit code, less than 0 for a signal.
@@ -82,7 +87,7 @@ class Nursery:
             The code; None where the nursery is gone, and its workers with it.
         """
         with suppress(OSError):
-            self._control.sendall(_message(worker))
+            self._control.sendall(_message(worker), QUIETLY)
             if told := self._control.recv(SIZE):
                 return _number(told)
         return None
@@ -120,7 +125,7 @@ def tend(handle: int) -> None:
 def ready() -> None:
     """Load what points need, on one thread, and leave it out of all collecting of garbage."""
     tqdm.monitor_interval = 0  # no thread that looks after bars
-    tqdm.set_lock(threading.RLock())  # type: ignore[no-untyped-call]  # none shared with siblings
+    tqdm.set_lock(threading.RLock())  # none that siblings share
     warm()
     gc.freeze()
     gc.enable()

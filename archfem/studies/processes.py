@@ -15,7 +15,7 @@ from typing import IO, Any, NamedTuple
 
 from archfem.errors import InvalidInput
 from archfem.studies.asking import Asked
-from archfem.studies.nursery import Nursery
+from archfem.studies.nursery import QUIETLY, Nursery
 from archfem.studies.points import Point, model_of
 from archfem.studies.worker import Row, answer, row
 
@@ -199,7 +199,7 @@ class Staff:
     def end(self) -> None:
         """End all processes."""
         for worker in self._workers:
-            worker.pipe.close()
+            worker.close()
         if self._nursery is not None:
             self._nursery.end()
 
@@ -234,6 +234,7 @@ class _Worker:
     def __init__(self, nursery: Nursery) -> None:
         self.nursery = nursery
         self.number, self.pipe = nursery.worker()
+        self._answers = self.pipe.makefile("rb")
         self.task: Task | None = None
         self.model: str | None = None
 
@@ -241,17 +242,22 @@ class _Worker:
         """Hand over a point; a process that is gone is noticed when its answer is waited for."""
         self.task, self.model = task, task.model
         with suppress(OSError):
-            self.pipe.send((task.number, task.told))
+            self.pipe.sendall(pickle.dumps((task.number, task.told)), QUIETLY)
 
     def result(self) -> tuple[int, Row] | None:
         """Number and row of the point that was handed over; None where the process is gone."""
         try:
-            done: tuple[int, Row] = self.pipe.recv()
-        except (EOFError, OSError):
-            self.pipe.close()
+            done: tuple[int, Row] = pickle.load(self._answers)
+        except (EOFError, OSError, pickle.UnpicklingError):  # ended, or in the midst of an answer
+            self.close()
             return None
         self.task = None
         return done
+
+    def close(self) -> None:
+        """Close the pipe, at which a process that waits for a point ends."""
+        self._answers.close()
+        self.pipe.close()
 
 
 def _how(code: int) -> str:
