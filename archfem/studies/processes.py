@@ -1,7 +1,8 @@
 """Points on processes of this machine: who is free takes the next; one that dies is replaced.
 
 Who is free goes on with points of the model that it knows, as long as there are any, and then takes
-up a model that nobody is at: so each is built once, not once a process.
+up a model that nobody is at: so each is built once, not once a process. All are forked from one
+that has imported what they need.
 """
 
 import os
