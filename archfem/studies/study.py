@@ -20,7 +20,7 @@ from archfem.studies.asking import Asked, refuse_code
 from archfem.studies.comparison import Comparison
 from archfem.studies.files import study_tables
 from archfem.studies.over import Axis, axes_over, changes_along, ends
-from archfem.studies.points import Point
+from archfem.studies.points import Point, by_model
 from archfem.studies.processes import on_processes, serially
 from archfem.studies.progress import Progress, status
 from archfem.studies.store import Store
@@ -188,8 +188,8 @@ class Study:
             rows = store.finished(digests)
             self._tell(store, digests, rows)
         wanted = dict(zip(reversed(digests), reversed(range(len(digests))), strict=True))
-        missing = [(number, self.points[number]) for digest, number in wanted.items()
-                   if digest not in rows][::-1]  # fmt: skip
+        left = [number for digest, number in wanted.items() if digest not in rows]
+        missing = by_model([(number, self.points[number]) for number in reversed(left)])
         failed = sum(bool(row["error"]) for row in rows.values())
         folder = None if store is None else store.folder
         progress = Progress(len(wanted), len(rows), failed, folder)
