@@ -24,7 +24,7 @@ from archfem.studies.points import Point, by_model
 from archfem.studies.processes import on_processes, serially
 from archfem.studies.progress import Progress, status
 from archfem.studies.store import Store
-from archfem.studies.table import table, write_table
+from archfem.studies.table import load_tables, table, write_table
 from archfem.studies.worker import Row
 
 logger = logging.getLogger("archfem")
@@ -224,7 +224,7 @@ class Study:
         count = whole(len(os.sched_getaffinity(0)) if workers is None else workers, "workers")
         if count > 1 and len(points) > 1:
             log = None if folder is None else folder / LOG
-            yield from on_processes(points, self.asked, count, log)
+            yield from on_processes(points, self.asked, count, log, load_tables)
             return
         with threadpool_limits(limits=1):
             yield from serially(points, self.asked)

@@ -142,17 +142,6 @@ def test_a_changed_case_is_told_apart(
     assert "6 points of other cases" in caplog.text
 
 
-@pytest.mark.slow
-def test_a_process_that_dies_is_replaced(small_ring, tmp_path, finders, monkeypatch):
-    monkeypatch.setattr("archfem.studies.processes.ATTEMPTS", 2)
-    over = {"structure.thickness": [0.5, 0.6]}
-    find = {"name": "finders_of_tests:deadly", "folder": str(tmp_path)}
-    found = af.Study.of(small_ring, over, find).run(tmp_path / "out", workers=2)
-    assert found["twice"].values[0] == 1.0  # its second process lives
-    assert "WorkerDied: 2 processes" in found["error"].values[1]
-    assert "signal 9" in found["error"].values[1]
-
-
 def test_a_second_driver_is_refused(study_file, tmp_path):
     folder = tmp_path / "out"
     with (
