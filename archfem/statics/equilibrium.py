@@ -184,7 +184,7 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
 def _solver(model: Model, newton: Newton | None) -> Solver:
     if newton is not None:
         instance(newton, Newton, "newton", "give Newton(tolerance=…)")
-    return Solver(model.size, newton)
+    return Solver(model.size, newton, sparing=True)
 
 
 def _on_moved_supports(

@@ -1,4 +1,4 @@
-"""One equilibrium solve: through PETSc SNES, or where PETSc is not installed by SciPy.
+"""One equilibrium solve: through PETSc SNES, or where that is not installed or not worth it SciPy.
 
 The joint law makes internal forces the gradient of a convex energy, so Newton's full step finds
 the equilibrium in a few iterations from any closed start. Where statuses cycle near collapse, a
@@ -8,6 +8,7 @@ that slide have no such energy: there a step ends where the residual has fallen 
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.util import find_spec
 
 import numpy as np
@@ -22,6 +23,9 @@ from archfem.statics.superlu import SuperLU
 
 ROUGHLY = 1e-7
 """Residual, relative to the load, above which round-off is no excuse."""
+
+SMALL = 300
+"""Coordinates up to which SciPy takes about as long as PETSc, 5 to 9 ms a dead load."""
 
 HOLLOW = 1e-3
 """Rounding of forces, relative to the load, that must not be taken for equilibrium. Of stones that
@@ -84,14 +88,19 @@ class Solver:
     Args:
         size: number of coordinates.
         settings: of the solves.
+        sparing: whether full steps of what is small are left to SciPy, unless there are options
+            for PETSc, which takes longer to load than a few solves take.
 
     Raises:
         NotInstalled: there are options for PETSc, which is not installed.
     """
 
-    def __init__(self, size: int, settings: Newton | None = None) -> None:
+    def __init__(self, size: int, settings: Newton | None = None, *, sparing: bool = False) -> None:
         self.settings = settings or Newton()
-        self._engine: Engine = _engine(size, self.settings)
+        self._size = size
+        self._light = SuperLU() if sparing and size <= SMALL and not self.settings.petsc else None
+        if self.settings.petsc:
+            _ = self._engine  # which may not be there
         self._scale = 1.0
         self._stiffest = 0.0
 
@@ -122,7 +131,8 @@ class Solver:
         equations = Equations(residual, self._checked(tangent), self._fits)
         iterations = 0
         for search in searches:
-            found = self._engine.attempt(equations, start, search, SEARCHES[search])
+            engine = self._light if self._light and search == "basic" else self._engine
+            found = engine.attempt(equations, start, search, SEARCHES[search])
             iterations += found.iterations
             if not found.failure:
                 return Solved(found.q, iterations, found.rest)
@@ -133,6 +143,15 @@ class Solver:
             f"no equilibrium after {iterations} iterations: {failure}, residual "
             f"{found.rest:.2e} against a load of {scale:.2e}"
         )
+
+    @cached_property
+    def _engine(self) -> Engine:
+        """What solves, loaded when it is first needed: PETSc takes a while, and begins MPI."""
+        if find_spec("petsc4py") is None and not self.settings.petsc:
+            return SuperLU()
+        with needed("PETSc"):
+            from archfem.statics.snes import Snes
+        return Snes(self._size, self.settings.petsc)
 
     def _fits(self, rest: float, q: Array, tangent: sparse.csr_matrix) -> bool:
         """Return whether a residual is within the tolerance, or nothing but round-off.
@@ -171,15 +190,6 @@ class Solver:
             return matrix
 
         return checked
-
-
-def _engine(size: int, settings: Newton) -> Engine:
-    """PETSc's SNES; where PETSc is not installed, Newton's method on SciPy's factors."""
-    if find_spec("petsc4py") is None and not settings.petsc:
-        return SuperLU()
-    with needed("PETSc"):
-        from archfem.statics.snes import Snes
-    return Snes(size, settings.petsc)
 
 
 def magnitude(load: Array) -> float:

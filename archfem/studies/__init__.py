@@ -8,6 +8,7 @@
     steppers    steppers that runs under many motions share
     warm        compiled code, loaded once a process
     worker      one point at a time, on one thread, and a row even where it fails
+    nursery     the process from which workers are forked
     processes   points on processes of this machine
     cluster     points on a cluster: all that knows Dask
     store       rows of finished points, a file each

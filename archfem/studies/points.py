@@ -1,9 +1,10 @@
 """One point of a study: a case file and what differs from it."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,18 @@ def model_of(point: Point) -> str:
     """
     told = [change for change in point.changes if change[0].partition(".")[0] in MODEL]
     return f"{id(point.base)} {told!r}"
+
+
+def by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
+    """Return points in their order, but those of one model together: who has built it goes on.
+
+    Args:
+        points: with their numbers.
+    """
+    groups: dict[str, list[tuple[int, Point]]] = {}
+    for number, point in points:
+        groups.setdefault(model_of(point), []).append((number, point))
+    return list(chain.from_iterable(groups.values()))
 
 
 def _leave_one(settings: dict[str, Any], pair: str) -> None:

@@ -20,11 +20,11 @@ from archfem.studies.asking import Asked, refuse_code
 from archfem.studies.comparison import Comparison
 from archfem.studies.files import study_tables
 from archfem.studies.over import Axis, axes_over, changes_along, ends
-from archfem.studies.points import Point
+from archfem.studies.points import Point, by_model
 from archfem.studies.processes import on_processes, serially
 from archfem.studies.progress import Progress, status
 from archfem.studies.store import Store
-from archfem.studies.table import table, write_table
+from archfem.studies.table import load_tables, table, write_table
 from archfem.studies.worker import Row
 
 logger = logging.getLogger("archfem")
@@ -188,8 +188,8 @@ class Study:
             rows = store.finished(digests)
             self._tell(store, digests, rows)
         wanted = dict(zip(reversed(digests), reversed(range(len(digests))), strict=True))
-        missing = [(number, self.points[number]) for digest, number in wanted.items()
-                   if digest not in rows][::-1]  # fmt: skip
+        left = [number for digest, number in wanted.items() if digest not in rows]
+        missing = by_model([(number, self.points[number]) for number in reversed(left)])
         failed = sum(bool(row["error"]) for row in rows.values())
         folder = None if store is None else store.folder
         progress = Progress(len(wanted), len(rows), failed, folder)
@@ -224,7 +224,7 @@ class Study:
         count = whole(len(os.sched_getaffinity(0)) if workers is None else workers, "workers")
         if count > 1 and len(points) > 1:
             log = None if folder is None else folder / LOG
-            yield from on_processes(points, self.asked, count, log)
+            yield from on_processes(points, self.asked, count, log, load_tables)
             return
         with threadpool_limits(limits=1):
             yield from serially(points, self.asked)

@@ -54,6 +54,14 @@ def table(axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, An
     return found
 
 
+def load_tables() -> None:
+    """Load what tables take, which is otherwise loaded when the first is made and written."""
+    frame = xr.Dataset({"number": ("point", [0.0])}).to_dataframe()
+    frame.to_csv()
+    with suppress(ImportError):
+        frame.to_parquet()
+
+
 def write_table(found: xr.Dataset, folder: Path) -> list[Path]:
     """Write a table as NetCDF and CSV, and as Parquet where pyarrow is there.
 

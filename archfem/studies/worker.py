@@ -3,9 +3,9 @@
 import contextlib
 import logging
 import pickle
+import socket
 import threading
 from collections.abc import Sequence
-from multiprocessing.connection import Connection
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -81,15 +81,22 @@ def serve(handle: int) -> None:
     """Answer points that come through a pipe until it is closed.
 
     Args:
-        handle: of the pipe.
+        handle: of the pipe, a socket.
     """
     logging.getLogger("archfem").setLevel(logging.ERROR)  # what is said of one run of thousands
-    with Connection(handle) as pipe, contextlib.suppress(EOFError, OSError), threadpool_limits(1):
+    with (
+        contextlib.suppress(EOFError, OSError),
+        socket.socket(fileno=handle) as pipe,
+        pipe.makefile("rwb") as line,
+        threadpool_limits(1),
+    ):
         while True:
-            number, task = pipe.recv()
+            number, task = pickle.load(line)
             try:
                 point, asked = pickle.loads(task)
             except Exception as error:  # a function that is in no module of the worker's
-                pipe.send((number, row({}, f"{type(error).__name__}: {error}", ours=False)))
-                continue
-            pipe.send((number, answer(point, asked)))
+                came = row({}, f"{type(error).__name__}: {error}", ours=False)
+            else:
+                came = answer(point, asked)
+            pickle.dump((number, came), line)
+            line.flush()

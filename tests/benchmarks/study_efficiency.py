@@ -7,7 +7,9 @@ The bridge's are those of its sensitivity study, of which 25 cases are taken und
 R = 3: the search for scales, which would take longer still, is left out.
 
 Wall time says what the machine gave, processor time of driver and workers what the study took:
-where other programs share the cores, the second alone tells of the study.
+where other programs share the cores, the second alone tells of the study. With
+PYTHONDONTWRITEBYTECODE each run compiles our modules anew, which no installed copy does: leave it
+unset, and let a first run write them.
 """
 
 import argparse

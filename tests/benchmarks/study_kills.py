@@ -1,10 +1,11 @@
-"""A study whose driver and workers are killed at random moments ends in the bits of one left alone.
+"""A study whose processes are killed at random moments ends in the bits of one left alone.
 
-    python tests/benchmarks/study_kills.py --points 160 --kills 20
+    python tests/benchmarks/study_kills.py --points 160 --kills 30
 
-The study goes over thickness and scale of a rigid ring, on two processes. Driver and workers are
-killed in turn with SIGKILL, ten each, after a time drawn evenly; a killed driver is started again.
-Should the study end before, it begins anew in another folder, which is compared as well.
+The study goes over thickness and scale of a rigid ring, on two processes. The driver, its workers
+and the nursery, from which they are forked, are killed in turn with SIGKILL, ten times each, after
+a time drawn evenly; a killed driver is started again. Should the study end before, it begins anew
+in another folder, which is compared as well. At last nobody is left of all that were begun.
 """
 
 import argparse
@@ -45,19 +46,25 @@ def driver(folder: Path, out: Path) -> "subprocess.Popen[bytes]":
         )
 
 
-def workers(process: "subprocess.Popen[bytes]") -> list[int]:
-    """Processes that a driver has begun."""
-    try:
-        text = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-    except OSError:
-        return []
-    commands = {int(word): Path(f"/proc/{word}/cmdline") for word in text.split()}
-    return [pid for pid, command in commands.items() if b"studies.worker" in _read(command)]
+def nurseries(process: int) -> list[int]:
+    """Processes that a driver has begun, from which workers are forked."""
+    return [each for each in children(process) if b"studies.nursery" in read(each, "cmdline")]
 
 
-def _read(path: Path) -> bytes:
+def workers(process: int) -> list[int]:
+    """Processes that those have begun."""
+    return [each for nursery in nurseries(process) for each in children(nursery)]
+
+
+def children(process: int) -> list[int]:
+    """Processes that one has begun."""
+    return [int(word) for word in read(process, f"task/{process}/children").split()]
+
+
+def read(process: int, name: str) -> bytes:
+    """What the machine tells of a process; nothing of one that has ended."""
     try:
-        return path.read_bytes()
+        return Path(f"/proc/{process}/{name}").read_bytes()
     except OSError:
         return b""
 
@@ -68,7 +75,8 @@ def rows(out: Path) -> int:
 
 
 def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chance: random.Random):
-    """Carry out a study, killing for as long as there is something left to kill."""
+    """Carry out a study, killing for as long as there is something left; return who was met."""
+    met: set[int] = set()
     process = driver(folder, out)
     while process.poll() is None:
         left = [kind for kind, count in kills.items() if count]
@@ -77,7 +85,9 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
             break
         kind = chance.choice(left)
         time.sleep(chance.uniform(0.0, most))
-        victims = workers(process) if kind == "worker" else [process.pid]
+        begun = {"nursery": nurseries(process.pid), "worker": workers(process.pid)}
+        met.update(each for some in begun.values() for each in some)
+        victims = begun.get(kind, [process.pid])
         if process.poll() is not None or not victims:
             continue
         os.kill(chance.choice(victims), signal.SIGKILL)
@@ -89,17 +99,19 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
     if process.returncode:
         log = (folder / "log.txt").read_text()[-3000:]
         raise SystemExit(f"{log}\nthe study ended with {process.returncode}")
+    return met
 
 
 def main() -> None:
     """Compare a study left alone with others that were not."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=160)
-    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--kills", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     chance = random.Random(given.seed)
-    kills = {"driver": given.kills // 2, "worker": given.kills - given.kills // 2}
+    each = given.kills // 3
+    kills = {"driver": each, "worker": given.kills - 2 * each, "nursery": each}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "ring.toml").write_text(CASE)
@@ -115,7 +127,7 @@ def main() -> None:
         studies, total = 0, given.kills
         while any(kills.values()):
             out = folder / f"disturbed {studies}"
-            disturbed(folder, out, kills, 0.25 * spent, chance)
+            met = disturbed(folder, out, kills, 0.25 * spent, chance)
             same = [
                 (folder / "alone" / name).read_bytes() == (out / name).read_bytes() for name in SAME
             ]
@@ -123,7 +135,9 @@ def main() -> None:
             print(f"study {studies}: {rows(out)} points, the same bits: {all(same)}", flush=True)
             if not all(same):
                 raise SystemExit("a study that was killed and gone on with differs")
-    print(f"{total} kills over {studies} studies: all ended in the same bits")
+            if left := [each for each in met if b"studies.nursery" in read(each, "cmdline")]:
+                raise SystemExit(f"processes {left} are left of it")
+    print(f"{total} kills over {studies} studies: the same bits in all, and nobody left")
 
 
 if __name__ == "__main__":

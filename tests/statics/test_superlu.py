@@ -41,6 +41,7 @@ def test_a_kink_is_solved_exactly(alone, search):
 def test_dead_load_and_modes_are_those_of_petsc(ring, monkeypatch):
     """Both solve to 1e-10 of the load."""
     model = af.build(ring, fidelity="rigid")
+    monkeypatch.setattr(newton, "SMALL", 0)
     usual = af.dead_load(model)
     for module in (newton, modes):
         monkeypatch.setattr(module, "find_spec", lambda name: None)
@@ -50,6 +51,21 @@ def test_dead_load_and_modes_are_those_of_petsc(ring, monkeypatch):
     found, also = dense_eigen.lowest(model.closed(), model.mass, 4)
     assert found == pytest.approx(squares, rel=1e-8)
     assert np.abs(shapes.T @ (model.mass @ also)) == pytest.approx(np.eye(4), abs=1e-6)
+
+
+def test_full_steps_of_what_is_small_do_without_petsc(monkeypatch):
+    """PETSc searches along a step; options are for it alone, and so is what is large."""
+    monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
+    start = np.array([5.0])
+    light = Solver(1, sparing=True)
+    assert light.solve(kinked, stiffness, start, 1.0, ["basic"]).q[0] == pytest.approx(-0.5)
+    with pytest.raises(af.errors.NotInstalled):
+        light.solve(kinked, stiffness, start, 1.0, ["cp"])
+    with pytest.raises(af.errors.NotInstalled):
+        Solver(1, Newton(petsc={"snes_monitor": ""}), sparing=True)
+    many = Solver(newton.SMALL + 1, sparing=True)
+    with pytest.raises(af.errors.NotInstalled):
+        many.solve(kinked, stiffness, start, 1.0, ["basic"])
 
 
 @pytest.mark.parametrize(

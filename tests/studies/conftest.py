@@ -12,8 +12,11 @@ FINDERS = '''
 
 import os
 import signal
+import sys
 import time
 from pathlib import Path
+
+import numpy as np
 
 
 def lengths(case):
@@ -37,6 +40,40 @@ def deadly(case, folder):
     if not (thin and mark.exists()):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    return lengths(case)
+
+
+def ending(case, folder):
+    """Ends its own process in one way or another, or tells of it."""
+    thickness = case.settings["structure"]["thickness"]
+    if thickness < 0.65:
+        deadly(case, folder)
+    elif thickness < 0.75:
+        os._exit(7)
+    elif thickness < 0.805:
+        print("an exit is noted")
+        sys.exit(5)
+    handles = {os.readlink(each) for each in Path("/proc/self/fd").iterdir() if each.is_symlink()}
+    return {
+        "sockets": sum(handle.startswith("socket:") for handle in handles),
+        "threads": len(list(Path(f"/proc/{os.getppid()}/task").iterdir())),
+        "mpi": sum(name in sys.modules for name in ("mpi4py.MPI", "petsc4py.PETSc")),
+        "draw": np.random.random(),
+        "process": os.getpid(),
+        "parent": os.getppid(),
+    }
+
+
+def orphaned(case, folder):
+    """Ends the parent of its process, the first time."""
+    seen = Path(folder) / "seen"
+    first = not seen.exists()
+    seen.mkdir(exist_ok=True)
+    for process in (os.getpid(), os.getppid()):
+        (seen / str(process)).touch()
+    if first:
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(30.0)  # which it does not live to see
     return lengths(case)
 '''
 

@@ -15,6 +15,7 @@ import archfem as af
 from archfem.cases import inputs
 from archfem.studies.asking import Asked
 from archfem.studies.over import axes_over
+from archfem.studies.points import by_model
 from archfem.studies.processes import Tasks
 from archfem.studies.store import Store
 
@@ -139,17 +140,6 @@ def test_a_changed_case_is_told_apart(
     with caplog.at_level("WARNING", logger="archfem"):
         after.run(folder, workers=1)
     assert "6 points of other cases" in caplog.text
-
-
-@pytest.mark.slow
-def test_a_process_that_dies_is_replaced(small_ring, tmp_path, finders, monkeypatch):
-    monkeypatch.setattr("archfem.studies.processes.ATTEMPTS", 2)
-    over = {"structure.thickness": [0.5, 0.6]}
-    find = {"name": "finders_of_tests:deadly", "folder": str(tmp_path)}
-    found = af.Study.of(small_ring, over, find).run(tmp_path / "out", workers=2)
-    assert found["twice"].values[0] == 1.0  # its second process lives
-    assert "WorkerDied: 2 processes" in found["error"].values[1]
-    assert "signal 9" in found["error"].values[1]
 
 
 def test_a_second_driver_is_refused(study_file, tmp_path):
@@ -346,6 +336,16 @@ def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
     frame = pd.read_csv(tmp_path / "results.csv")
     assert frame["title"].tolist() == ["'=1+1", "'@SUM(A1)", "plain"]
     assert frame["motion.scale"].tolist() == [-1.0, -1.0, -1.0]
+
+
+def test_points_of_one_model_are_taken_together(small_ring):
+    over = {"motion.scale": [0.1, 0.2], "structure.thickness": [0.5, 0.6]}
+    points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
+    sorted_points = by_model(points)
+    thick = [dict(point.changes)["structure.thickness"] for _, point in sorted_points]
+    assert thick == [0.5, 0.5, 0.6, 0.6]
+    assert [number for number, _ in sorted_points] == [0, 2, 1, 3]
+    assert sorted(sorted_points, key=lambda pair: pair[0]) == points
 
 
 def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):

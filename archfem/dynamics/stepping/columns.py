@@ -58,16 +58,17 @@ def take_in(columns, compliance, force, entries, count):  # type: ignore
         entries: rows and columns of the derivatives of λ.
         count: how many of those there are.
     """
-    before, rows, places = columns.taken[0], columns.rows, columns.places
+    before, rows = columns.taken[0], columns.rows
     for k in range(len(force)):
         if force[k] != 0.0:
             _name(columns, k)
     for entry in range(count):
         _name(columns, entries[entry, 0])
+    numbers = rows[columns.places[before : columns.taken[0]]]
     for i in range(len(rows)):
-        own, whole = columns.entries[i], compliance[rows[i]]
-        for j in range(before, columns.taken[0]):
-            own[j] = whole[rows[places[j]]]
+        own, whole = columns.entries[i][before:], compliance[rows[i]]
+        for j in range(len(numbers)):
+            own[j] = whole[numbers[j]]
 
 
 @numba.njit(cache=True)

@@ -237,7 +237,7 @@ def _settled(system, kept, step, states, ground):  # type: ignore
     contact[:] = right
     passes = solve(system, contact, kept.gap, kept.before, kept.force)
     if passes > 0:
-        add_rows(linear.opening, np.flatnonzero(kept.force), kept.force, right)
+        add_rows(linear.opening, range(len(kept.force)), kept.force, right)
         _follow_images(contact, right, (old, new), linear)
         follow(contact, states[0], states[1], linear.numbers)
     return passes

@@ -8,11 +8,15 @@ import numpy as np
 
 from archfem.joints.moving.compiled import computing, inlined, summing
 
-FEW = 60
+FEW = 100
 """Rows up to which the problem is solved directly."""
 
 ROUGH = 1e-3
 """Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
+
+
+PAYS = 6
+"""Columns for each of their products in pairs: with as many a factor takes no longer."""
 
 
 @computing
@@ -163,10 +167,11 @@ def newton_change(rest, entered, system):  # type: ignore
     change, own, size = np.zeros(len(rest)), np.zeros(len(exchanges)), len(exchanges)
     for k in range(count):
         own[columns.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
-    if size > FEW:
-        own = _gradients(matrix, own)
-    else:
+    if size <= FEW:
         _substitute(matrix, exchanges, own)
+    elif not _gradients(matrix, own):
+        factor = matrix.copy()
+        _substitute(factor, factorised(factor), own)
     for k in range(size):
         change[columns.places[k]] = own[k]
     return change
@@ -228,11 +233,19 @@ def _substitute(matrix, exchanges, right):  # type: ignore
 
 @numba.njit(cache=True)
 def _gradients(matrix, right):  # type: ignore
-    """Solve a system by stabilised biconjugate gradients from zero."""
+    """Solve a system in place by stabilised biconjugate gradients; nothing if a factor costs less.
+
+    Args:
+        matrix: of the system (c, c).
+        right: its right side, then the solution (c,).
+
+    Returns:
+        Whether it is solved.
+    """
     solution, left = np.zeros(len(right)), right.copy()
     direction, rho = right.copy(), right @ right
     end = (ROUGH**2) * rho
-    for _ in range(2 * len(right)):
+    for _ in range(len(right) // PAYS + 1):
         image = matrix @ direction
         seen = right @ image
         if left @ left <= end or seen == 0.0:
@@ -249,4 +262,7 @@ def _gradients(matrix, right):  # type: ignore
             break
         direction = left + (new / rho) * (length / weight) * (direction - weight * image)
         rho = new
-    return solution
+    if not left @ left <= end:
+        return False
+    right[:] = solution
+    return True

@@ -3,6 +3,7 @@
 Rows and columns are taken four at a time, so that values that are fetched once serve them all.
 """
 
+from archfem.dynamics.stepping.panels import four
 from archfem.joints.moving.compiled import summing
 
 
@@ -46,8 +47,7 @@ def _columns_times(lower, own, total):  # type: ignore
     for i in range(count):
         total[i] = 0.0
     while done + 4 <= len(own):
-        p, q = lower[done * count :], lower[(done + 1) * count :]
-        r, s = lower[(done + 2) * count :], lower[(done + 3) * count :]
+        p, q, r, s = four(lower, done, count)
         a, b, c, d = own[done], own[done + 1], own[done + 2], own[done + 3]
         for i in range(count):
             total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
@@ -80,10 +80,9 @@ def _up(panels, entries, vector, room):  # type: ignore
 def _take_rows(upper, later, own):  # type: ignore
     """Take from the values of a group those that follow by its rows, four rows at a time."""
     width, count, done = len(own), len(later), 0
-    size = width + count
+    size, right = width + count, upper[width:]
     while done + 4 <= width:
-        p, q = upper[done * size + width :], upper[(done + 1) * size + width :]
-        r, s = upper[(done + 2) * size + width :], upper[(done + 3) * size + width :]
+        p, q, r, s = four(right, done, size)
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(count):
             a += p[j] * later[j]
@@ -96,7 +95,7 @@ def _take_rows(upper, later, own):  # type: ignore
         own[done + 3] -= d
         done += 4
     for k in range(done, width):
-        row, value = upper[k * size + width :], 0.0
+        row, value = right[k * size :], 0.0
         for j in range(count):
             value += row[j] * later[j]
         own[k] -= value

@@ -120,7 +120,7 @@ def forward(factor, vector, room):  # type: ignore
         total[:] = 0.0
         done = 0
         while done + 4 <= width:
-            a, b, c, d = _four(panel, done, height)
+            a, b, c, d = four(panel, done, height)
             p, q, r, s = own[done], own[done + 1], own[done + 2], own[done + 3]
             for i in range(height):
                 total[i] += a[i] * p + b[i] * q + c[i] * r + d[i] * s
@@ -160,7 +160,7 @@ def backward(factor, vector, room, wanted):  # type: ignore
             known[width + i] = -vector[rows[i]]
         done = 0
         while done + 4 <= width:
-            a, b, c, d = _four(panel, done, height)
+            a, b, c, d = four(panel, done, height)
             p, q, r, s = 0.0, 0.0, 0.0, 0.0
             for i in range(height):
                 p += a[i] * known[i]
@@ -186,8 +186,14 @@ def _zero(vector):  # type: ignore
 
 
 @numba.njit(cache=True, inline="always")
-def _four(panel, column, height):  # type: ignore
-    """Four columns of a panel, from this one on."""
+def four(panel, column, height):  # type: ignore
+    """Return four columns of a panel, from one on.
+
+    Args:
+        panel: column by column.
+        column: the first of them.
+        height: of a column.
+    """
     start = column * height
     return (
         panel[start : start + height],

@@ -8,8 +8,9 @@ gradient of an energy, and the problem
 is not symmetric. It is solved by Newton's method, (1 - F λ') δ = z₀ + F λ - z, in the rows that
 open or slide and in the openings that press on those, by a dense factor where they are few and by
 stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) where
-they are many. Where some passes have not been enough, further ones go no farther than λ errs less;
-and where those are not, λ is led from where it is known to where it is sought.
+they are many and these converge. Where some passes have not been enough, further ones go no
+farther than λ errs less; and where those are not, λ is led from where it is known to where it is
+sought.
 """
 
 import numba
@@ -58,7 +59,7 @@ def _held(law, opening, right):  # type: ignore
     for k in range(len(points)):
         if points[k].group >= 0:
             force[points[k].group] += points[k].elastic * points[k].slid
-    add_rows(opening, np.flatnonzero(force), force, right)
+    add_rows(opening, range(len(force)), force, right)
 
 
 def _largest(law, gap):  # type: ignore

@@ -13,8 +13,8 @@ from archfem.dynamics.stepping.newton_pass import holding, taken_out
 from archfem.dynamics.stepping.panel_solution import back
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.small_problem import ROUNDED, SETTLED, largest
-from archfem.dynamics.stepping.sparse_rows import row_times
-from archfem.dynamics.stepping.tangent_pass import add_forces, add_rated, rated, resolved
+from archfem.dynamics.stepping.sparse_rows import add_rows, row_times
+from archfem.dynamics.stepping.tangent_pass import add_rated, rated, resolved
 from archfem.joints.moving.compiled import computing
 
 SLOWLY = 0.03
@@ -82,7 +82,7 @@ def _first(system, right, renew):  # type: ignore
     add_rated(system, room.along, force)
     for k in range(len(contact)):
         contact[k] = right[k]
-    add_forces(rows, force, contact)
+    add_rows(rows, range(len(force)), force, contact)
     if not resolved(system, contact, renew):
         return False
     for row in range(len(force)):
@@ -104,7 +104,7 @@ def _direction(system, renew):  # type: ignore
         room.move[row] = room.wanted[row] - room.force[row]
     for k in range(len(room.change)):
         room.change[k] = 0.0
-    add_forces(rows, room.move, room.change)
+    add_rows(rows, range(len(room.move)), room.move, room.change)
     if not resolved(system, room.change, renew):
         return False
     for row in range(len(room.force)):
@@ -144,7 +144,7 @@ def _go(system, share):  # type: ignore
     if holding(wanted, room.force, room.left):
         for k in range(len(room.line)):
             room.line[k] = 0.0
-        add_forces(rows, room.left, room.line)
+        add_rows(rows, range(len(room.left)), room.left, room.line)
         back(system.panels, room.closed, room.line, room.image)
         for row in range(len(force)):
             law.guess[row] += row_times(rows, row, room.line)

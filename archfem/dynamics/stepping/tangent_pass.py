@@ -161,22 +161,6 @@ def add_rated(system, along, result):  # type: ignore
 
 
 @computing
-def add_forces(rows, force, result):  # type: ignore
-    """Add what forces at the rows of gaps do to the coordinates.
-
-    Args:
-        rows: of the gaps, in compressed form.
-        force: at them (r,).
-        result: changed (n,).
-    """
-    indptr, indices, data = rows
-    for row in range(len(force)):
-        if force[row] != 0.0:
-            for entry in range(indptr[row], indptr[row + 1]):
-                result[indices[entry]] += data[entry] * force[row]
-
-
-@computing
 def resolved(system, vector, renew):  # type: ignore
     """Solve with the tangent in place, or with one of a pass before.
 
