@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.limit import movement
 from archfem.limit.blocks import RigidBlocks
 from archfem.limit.displaced import DisplacedBlocks
 from archfem.limit.movement import End, largest_movement
@@ -206,6 +207,16 @@ def test_a_small_movement_is_held_and_a_strut_locks():
     flat = af.circular_arch(span=4.0, rise=0.2, thickness=1.0, voussoirs=9)
     stuck = largest_movement(flat, af.Settlement("left abutment", (1.0, 0.0, 0.0)))
     assert (stuck.end, stuck.largest) == (End.LOCKS, 0.0)
+
+
+def test_the_last_step_ends_where_it_is_asked_to(monkeypatch):
+    """Steps of three tenths, and one of a tenth."""
+    monkeypatch.setattr(movement, "FIRST", 0.3)
+    ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=120.0, voussoirs=7, chords=1)
+    spread = af.Settlement("right abutment", (1e-3, 0.0, 0.0))
+    found = largest_movement(ring, spread)
+    assert found.end is End.HOLDS
+    assert [each.share for each in found.stages] == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.0])
 
 
 def test_the_first_thrust_is_that_of_the_small_movement():

@@ -51,8 +51,11 @@ def test_a_small_push_does_what_it_does_with_small_displacements(structure, fide
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_own_coordinates_are_about_centres_of_mass(fidelity):
-    """There pushing a block does not turn it; modes, which are orthogonal, do not move it."""
-    ring = af.circular_arch(radius=2.0, thickness=0.6, embrace=120.0, voussoirs=3, chords=1)
+    """There pushing a block does not turn it; modes, which are orthogonal, do not move it.
+
+    The mass of cells with straight sides is not where that of stones with arcs is.
+    """
+    ring = af.circular_arch(radius=2.0, thickness=0.6, embrace=120.0, voussoirs=3)
     small = af.build(ring, fidelity=fidelity, cells=(2, 2))
     own = OwnCoordinates.of(small)
     mass = (own.basis.T @ small.mass @ own.basis).toarray()
@@ -60,7 +63,7 @@ def test_own_coordinates_are_about_centres_of_mass(fidelity):
     for span, turns in own.blocks.values():
         assert turns
         assert mass[span[0], span[0]] == pytest.approx(mass[span[1], span[1]])
-        assert mass[span[0], span[0]] * 9.81 == pytest.approx(ring.weight / 3.0, rel=1e-2)
+        assert mass[span[0], span[0]] * 9.81 == pytest.approx(ring.weight / 3.0, rel=0.03)
 
 
 @pytest.mark.parametrize(
