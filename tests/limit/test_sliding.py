@@ -320,3 +320,12 @@ def test_the_words_tell_names_and_where_solutions_lie():
     assert str(pressed.solutions) == (
         "without dilatancy it does not either: no factor is too large"
     )
+
+
+def test_where_dilatancy_locks_a_strut_solutions_may_have_any_factor_above_a_bound():
+    """Its own load presses three stones between walls; nothing is known of the largest factor."""
+    dry = af.Contact(1e9, 3e8, 0.6)
+    strut = af.circular_arch(radius=5.0, thickness=1.0, embrace=20.0, voussoirs=3, contact=dry)
+    found = af.collapse_factor(strut, live=af.PointLoad(0.0, (0.0, -1e4)), friction="nonassociated")
+    assert found.factor == np.inf
+    assert 0.0 < found.solutions.bracket[0] < found.solutions.bracket[1] == np.inf
