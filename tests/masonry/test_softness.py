@@ -16,6 +16,16 @@ def test_a_shear_wave_crosses_a_block_twice(stack):
     assert found.ratio == pytest.approx(30e9 / 1.48e9)
 
 
+def test_a_block_is_as_large_as_a_square_and_held_by_its_stiffest_joint():
+    """One of 1 m by 4 m, which is 2 m large, between joints of which the upper is stiffer."""
+    tower = af.column(breadth=1.0, heights=[4.0, 1.0])
+    below, above = tower.joints
+    stiff = replace(above, contact=replace(above.contact, normal_stiffness=5e9))
+    found = softness(replace(tower, joints=(below, stiff)), 1)
+    assert found.inner == pytest.approx(np.sqrt(30e9 / 2.4 / (20e3 / 9.81)) / 4.0)
+    assert found.ratio == pytest.approx(30e9 / 2.0 / 5e9)
+
+
 def test_soil_is_soft_and_yields_and_stone_is_neither(viaduct):
     soil = viaduct.block_number("backfill")
     assert soft_blocks(viaduct) == yielding_blocks(viaduct) == (soil,)
