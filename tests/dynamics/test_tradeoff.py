@@ -71,6 +71,6 @@ def test_no_more_time_is_told_than_has_passed(stack, fails, monkeypatch):
         monkeypatch.setattr(tradeoff, "time_history", failing)
     begun = process_time()
     run = tradeoff.timed(model, motion, None, 0.005)
-    assert 0.0 < run.seconds < process_time() - begun
+    assert 0.0 <= run.seconds <= process_time() - begun
     assert (run.peaks is None) is fails
     assert run.size == 6
