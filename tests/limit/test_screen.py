@@ -1,5 +1,7 @@
 """The quick look at failed joints against the programme that decides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mechanisms import WEIGHT, beside, filled, piers
@@ -40,6 +42,35 @@ def test_loops_rule_out_only_what_the_programme_rules_out(structure):
     assert agreed[True] > 10
     assert agreed[False] > 10
     assert sum(agreed.values()) >= 59  # hinges almost in a line are left to the programme
+
+
+def test_self_stresses_do_no_work_and_joints_in_no_loop_have_none():
+    """A column beside a ring, on the same ground: Gᵀ R = 0, three to the ring's one loop."""
+    ring = af.circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=3, chords=1)
+    column = af.column(breadth=1.0, heights=[1.0, 1.0])
+    first = len(ring.blocks)
+    away = np.array([10.0, 0.0])
+    blocks = tuple(
+        replace(block, outline=tuple(map(tuple, block.points + away)), name=f"far {block.name}")
+        for block in column.blocks
+    )
+    joints = tuple(
+        replace(
+            joint,
+            blocks=(joint.lower + first, joint.higher + first),
+            intrados=tuple(joint.intrados + away),
+            extrados=tuple(joint.extrados + away),
+            name=f"far {joint.name}",
+        )
+        for joint in column.joints
+    )
+    both = replace(ring, blocks=ring.blocks + blocks, joints=ring.joints + joints)
+    rigid = RigidBlocks(both)
+    stresses = Screen(rigid, ("arch",)).stresses
+    assert stresses.shape == (3 * len(both.joints), 3)
+    assert rigid.kinematics.T @ stresses == pytest.approx(0.0, abs=1e-12)
+    in_column = np.tile(np.arange(len(both.joints)) >= len(ring.joints), 3)
+    assert not stresses[in_column].any()
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

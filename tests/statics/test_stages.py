@@ -217,7 +217,7 @@ def test_forces_on_what_stands_are_the_slope_of_its_energy(column, friction, ten
 
 
 @pytest.mark.parametrize(
-    ("count", "words"), [(5, "'block 4', 'block 5']: every"), (7, "'block 5'] and 2 more: every")]
+    ("count", "words"), [(5, "'block 4', 'block 5']: every"), (6, "'block 5'] and 1 more: every")]
 )
 def test_blocks_that_no_stage_places_are_named_up_to_five(count, words):
     tower = af.column(breadth=1.0, heights=[1.0] * (count + 1))
