@@ -13,6 +13,7 @@ from typing import Any
 import tomli_w
 
 from archfem.annotated import as_annotated
+from archfem.arguments import instance
 from archfem.cases import motions as ground
 from archfem.cases.based import based_tables
 from archfem.cases.building import stages_asked
@@ -152,6 +153,7 @@ class Case:
             InvalidStructure: lengths that do not make a structure.
         """
         refuse_unknown(settings, SECTIONS)
+        instance(settings.get("title", ""), str, "title", 'write words in quotes: title = "…"')
         for key in set(SECTIONS) - {"title"}:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
@@ -162,7 +164,7 @@ class Case:
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
-            title=str(settings.get("title", "case")),
+            title=settings.get("title", "case"),
             structure=structure_of(settings, folder),
             model=checked(settings.get("model", {}), MODEL, "model"),
             motion=None if motion is None else ground.motion_settings(motion),

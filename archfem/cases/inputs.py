@@ -6,6 +6,7 @@ taken for an answer that was found from another file or by another program.
 
 import hashlib
 import json
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from archfem.cases.settings import Table
+from archfem.errors import InvalidInput
+from archfem.files import check_file
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -44,8 +47,9 @@ def content_digest(path: Path) -> str:
         path: the file.
     """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:
+        with check_file(path, "file", sys.maxsize).open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    except (OSError, InvalidInput):
         return "missing"
 
 

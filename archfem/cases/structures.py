@@ -163,7 +163,7 @@ def structure_of(settings: Table, folder: Path = Path()) -> Structure:
     key = json.dumps([told, files], default=repr)
     if key not in _kept:
         made = planned(settings, folder)
-        _kept[key] = replace(made, name=str(settings.get("title", made.name)))
+        _kept[key] = replace(made, name=settings.get("title", made.name))
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
     _kept.move_to_end(key)

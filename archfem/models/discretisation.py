@@ -1,6 +1,6 @@
 """What a structure is modelled by: a rung of the ladder, a mesh, and a rule on its joints."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -116,18 +116,23 @@ class Discretisation:
 def _check_fidelity(fidelity: object) -> None:
     """Refuse rungs that there are not."""
     if isinstance(fidelity, Mapping):
-        unknown = sorted({str(rung) for rung in fidelity.values() if rung not in RUNGS})
+        unknown = sorted({str(rung) for rung in fidelity.values() if not _among(rung, RUNGS)})
         if unknown:
             raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
-    elif fidelity == "modal":
+    elif _among(fidelity, ("modal",)):
         raise InvalidInput(
             "fidelity 'modal' is no longer known, for 'faces' is faster and errs less: use one of "
             f"{FIDELITIES}"
         )
-    elif fidelity not in FIDELITIES:
+    elif not _among(fidelity, FIDELITIES):
         raise InvalidInput(
             f"fidelity {fidelity!r} is not known: use one of {FIDELITIES}, or 'auto' in `build`"
         )
+
+
+def _among(rung: object, known: Collection[str]) -> bool:
+    """Whether a rung is one of some; what is no word is none."""
+    return isinstance(rung, str) and rung in known
 
 
 def _two(cells: object) -> tuple[int, int]:

@@ -74,6 +74,7 @@ def test_changes_from_the_command_line():
         ("structure=3", "structure = 3 is not a table"),
         ("nonsense", "write section.key=value"),
         ("title.x=3", "title is not a table"),
+        ("title=inf", "title is a float: write words in quotes"),
     ],
 )
 def test_refusals_name_the_key(change, says):

@@ -81,6 +81,14 @@ def test_devices_pipes_and_folders_are_no_files(tmp_path, read):
             read(path)
 
 
+def test_nor_are_they_drawings_of_a_case(tmp_path):
+    os.mkfifo(tmp_path / "pipe.dxf")
+    for path in [*devices(tmp_path), tmp_path / "pipe.dxf"]:
+        drawn = {"shape": "outlines", "file": str(path), "unit": "m", "snap": 0.01}
+        with pytest.raises(af.InvalidInput, match=r"is no drawing|a pipe: give a draw"):
+            af.Case.of({"structure": drawn})
+
+
 def test_counts_beyond_the_room_are_refused_before_they_take_any():
     ring = af.circular_arch(radius=3, thickness=0.5, embrace=90, voussoirs=5)
     with pytest.raises(af.errors.MeshError, match=r"a mesh of 5e.06 cells, and there is room"):

@@ -175,9 +175,9 @@ def trial(seed: int, number: int, folder: Path) -> Came:
         _torn(DRAWING.encode(), rng) if rng.random() < 0.1 else DRAWING.encode()
     )
     settings = tomllib.loads(BASES[number % len(BASES)])
-    for _ in range(rng.choice([1, 1, 2, 3])):
-        _mutate(settings, rng)
     try:
+        for _ in range(rng.choice([1, 1, 2, 3])):
+            _mutate(settings, rng)
         content = tomli_w.dumps(settings).encode()
     except (TypeError, ValueError, RecursionError):
         content = BASES[0].encode()

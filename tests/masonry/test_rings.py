@@ -38,6 +38,7 @@ def test_over_semicircular_and_single_stone_rings():
         ({"voussoirs": 2.5}, "voussoirs 2.5"),
         ({"span": 5.0}, "either radius and embrace"),
         ({"radius": None, "embrace": None, "span": 5.0, "rise": 2.6}, "half the span"),
+        ({"radius": None, "embrace": None, "span": 1e308, "rise": 1.0}, "make no circle: give"),
         ({"width": 0.0}, "width 0 m"),
         ({"gravity": -9.81}, "gravity -9.81"),
     ],

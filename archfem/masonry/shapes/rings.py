@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, degrees, pi, radians, sin
+from math import asin, degrees, isfinite, pi, radians, sin
 
 import numpy as np
 
@@ -259,7 +259,11 @@ def _circle(
             f"rise {rise:.4g} m is not between 0 and half the span {span:.4g} m: a circular arch "
             "is at most a semicircle by span and rise; give radius and embrace beyond"
         )
-    inner = (span**2 / 4.0 + rise**2) / (2.0 * rise)
+    inner = (span / 2.0 * (span / 2.0 / rise) + rise) / 2.0
+    if not isfinite(inner):
+        raise InvalidStructure(
+            f"span {span:.4g} m and rise {rise:.4g} m make no circle: give both in metres"
+        )
     return inner + thickness / 2.0, degrees(2.0 * asin(min(1.0, span / 2.0 / inner)))
 
 
