@@ -1,8 +1,9 @@
 """What a caller gave: numbers, whole numbers and rows of them, or an error that says what was."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import inf, isfinite
 from numbers import Integral
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,16 @@ def real(value: Any, name: str, *, least: float = -inf) -> float:
     if value < least:
         raise InvalidInput(f"{name} = {said(value)} is below {least:g}, the least that is meant")
     return float(value)
+
+
+def among(value: Any, known: Collection[Any]) -> bool:
+    """Return whether a value is one of some words or numbers; an array, a table, a list is none.
+
+    Args:
+        value: what was given.
+        known: of which it must be one.
+    """
+    return isinstance(value, (str, *_NUMBERS, NoneType)) and value in known
 
 
 def is_number(value: Any) -> bool:

@@ -91,6 +91,11 @@ MADE = [
         "span = '3 m' is a str: give a length",
     ),
     (lambda: af.response_spectrum(QUAKE, "x"), "periods 'x' s are no numbers"),
+    (lambda: af.response_spectrum(QUAKE, 10**400), "periods 1000.* s are no numbers"),
+    (lambda: QUAKE.at(np.nan), "times = nan: one is not a number"),
+    (lambda: af.Contact(1e9, 1e9, np.zeros(3)), "friction of 'contact' = array.* is not a finite"),
+    (lambda: af.stands(RING, friction=np.zeros(3)), r"friction array.* is not known: use one of"),
+    (lambda: af.minimum_thickness(int), r"build\(100\) is a int: make a structure"),
     (lambda: af.response_spectrum(3.0, [0.1]), "motion is a float: give a Motion"),
     (lambda: af.response_spectrum(QUAKE, [0.1], damping="5 %"), "damping ratio .* = '5 %'"),
     (lambda: af.collapse_factor(RING, live=0.1), r"load 0.1 is none: give BodyForce"),
@@ -116,6 +121,23 @@ def test_what_is_made_of_wrong_arguments(make, says):
 def test_cells_are_two_whole_numbers(fidelity, cells):
     with pytest.raises(af.InvalidInput, match="cells"):
         af.build(RING, fidelity=fidelity, cells=cells)
+
+
+@pytest.mark.parametrize("coarse", [5e-324, 1.7e308])
+def test_where_nothing_is_meshed_at_will_cells_of_any_size_will_do(coarse):
+    assert af.build(RING, fidelity="faces", coarse=coarse).size == 6 * 7
+
+
+def test_a_step_beyond_all_numbers_is_none(tmp_path):
+    (tmp_path / "record.txt").write_text("0.1\n0.2\n0.1\n")
+    with pytest.raises(af.InvalidInput, match=r"dt \[s\] = 1000.* is not a finite number"):
+        af.Motion.read(tmp_path / "record.txt", units="g", dt=10**400)
+
+
+@pytest.mark.parametrize("key", ["fidelity", "cell", "degree", "quadrature", "displacements"])
+def test_an_array_is_no_word(key):
+    with pytest.raises(af.InvalidInput, match=rf"{key} .*array.*(not known|of degree)"):
+        af.build(RING, **{key: np.zeros(3)})
 
 
 def test_cells_of_any_integer_and_row():

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from archfem.annotated import as_annotated
+from archfem.arguments import instance
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill import Fill
@@ -111,7 +112,10 @@ def _size(build: Callable[[float], Structure]) -> float:
     """Size of the first member of a family that can be built, from the thickest down [m]."""
     for thickness in 10.0 ** np.arange(2, -7, -1):
         try:
-            return build(float(thickness)).size
+            built = build(float(thickness))
         except InvalidStructure as error:
             refusal = error
+            continue
+        instance(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
+        return built.size
     raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")

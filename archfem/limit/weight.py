@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from archfem.arguments import instance, real
+from archfem.arguments import among, instance, real, said
 from archfem.errors import InvalidInput
 from archfem.limit.blocks import RigidBlocks
 from archfem.limit.fill import Fill
@@ -22,8 +22,8 @@ UNBALANCED = 1e-8
 
 def _checked(structure: Structure, friction: str | None, strength: float | None) -> None:
     """Refuse options that mean nothing, and bonds, which do not yield but break."""
-    if friction not in FRICTION:
-        raise InvalidInput(f"friction {friction!r} is not known: use one of {FRICTION}")
+    if not among(friction, FRICTION):
+        raise InvalidInput(f"friction {said(friction)} is not known: use one of {FRICTION}")
     if strength is not None and not real(strength, "strength [Pa]") > 0.0:
         raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
     if structure.tension.any():

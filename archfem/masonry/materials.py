@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import inf
 
-from archfem.arguments import real
+from archfem.arguments import among, real
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
@@ -114,7 +114,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a contact, or can only be a wrong unit."""
-        if self.friction is None or self.friction == inf:
+        if among(self.friction, (None, inf)):
             object.__setattr__(self, "friction", inf)
         else:
             real(self.friction, f"friction of '{self.name}'")

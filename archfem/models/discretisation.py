@@ -1,10 +1,10 @@
 """What a structure is modelled by: a rung of the ladder, a mesh, and a rule on its joints."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from archfem.arguments import real, row, whole
+from archfem.arguments import among, real, row, said, whole
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 
@@ -64,14 +64,13 @@ class Discretisation:
         """Refuse unknown words, impossible numbers, and what does not go together."""
         _check_fidelity(self.fidelity)
         object.__setattr__(self, "cells", _two(self.cells))
-        if self.cell not in SHAPES:
-            raise InvalidInput(f"cell '{self.cell}' is not known: use one of {SHAPES}")
+        if not among(self.cell, SHAPES):
+            raise InvalidInput(f"cell {said(self.cell)} is not known: use one of {SHAPES}")
         if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
             raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
-        if self.displacements not in DISPLACEMENTS:
-            raise InvalidInput(
-                f"displacements {self.displacements!r} are not known: use one of {DISPLACEMENTS}"
-            )
+        if not among(self.displacements, DISPLACEMENTS):
+            given = said(self.displacements)
+            raise InvalidInput(f"displacements {given} are not known: use one of {DISPLACEMENTS}")
         if self.displacements == "large" and self.fidelity == "monolithic":
             raise InvalidInput(
                 "displacements are large, which the rung 'monolithic' does not know: use 'full', "
@@ -79,8 +78,8 @@ class Discretisation:
             )
         if self.file is not None and self.fidelity == "rigid":
             raise InvalidInput(f"file = {str(self.file)!r}: the rung 'rigid' has no mesh to read")
-        if self.degree not in (1, 2):
-            raise InvalidInput(f"degree {self.degree!r}: elements are of degree 1 or 2")
+        if not among(self.degree, (1, 2)):
+            raise InvalidInput(f"degree {said(self.degree)}: elements are of degree 1 or 2")
         if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):
             raise InvalidInput(
                 "exact quadrature needs openings that are linear along a facet, and is not written "
@@ -116,23 +115,18 @@ class Discretisation:
 def _check_fidelity(fidelity: object) -> None:
     """Refuse rungs that there are not."""
     if isinstance(fidelity, Mapping):
-        unknown = sorted({str(rung) for rung in fidelity.values() if not _among(rung, RUNGS)})
+        unknown = sorted({str(rung) for rung in fidelity.values() if not among(rung, RUNGS)})
         if unknown:
             raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
-    elif _among(fidelity, ("modal",)):
+    elif among(fidelity, ("modal",)):
         raise InvalidInput(
             "fidelity 'modal' is no longer known, for 'faces' is faster and errs less: use one of "
             f"{FIDELITIES}"
         )
-    elif not _among(fidelity, FIDELITIES):
+    elif not among(fidelity, FIDELITIES):
         raise InvalidInput(
-            f"fidelity {fidelity!r} is not known: use one of {FIDELITIES}, or 'auto' in `build`"
+            f"fidelity {said(fidelity)} is not known: use one of {FIDELITIES}, or 'auto' in `build`"
         )
-
-
-def _among(rung: object, known: Collection[str]) -> bool:
-    """Whether a rung is one of some; what is no word is none."""
-    return isinstance(rung, str) and rung in known
 
 
 def _two(cells: object) -> tuple[int, int]:

@@ -11,6 +11,9 @@ from archfem.errors import InvalidInput
 SAMPLES_PER_PERIOD = 40
 """The record is interpolated until an oscillation has this many samples."""
 
+RIGID = 1e-9
+"""Period, in steps of the record, up to which an oscillator has the acceleration of the ground."""
+
 _FINEST = 1000  # parts of a step; an oscillator still stiffer follows the ground
 
 
@@ -43,7 +46,7 @@ def peak_responses(
     values, times = np.empty(len(periods)), np.empty(len(periods))
     finer: dict[int, Array] = {1: samples}
     for index, period in enumerate(periods):
-        if period == 0.0:
+        if period <= RIGID * dt:
             largest = int(np.argmax(np.abs(samples)))
             values[index], times[index] = samples[largest], largest * dt
             continue

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from archfem.arguments import instance, unmasked
+from archfem.arguments import instance, said, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.motion import oscillator
@@ -47,8 +47,8 @@ def response_spectrum(
     unmasked(periods, "periods [s]")
     try:
         natural = np.asarray(periods, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"periods {periods!r} s are no numbers") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"periods {said(periods)} s are no numbers") from error
     samples = motion.component(component)
     peaks = oscillator.peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
     spectrum: Array = np.abs(peaks)

@@ -2,7 +2,7 @@
 
     python -m fuzz [--count 100] [--seed 0] [--only case_files] [--trials 17,18]
 
-Without a count each campaign has its own, which takes hours in all. What ended badly is kept under
+Without a count each campaign has its own, some ten minutes in all. What ended badly is kept under
 --out, with what was tried; `--only … --trials NUMBER` does it again.
 """
 

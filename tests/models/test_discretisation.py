@@ -17,7 +17,6 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
         ({"fidelity": "exact"}, "fidelity 'exact' is not known: use one of .*'rigid'.*'auto'"),
         ({"fidelity": 3}, "fidelity 3 is not known"),
         ({"fidelity": ["full"]}, "is not known"),
-        ({"fidelity": np.zeros(3)}, "is not known"),
         ({"fidelity": {"rest": np.zeros(3)}}, r"rungs \['\[0. 0. 0.\]'\] are not known"),
         ({"fidelity": "modal"}, "'modal' is no longer known, for 'faces' is faster.*'rigid'"),
         ({"fidelity": {"rest": "modal"}}, r"rungs \['modal'\] are not known: use some of"),

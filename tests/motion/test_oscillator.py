@@ -31,6 +31,13 @@ def test_peak_has_its_sign_and_its_time():
     assert times == pytest.approx(0.5 * periods / damped, rel=1e-4)
 
 
+@pytest.mark.parametrize("period", [5e-324, 1e-300, 1e-12])
+def test_one_that_is_as_good_as_rigid_does_too(period):
+    samples = np.array([0.0, 1.0, -3.0, 2.0])
+    values, times = oscillator.peak_responses(samples, 0.1, np.array([period]), 0.05)
+    assert (values.tolist(), times.tolist()) == ([-3.0], [0.2])
+
+
 def test_rigid_oscillator_follows_the_ground():
     samples = np.array([0.0, 1.0, -3.0, 2.0])
     values, times = oscillator.peak_responses(samples, 0.1, np.zeros(1), 0.05)

@@ -125,7 +125,8 @@ def _check_room(edges: Edges, asked: Discretisation) -> None:
     count = sum(prod(map(float, _wanted(edges, number, asked))) for number in edges.structured)
     if asked.coarse is not None:
         blocks = [edges.structure.blocks[number] for number in edges.unstructured]
-        count += sum(block.area for block in blocks if not block.fixed) / asked.coarse**2
+        area = sum(block.area for block in blocks if not block.fixed)
+        count += area / asked.coarse / asked.coarse
     if not count <= MOST:
         raise MeshError(
             f"a mesh of {count:.3g} cells, and there is room for {MOST}: use fewer cells, larger "

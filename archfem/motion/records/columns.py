@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+from archfem.arguments import real
 from archfem.arrays import Array
 from archfem.motion.records.channel import Channel
 from archfem.motion.records.text import NUMBER, RecordText
@@ -108,7 +109,7 @@ def _unit(text: RecordText, comments: str, units: str | None) -> float:
 
 def _told(comments: str, dt: float | None) -> list[float]:
     """Return the steps told by keyword and by the comments [s]."""
-    told = [] if dt is None else [float(dt)]
+    told = [] if dt is None else [real(dt, "dt [s]")]
     told += [float(value) * (1e-3 if milli else 1.0) for value, milli in _STEP.findall(comments)]
     told += [1.0 / max(float(rate), 1e-9) for rate in _RATE.findall(comments)]
     return told
