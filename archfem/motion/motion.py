@@ -183,13 +183,8 @@ class Motion(Shown, picture="motions.draw_motion"):
 
         Args:
             times: of any shape (n in all) [s]; straight between samples, zero outside the record.
-
-        Raises:
-            InvalidInput: one is not a number.
         """
-        moments, up = np.asarray(times, dtype=float).ravel() / self.dt, self.vertical
-        if np.isnan(moments).any():
-            raise InvalidInput(f"times = {said(times)}: one is not a number; give seconds")
+        moments, up = signals.counted(times, self.dt), self.vertical
         rows = self.horizontal, np.zeros(1) if up is None else up
         return np.column_stack([signals.between(row, moments) for row in rows])
 

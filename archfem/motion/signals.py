@@ -4,7 +4,7 @@ import numpy as np
 import scipy  # loads scipy.signal, which is slow, when it is first used
 from scipy import integrate
 
-from archfem.arguments import pieces, unmasked
+from archfem.arguments import pieces, said, unmasked
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.units import STANDARD_GRAVITY
@@ -183,6 +183,22 @@ def resampled(samples: Array, dt: float, new_dt: float) -> Array:
     turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
     new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
     return new
+
+
+def counted(times: float | Array, dt: float) -> Array:
+    """Return times in samples from the first (m,) [-].
+
+    Args:
+        times: of any shape (m in all) [s].
+        dt: time between samples [s].
+
+    Raises:
+        InvalidInput: one is not a number.
+    """
+    places: Array = np.asarray(times, dtype=float).ravel() / dt
+    if np.isnan(places).any():
+        raise InvalidInput(f"times = {said(times)}: one is not a number; give seconds")
+    return places
 
 
 def between(samples: Array, places: Array) -> Array:

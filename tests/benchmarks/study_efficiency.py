@@ -8,7 +8,8 @@ R = 3: the search for scales, which would take longer still, is left out.
 
 One worker is a process of its own too, so that both begin one, store rows and write tables; they
 run by turns, and efficiency is that of the sums, for the machine is not the same from minute to
-minute. Wall time says what it gave, processor time of driver and workers what the study took: where other programs share the cores, the second alone tells of the study. With
+minute. Wall time says what it gave, processor time of driver and workers what the study took:
+where other programs share the cores, the second alone tells of the study. With
 PYTHONDONTWRITEBYTECODE each run compiles our modules anew, which no installed copy does: leave it
 unset, and let a first run write them.
 """
