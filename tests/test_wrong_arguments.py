@@ -22,6 +22,9 @@ def model():
 MADE = [
     (lambda: af.BodyForce("x"), r"horizontal \[g\] = 'x' is not a finite number"),
     (lambda: af.BodyForce(0.1, (0.0, 1.0)), r"vertical \[g\] = \(0.0, 1.0\) is not a finite"),
+    (lambda: af.BodyForce(1.7e308), r"horizontal = 1.7e\+308 g is more than 1000 g: give"),
+    (lambda: af.BodyForce(0.0, -1001.0), "vertical = -1001 g is more than 1000 g"),
+    (lambda: af.PointLoad(0, (1e17, -1.0)), r"load of \(1e\+17, -1.0\) N, and none is above 1e"),
     (lambda: af.PointLoad(0, -1), r"force \(x, y\) \[N\] = -1 is not a row of values: give \(a, b"),
     (lambda: af.PointLoad(0, (0, -1, 2)), r"has 3 values: give \(a, b\)"),
     (lambda: af.PointLoad("crown", (0, -1)), r"x \[m\] = 'crown' is not a finite number"),

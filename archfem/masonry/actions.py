@@ -10,6 +10,12 @@ from archfem.arrays import Array
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
+MOST = 1e3
+"""Multiples of g beyond which nobody means them."""
+
+HEAVIEST = 1e9
+"""Force beyond which nobody means it, that of 100 000 tonnes [N]."""
+
 
 @dataclass(frozen=True)
 class BodyForce:
@@ -30,8 +36,12 @@ class BodyForce:
 
     def __post_init__(self) -> None:
         """Refuse what are no multiples of g."""
-        real(self.horizontal, "body force, horizontal [g]")
-        real(self.vertical, "body force, vertical [g]")
+        for name in ("horizontal", "vertical"):
+            value = real(getattr(self, name), f"body force, {name} [g]")
+            if abs(value) > MOST:
+                raise InvalidInput(
+                    f"body force, {name} = {value:.4g} g is more than {MOST:g} g: give fewer"
+                )
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,10 @@ class PointLoad:
         """Refuse what is no place or no force."""
         real(self.x, "point load, x [m]")
         object.__setattr__(self, "force", reals(self.force, "point load, force (x, y) [N]", 2))
+        if max(map(abs, self.force)) > HEAVIEST:
+            raise InvalidInput(
+                f"a point load of {self.force} N, and none is above {HEAVIEST:g} N: give newtons"
+            )
 
     def place(self, structure: Structure) -> tuple[int, Array]:
         """Return the number of the loaded block and the loaded point (2,) [m].

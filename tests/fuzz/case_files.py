@@ -179,7 +179,7 @@ def trial(seed: int, number: int, folder: Path) -> Came:
         for _ in range(rng.choice([1, 1, 2, 3])):
             _mutate(settings, rng)
         content = tomli_w.dumps(settings).encode()
-    except (TypeError, ValueError, RecursionError):
+    except (TypeError, ValueError, OverflowError, RecursionError):
         content = BASES[0].encode()
     if rng.random() < 0.25:
         content = _torn(content, rng)

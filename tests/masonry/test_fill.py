@@ -295,3 +295,17 @@ def test_pieces_are_a_thousand_times_as_stiff_as_what_they_stand_for():
     fill = jointed_fill(box(3.0, slick, slick), 1.0, angle=30.0)
     young = {block.material.young for block in fill.blocks if block.grain}
     assert [*young] == [pytest.approx(6.25e9)]
+
+
+def test_pieces_are_counted_by_their_area():
+    """A whole one is a right triangle of sides s/2 and √3 s/2."""
+    smooth = af.Contact(1e10, 1e10, 0.0)
+    whole = box(3.0, smooth, smooth)
+
+    def cut(count):
+        piece = 3.0 * HEIGHT / count
+        return jointed_fill(whole, sqrt(8.0 * piece / sqrt(3.0)), angle=30.0)
+
+    assert len(cut(2.1).blocks) > len(whole.blocks)
+    with pytest.raises(af.InvalidInput, match=r"make 1\.9 of a fill"):
+        cut(1.9)

@@ -61,6 +61,14 @@ def test_loads_grow_by_a_twentieth_and_less_while_the_structure_creeps(slides, m
     assert len(moved) == 2
 
 
+def test_a_path_has_ended_once_its_slope_is_small_enough():
+    """In units of the first step: a twentieth of its load at ten times its way."""
+    stop, moved = af.statics.Stop(slope=0.01), np.array([10.0, 0.05])
+    assert ends.finished(Slow([]), stop, af.Criteria(), moved) == (
+        "the slope fell to 0.005 of the initial one"
+    )
+
+
 def test_a_rule_ends_the_creep(slides, monkeypatch):
     monkeypatch.setattr(ends, "finished", lambda path, stop, criteria, step: "it is enough")
     assert ends.crept(Slow([False, True]), STOP, af.Criteria()) == "it is enough"
