@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 
-from archfem.arguments import real, reals
+from archfem.arguments import among, real, reals
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
@@ -125,7 +125,7 @@ class EffectiveDamping:
         """Refuse what could not become damping."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if not isinstance(self.kind, str) or self.kind not in KINDS:
+        if not among(self.kind, KINDS):
             raise InvalidInput(f"damping kind = {self.kind!r}: use one of {KINDS}")
         if not 0.0 < real(self.share, "damping share [-]") < 1.0:
             raise InvalidInput(f"share {self.share} of the mass is not between 0 and 1")
@@ -137,7 +137,7 @@ def _check_ratio(ratio: float) -> None:
 
 
 def _check_joints(joints: str) -> None:
-    if not isinstance(joints, str) or joints not in JOINTS:
+    if not among(joints, JOINTS):
         raise InvalidInput(f"damping joints = {joints!r}: use one of {JOINTS}")
 
 

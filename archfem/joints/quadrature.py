@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from archfem.arguments import whole
+from archfem.arguments import among, whole
 from archfem.arrays import Array
 from archfem.errors import InvalidInput
 
@@ -39,7 +39,7 @@ class Quadrature:
 
     def __post_init__(self) -> None:
         """Refuse unknown rules and impossible numbers of points."""
-        if not isinstance(self.rule, str) or self.rule not in RULES:
+        if not among(self.rule, RULES):
             raise InvalidInput(f"quadrature {self.rule!r} is not known: use one of {RULES}")
         if self.rule in ("nodal", "exact") and self.points is not None:
             raise InvalidInput(
