@@ -70,8 +70,7 @@ def on_processes(
             staff.take(tasks)
             if meanwhile is not None:
                 meanwhile()
-            while tasks or staff.busy:
-                staff.take(tasks)
+            while staff.busy:
                 for worker in staff.ready():
                     done = staff.result(worker, tasks)
                     staff.take(tasks)  # before this row is kept, for which nobody has to wait
