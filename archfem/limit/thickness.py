@@ -42,7 +42,7 @@ def minimum_thickness(
         The end of the last bracket that stands [m].
 
     Raises:
-        InvalidInput: no thickness makes it stand, or every one does.
+        InvalidInput: no thickness makes it stand, or every one does, or build makes no structure.
 
     References:
         Milankovitch, Z. Math. Phys. 55 (1907) 1-27. Heyman, Int. J. Mech. Sci. 11 (1969) 363-372.

@@ -25,6 +25,9 @@ class BodyForce:
         horizontal: multiple of g, positive along x [-].
         vertical: multiple of g, positive upward [-]; self-weight is -1.
 
+    Raises:
+        InvalidInput: one is no number, or more than 1000 g.
+
     Example:
         >>> block = af.column(breadth=0.6, heights=[2.4])
         >>> round(af.collapse_factor(block, live=af.BodyForce(1.0)).factor, 6)
@@ -40,7 +43,8 @@ class BodyForce:
             value = real(getattr(self, name), f"body force, {name} [g]")
             if abs(value) > MOST:
                 raise InvalidInput(
-                    f"body force, {name} = {value:.4g} g is more than {MOST:g} g: give fewer"
+                    f"body force, {name} = {value:.4g} g is more than {MOST:g} g: give a multiple "
+                    "of g, such as 0.3"
                 )
 
 
@@ -54,6 +58,9 @@ class PointLoad:
     Attributes:
         x: where it stands [m].
         force: its components for the whole width, up positive (2,) [N].
+
+    Raises:
+        InvalidInput: x is no number, or the force no two of up to 1e9 N.
     """
 
     x: float

@@ -182,7 +182,8 @@ class Motion(Shown, picture="motions.draw_motion"):
         """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
 
         Args:
-            times: of any shape (n in all) [s]; straight between samples, zero outside the record.
+            times: of any shape (n in all) [s], `InvalidInput` where one is nan; straight between
+                samples, zero outside the record.
         """
         moments, up = signals.counted(times, self.dt), self.vertical
         rows = self.horizontal, np.zeros(1) if up is None else up
