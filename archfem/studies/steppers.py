@@ -12,6 +12,7 @@ import numpy as np
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.stepping.compliance import Compliance
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.sparse import SparseSystem
 from archfem.dynamics.stepping.stepper import Stepper
@@ -100,5 +101,7 @@ class Shared(Stepper):
 
 def _copied(system: Any) -> Any:
     """A copy of matrices with which no step has been made yet."""
-    rooms = [system.compliance] if isinstance(system, SparseSystem) else []
-    return deepcopy(system, {id(room): np.empty_like(room) for room in rooms})  # nothing is in it
+    if not isinstance(system, SparseSystem):
+        return deepcopy(system)
+    empty = Compliance.of(np.empty_like(system.compliance.whole))  # as it is where no step was made
+    return deepcopy(system, {id(system.compliance): empty})

@@ -21,8 +21,11 @@ Start reading at `stepper`, then `strategy` for what a further one has to provid
     small_problem    of the joint points that open or slide: what solves it
     open_points      its solution at an instant
     sliding_points   its solution over a step
+    at_work          which of its rows those are
     newton_pass      of which this is one pass
-    columns          the part of the compliance that it needs
+    residuals        the solution of its equations where they are many
+    compliance       that of the joints, and room for such problems
+    columns          the part of it that they need
     chain            joints of a chain of blocks, and the band that they make
     chain_newton     the same solution in that band
     modal            the strategy in the modes of the closed structure

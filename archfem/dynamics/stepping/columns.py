@@ -1,99 +1,172 @@
 """The compliance that a small problem needs: of its rows, in the columns where λ is not zero.
 
 Rows of which λ is known to be zero are there for their gaps alone, which press on what slides; they
-are as many as the others. A column is taken in when its λ is no longer zero, and stays.
+are as many as the others. A column is taken in when its λ is no longer zero, and stays to the end
+of the problem. Few of either come or go from one problem to the next, and the compliance of a whole
+structure is too large to lie near at hand: so the entries stay where they are, the last row or
+column takes the place of one that goes, and only what comes is fetched.
 """
 
-from typing import NamedTuple
-
-import numba
-import numpy as np
-
-from archfem.arrays import Array
-from archfem.dynamics.stepping.elimination import Indices
-from archfem.joints.moving.compiled import summing
+from archfem.dynamics.stepping.compliance import NARROW, line
+from archfem.joints.moving.compiled import computing, summing
 
 
-class Columns(NamedTuple):
-    """F of some rows, as far as λ is not zero.
-
-    Attributes:
-        entries: of F, of all columns that have been taken in (k, k).
-        rows: their numbers in the structure (k,).
-        places: which of the rows each column is, in the order in which they came (k,).
-        column: which column each row is, -1 if it is none (k,).
-        taken: how many columns have been (1,).
-        force: room for λ of the columns (k,).
-    """
-
-    entries: Array
-    rows: Indices
-    places: Indices
-    column: Indices
-    taken: Indices
-    force: Array
-
-
-@numba.njit(cache=True)
-def no_columns(rows):  # type: ignore
-    """Return room for rows, without a column.
+@computing
+def forget(compliance):  # type: ignore
+    """Have no rows any more, so that what follows does not depend on what was.
 
     Args:
-        rows: their numbers in the structure (k,).
+        compliance: `Compliance`.
     """
-    size = len(rows)
-    entries, places = np.empty((size, size)), np.empty(size, np.int64)
-    column, taken = np.full(size, -1), np.zeros(1, np.int64)
-    return Columns(entries, rows, places, column, taken, np.empty(size))
+    for k in range(compliance.sizes[0]):
+        compliance.place[compliance.rows[k]] = -1
+    compliance.sizes[0], compliance.sizes[1] = 0, 0
+    compliance.sizes[2] = min(NARROW, len(compliance.rows))
 
 
-@numba.njit(cache=True)
-def take_in(columns, compliance, force, entries, count):  # type: ignore
-    """Take in the columns of rows where λ or a derivative of it is not zero.
+@computing
+def begin(compliance, rows):  # type: ignore
+    """Begin a problem in these rows, of the columns those that are still there.
 
     Args:
-        columns: `Columns`.
-        compliance: F of the structure (p, p).
+        compliance: `Compliance`.
+        rows: their numbers in the structure (k,).
+    """
+    needed, sizes, k = compliance.needed, compliance.sizes, 0
+    for row in rows:
+        needed[row] = True
+    while k < sizes[0]:
+        if needed[compliance.rows[k]]:
+            k += 1
+        else:
+            _leave(compliance, k)
+    for row in rows:
+        needed[row] = False
+        if compliance.place[row] < 0:
+            _come(compliance, row)
+
+
+@computing
+def _come(compliance, row):  # type: ignore
+    """Take in a row of the structure."""
+    k, whole = compliance.sizes[0], compliance.whole[row]
+    compliance.sizes[0] += 1
+    compliance.rows[k], compliance.place[row], compliance.column[k] = row, k, -1
+    own = line(compliance, k)
+    for j in range(len(own)):
+        own[j] = whole[compliance.rows[compliance.places[j]]]
+
+
+@computing
+def _leave(compliance, k):  # type: ignore
+    """Let a row go; the last one takes its place."""
+    column, last = compliance.column, compliance.sizes[0] - 1
+    if column[k] >= 0:
+        _drop(compliance, column[k])
+    own, other = line(compliance, k), line(compliance, last)
+    for j in range(len(own)):
+        own[j] = other[j]
+    compliance.place[compliance.rows[k]] = -1
+    if k < last:
+        row = compliance.rows[last]
+        compliance.rows[k], compliance.place[row], column[k] = row, k, column[last]
+        if column[k] >= 0:
+            compliance.places[column[k]] = k
+    compliance.sizes[0] = last
+
+
+@computing
+def _drop(compliance, column):  # type: ignore
+    """Let a column go; the last one takes its place."""
+    last, entries, wide = compliance.sizes[1] - 1, compliance.entries, compliance.sizes[2]
+    compliance.column[compliance.places[column]] = -1
+    if column < last:
+        row = compliance.places[last]
+        compliance.places[column], compliance.column[row] = row, column
+        for k in range(compliance.sizes[0]):
+            entries[k * wide + column] = entries[k * wide + last]
+    compliance.sizes[1] = last
+
+
+@computing
+def keep(compliance, force, entries, count):  # type: ignore
+    """Let columns go of rows where λ and its derivatives are zero, and take in those of others.
+
+    Args:
+        compliance: `Compliance`.
         force: λ of the rows (k,).
         entries: rows and columns of the derivatives of λ.
         count: how many of those there are.
     """
-    before, rows = columns.taken[0], columns.rows
-    for k in range(len(force)):
-        if force[k] != 0.0:
-            _name(columns, k)
+    needed, places, column = compliance.needed, compliance.places, 0
     for entry in range(count):
-        _name(columns, entries[entry, 0])
-    numbers = rows[columns.places[before : columns.taken[0]]]
-    for i in range(len(rows)):
-        own, whole = columns.entries[i][before:], compliance[rows[i]]
-        for j in range(len(numbers)):
-            own[j] = whole[numbers[j]]
+        needed[entries[entry, 0]] = True
+    while column < compliance.sizes[1]:
+        if force[places[column]] == 0.0 and not needed[places[column]]:
+            _drop(compliance, column)
+        else:
+            column += 1
+    for entry in range(count):
+        needed[entries[entry, 0]] = False
+    take_in(compliance, force, entries, count)
 
 
-@numba.njit(cache=True)
-def _name(columns, row):  # type: ignore
-    """Make a row the next column, if it is none."""
-    if columns.column[row] < 0:
-        columns.column[row] = columns.taken[0]
-        columns.places[columns.taken[0]] = row
-        columns.taken[0] += 1
+@computing
+def take_in(compliance, force, entries, count):  # type: ignore
+    """Take in the columns of rows where λ or a derivative of it is not zero.
+
+    Args:
+        compliance: `Compliance`.
+        force: λ of the rows (k,).
+        entries: rows and columns of the derivatives of λ.
+        count: how many of those there are.
+    """
+    for k in range(len(force)):
+        if force[k] != 0.0 and compliance.column[k] < 0:
+            _become(compliance, k)
+    for entry in range(count):
+        if compliance.column[entries[entry, 0]] < 0:
+            _become(compliance, entries[entry, 0])
+
+
+@computing
+def _become(compliance, row):  # type: ignore
+    """Make a row the next column."""
+    column, entries = compliance.sizes[1], compliance.entries
+    if column == compliance.sizes[2]:
+        _widen(compliance)
+    compliance.column[row], compliance.places[column] = column, row
+    compliance.sizes[1] += 1
+    rows, wide, whole = compliance.rows, compliance.sizes[2], compliance.whole[compliance.rows[row]]
+    for k in range(compliance.sizes[0]):
+        entries[k * wide + column] = whole[rows[k]]
+
+
+@computing
+def _widen(compliance):  # type: ignore
+    """Make room for more columns."""
+    entries, (rows, columns, wide, _) = compliance.entries, compliance.sizes
+    wider = min(wide + NARROW, len(compliance.rows))
+    for k in range(rows - 1, 0, -1):
+        for j in range(columns - 1, -1, -1):
+            entries[k * wider + j] = entries[k * wide + j]
+    compliance.sizes[2] = wider
 
 
 @summing
-def add_gaps(columns, force, gaps):  # type: ignore
+def add_gaps(compliance, force, gaps):  # type: ignore
     """Add F λ.
 
     Args:
-        columns: `Columns`, among them all of which λ is not zero.
+        compliance: `Compliance`, among its columns all of which λ is not zero.
         force: λ of the rows (k,).
         gaps: of the rows, changed (k,).
     """
-    count, own = columns.taken[0], columns.force
+    count, own = compliance.sizes[1], compliance.vectors.column
     for j in range(count):
-        own[j] = force[columns.places[j]]
+        own[j] = force[compliance.places[j]]
     for i in range(len(gaps)):
-        row, total = columns.entries[i], 0.0
+        row, total = line(compliance, i), 0.0
         for j in range(count):
             total += row[j] * own[j]
         gaps[i] += total

@@ -22,6 +22,7 @@ from scipy.linalg import eigh
 
 from archfem.arrays import Array
 from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
+from archfem.dynamics.stepping.compliance import Compliance
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, gaps_of, solve
 from archfem.dynamics.stepping.loop import ITERATIONS
@@ -53,7 +54,7 @@ class ModalSystem(NamedTuple):
 
     linear: Linear
     gain: Array
-    compliance: Array
+    compliance: Compliance
 
 
 class Modal:
@@ -136,7 +137,7 @@ class Modal:
         )
         gain = 1.0 / (squares * (1.0 + numbers.rate * rate) + numbers.inertia)
         compliance = (opening * gain) @ opening.T
-        return ModalSystem(linear, gain, np.ascontiguousarray(compliance))
+        return ModalSystem(linear, gain, Compliance.of(np.ascontiguousarray(compliance)))
 
 
 @overload(solve)
@@ -170,7 +171,7 @@ def _solved(system, vector, gap, before, force):  # type: ignore
                 return -1
             passes += taken - 1
             gap[:] = start
-            add_rows(system.compliance, rows, force, gap)
+            add_rows(system.compliance.whole, rows, force, gap)
         if exact(law, gap, force, near):
             _give(vector, linear.opening, force, system.gain)
             return passes

@@ -3,20 +3,14 @@
 Of (1 - λ' F) μ = λ' (z₀ + F λ - z) for the change μ of λ the rows matter where λ' has any entry.
 """
 
-import numba
 import numpy as np
 
+from archfem.dynamics.stepping.compliance import line, square
+from archfem.dynamics.stepping.residuals import minimised
 from archfem.joints.moving.compiled import computing, inlined, summing
 
 FEW = 100
 """Rows up to which the problem is solved directly."""
-
-ROUGH = 1e-3
-"""Residual of biconjugate gradients, relative to the first, where a pass is not the last."""
-
-
-PAYS = 6
-"""Columns for each of their products in pairs: with as many a factor takes no longer."""
 
 
 @computing
@@ -115,28 +109,32 @@ def holding(was, force, change):  # type: ignore
     return some
 
 
-@numba.njit(cache=True)
-def prepared(columns, entries, count, room):  # type: ignore
-    """Get ready to solve with 1 - λ' F.
+@computing
+def prepared(compliance, entries, count):  # type: ignore
+    """Get ready to solve with 1 - λ' F, of few columns by its factor.
 
     Args:
-        columns: of F, `Columns`, among them all rows of λ'.
+        compliance: `Compliance`, among its columns all rows of λ'; in its room that is.
         entries: rows and columns of λ', and its values there.
         count: how many of them there are.
-        room: of which part is taken (k²,).
-
-    Returns:
-        That matrix or, of at most `FEW` columns, its factor (c, c); and with which column each was
-        exchanged, which is of no matter where they are many (c,).
     """
-    size = columns.taken[0]
-    matrix = room[: size**2].reshape((size, size))
-    _equations(columns, entries, count, matrix)
-    return matrix, factorised(matrix) if size <= FEW else np.zeros(size, np.int64)
+    compliance.sizes[3] = size = compliance.sizes[1]
+    if size <= FEW:
+        _factorise(compliance, entries, count)
+    else:
+        _equations(compliance, entries, count, square(compliance.rough, size))
+
+
+@computing
+def _factorise(compliance, entries, count):  # type: ignore
+    """Factorise 1 - λ' F of the columns."""
+    matrix = square(compliance.matrix, compliance.sizes[3])
+    _equations(compliance, entries, count, matrix)
+    factorised(matrix, compliance.exchanges)
 
 
 @summing
-def _equations(columns, entries, count, matrix):  # type: ignore
+def _equations(compliance, entries, count, matrix):  # type: ignore
     """Fill 1 - λ' F of the columns."""
     (places, values), size = entries, len(matrix)
     for i in range(size):
@@ -145,40 +143,41 @@ def _equations(columns, entries, count, matrix):  # type: ignore
             own[k] = 0.0
         own[i] = 1.0
     for entry in range(count):
-        own, other = matrix[columns.column[places[entry, 0]]], columns.entries[places[entry, 1]]
-        value = values[entry]
+        own, value = matrix[compliance.column[places[entry, 0]]], values[entry]
+        other = line(compliance, places[entry, 1])
         for k in range(size):
             own[k] -= value * other[k]
 
 
-@numba.njit(cache=True)
-def newton_change(rest, entered, system):  # type: ignore
-    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no column is.
+@computing
+def newton_change(rest, entered, compliance, change):  # type: ignore
+    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no column was.
 
     Args:
         rest: r (k,).
         entered: rows and columns of λ' with its values, and how many those are.
-        system: `Columns`, and what `prepared` returned.
-
-    Returns:
-        μ (k,).
+        compliance: `Compliance`, in the room of which `prepared` has left the equations.
+        change: μ, filled (k,).
     """
-    ((places, values), count), (columns, (matrix, exchanges)) = entered, system
-    change, own, size = np.zeros(len(rest)), np.zeros(len(exchanges)), len(exchanges)
-    for k in range(count):
-        own[columns.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
-    if size <= FEW:
-        _substitute(matrix, exchanges, own)
-    elif not _gradients(matrix, own):
-        factor = matrix.copy()
-        _substitute(factor, factorised(factor), own)
+    ((places, values), count), size = entered, compliance.sizes[3]
+    own = compliance.vectors.column[:size]
     for k in range(size):
-        change[columns.places[k]] = own[k]
-    return change
+        own[k] = 0.0
+    for k in range(len(change)):
+        change[k] = 0.0
+    for k in range(count):
+        own[compliance.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
+    if size > FEW and not minimised(compliance, own):
+        _factorise(compliance, entered[0], count)
+        _substitute(square(compliance.matrix, size), compliance.exchanges, own)
+    elif size <= FEW:
+        _substitute(square(compliance.matrix, size), compliance.exchanges, own)
+    for k in range(size):
+        change[compliance.places[k]] = own[k]
 
 
-@numba.njit(cache=True, fastmath={"contract"})
-def factorised(matrix):  # type: ignore
+@computing
+def factorised(matrix, exchanges):  # type: ignore
     """Factorise a matrix in place.
 
     Faster than LAPACK's where there are but some tens of rows. Of a matrix that is singular,
@@ -186,12 +185,9 @@ def factorised(matrix):  # type: ignore
 
     Args:
         matrix: changed (c, c).
-
-    Returns:
-        With which row each was exchanged (c,).
+        exchanges: filled with the row with which each was exchanged (c,).
     """
     size = len(matrix)
-    exchanges = np.empty(size, np.int64)
     for k in range(size):
         best = k
         for i in range(k + 1, size):
@@ -209,7 +205,6 @@ def factorised(matrix):  # type: ignore
             for j in range(len(top)):
                 row[j] -= factor * top[j]
         matrix[k, k] = scale
-    return exchanges
 
 
 @summing
@@ -229,40 +224,3 @@ def _substitute(matrix, exchanges, right):  # type: ignore
         for j in range(k + 1, size):
             total -= matrix[k, j] * right[j]
         right[k] = total * matrix[k, k]
-
-
-@numba.njit(cache=True)
-def _gradients(matrix, right):  # type: ignore
-    """Solve a system in place by stabilised biconjugate gradients; nothing if a factor costs less.
-
-    Args:
-        matrix: of the system (c, c).
-        right: its right side, then the solution (c,).
-
-    Returns:
-        Whether it is solved.
-    """
-    solution, left = np.zeros(len(right)), right.copy()
-    direction, rho = right.copy(), right @ right
-    end = (ROUGH**2) * rho
-    for _ in range(len(right) // PAYS + 1):
-        image = matrix @ direction
-        seen = right @ image
-        if left @ left <= end or seen == 0.0:
-            break
-        length = rho / seen
-        half = left - length * image
-        other = matrix @ half
-        square_of = other @ other
-        weight = (other @ half) / square_of if square_of > 0.0 else 0.0
-        solution += length * direction + weight * half
-        left = half - weight * other
-        new = right @ left
-        if new == 0.0 or weight == 0.0:
-            break
-        direction = left + (new / rho) * (length / weight) * (direction - weight * image)
-        rho = new
-    if not left @ left <= end:
-        return False
-    right[:] = solution
-    return True

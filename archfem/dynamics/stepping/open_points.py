@@ -30,6 +30,7 @@ from archfem.dynamics.stepping.small_problem import (
     release,
     shift,
     solved_by,
+    unload,
 )
 
 FEW = 24
@@ -43,7 +44,7 @@ as of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996)."""
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
     """Find λ where it may differ from zero; passes, or -1 if it does not settle."""
     law = Law(law.facets, chosen(law.stiffness, rows), law.arm, law.joint)
-    matrix, free, own = square(compliance, rows), chosen(start, rows), chosen(force, rows)
+    matrix, free, own = square(compliance.whole, rows), chosen(start, rows), chosen(force, rows)
     root, wanted = np.zeros((len(rows), 2)), np.empty(len(rows))
     gap, left, last = free + matrix @ own, ROUGH, np.inf
     for passes in range(1, ITERATIONS + 1):
@@ -61,6 +62,13 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
         left = min(ROUGH, (off / last) ** 2) if last < np.inf else ROUGH
         last = off
     return -1
+
+
+def _unloaded(law, gap, rows, compliance, force):  # type: ignore
+    """Take from gaps what λ opens."""
+    moved = square(compliance.whole, rows) @ chosen(force, rows)
+    for k in range(len(rows)):
+        gap[rows[k]] -= moved[k]
 
 
 def _fits(law, gap, force, near):  # type: ignore
@@ -106,6 +114,7 @@ solved_by(
     Law,
     (expected, _foreseen),
     (release, _released),
+    (unload, _unloaded),
     (exact, _fits),
     (shift, _same),
     (largest, _largest),

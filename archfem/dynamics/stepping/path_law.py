@@ -88,6 +88,8 @@ class Work(NamedTuple):
         along: λ of each row of slips [N], and its derivative by z there [N/m] (g, 2).
         places: room for rows and columns of the derivatives of λ (m, 2).
         values: room for those derivatives (m,) [N/m].
+        some: room for numbers of stretches (s,).
+        slips: room for numbers of rows of slips (g,).
     """
 
     points: Any
@@ -95,6 +97,8 @@ class Work(NamedTuple):
     along: Array
     places: Any
     values: Array
+    some: Any
+    slips: Any
 
 
 class PathLaw(NamedTuple):
@@ -236,6 +240,8 @@ def _room(points: int, stretches: int, slips: int) -> Work:
         np.zeros((slips, 2)),
         np.zeros((most, 2), np.int64),
         np.zeros(most),
+        np.zeros(stretches, np.int64),
+        np.zeros(slips, np.int64),
     )
 
 

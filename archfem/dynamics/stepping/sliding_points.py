@@ -7,25 +7,29 @@ gradient of an energy, and the problem
 
 is not symmetric. It is solved by Newton's method, (1 - F λ') δ = z₀ + F λ - z, in the rows that
 open or slide and in the openings that press on those, by a dense factor where they are few and by
-stabilised biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) where
-they are many and these converge. Where some passes have not been enough, further ones go no
-farther than λ errs less; and where those are not, λ is led from where it is known to where it is
-sought.
+minimal residuals (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856) in single precision
+where they are many and these converge: a pass only leads to the next. Where some passes have not
+been enough, further ones go no farther than λ errs less; and where those are not, λ is led from
+where it is known to where it is sought.
 """
 
-import numba
 import numpy as np
 
-from archfem.dynamics.stepping.chain_newton import FALLS, LEAST, TRIES, WHOLE, along_chain
-from archfem.dynamics.stepping.columns import add_gaps, no_columns, take_in
+from archfem.dynamics.stepping.at_work import fits, foreseen
+from archfem.dynamics.stepping.chain_newton import (
+    FALLS,
+    LEAST,
+    TRIES,
+    WHOLE,
+    along_chain,
+    lacking,
+)
+from archfem.dynamics.stepping.columns import add_gaps, begin, forget, keep, take_in
 from archfem.dynamics.stepping.loop import ITERATIONS
 from archfem.dynamics.stepping.newton_pass import holding, newton_change, prepared, rates, taken_out
-from archfem.dynamics.stepping.open_points import chosen
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import (
-    AHEAD,
-    EXACT,
     ROUNDED,
     SETTLED,
     add_held,
@@ -35,6 +39,7 @@ from archfem.dynamics.stepping.small_problem import (
     release,
     shift,
     solved_by,
+    unload,
 )
 from archfem.dynamics.stepping.sparse_rows import add_rows
 from archfem.joints.moving.compiled import computing
@@ -76,96 +81,6 @@ def _largest(law, gap):  # type: ignore
     return most
 
 
-def _foreseen(law, gap, before, force):  # type: ignore
-    """Return which rows are at work, or will be soon if they go on as they did (r,)."""
-    works, near, openings = force != 0.0, force != 0.0, len(law.stiffness)
-    if law.chain.half > 0:
-        near[:] = True
-    guess, start, speed, points = law.guess, law.start, law.speed, law.points
-    for row in range(len(gap)):
-        guess[row] = start[row] + speed[row] / law.gain
-        if row < openings and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
-            works[row] = True
-    if law.chain.half > 0:
-        return near
-    for part in law.stretches:
-        if works[part.near] or works[part.far]:
-            near[part.near] = near[part.far] = True
-            for k in range(part.begin, part.end):
-                if points[k].group >= 0:
-                    near[points[k].group] = True
-    _work_at(law, guess, near, True)
-    return near
-
-
-@computing
-def _involve(law, near):  # type: ignore
-    """Add to rows of slips at work the openings that press on their points."""
-    points, stretches = law.points, law.stretches
-    for k in range(len(points)):
-        if points[k].group >= 0 and near[points[k].group]:
-            stretch = stretches[points[k].stretch]
-            near[stretch.near] = near[stretch.far] = True
-
-
-def _fits(law, gap, force, near):  # type: ignore
-    """Return whether the gaps ask for the λ they were found with; adds rows at work to near.
-
-    Of rows that are near, λ is known to fit the guess, so that the gaps need but be that.
-    """
-    across, along, guess, off = law.stiffness, law.along, law.guess, 0.0
-    for row in range(len(gap)):
-        if near[row]:
-            stiffness = across[row] if row < len(across) else along[row - len(across)]
-            off = max(off, stiffness * abs(gap[row] - guess[row]))
-        guess[row] = gap[row]
-    whole = off > EXACT * largest(law, gap)
-    if _work_at(law, gap, near, whole):
-        return not whole
-    return False
-
-
-@numba.njit(cache=True)
-def _work_at(law, gap, near, whole):  # type: ignore
-    """Add to near what further rows are at work at some gaps.
-
-    Looks at all rows if it is to, else at those that are not near.
-
-    Returns:
-        Whether there are none.
-    """
-    openings, more = len(law.stiffness), False
-    stretches, slips = _others(law, near, whole)
-    press(law, gap, stretches)
-    slide(law, gap, slips)
-    parts, found, along = law.stretches, law.work.stretches, law.work.along
-    for number in stretches:
-        part, carried = parts[number], found[number]
-        if carried.near != 0.0 or carried.far != 0.0:
-            more = more or not (near[part.near] and near[part.far])
-            near[part.near] = near[part.far] = True
-    for row in slips:
-        if along[row - openings, 0] != 0.0:
-            more = more or not near[row]
-            near[row] = True
-    _involve(law, near)
-    return not more
-
-
-@numba.njit(cache=True)
-def _others(law, near, whole):  # type: ignore
-    """Numbers of stretches of which not both ends are near, and of slips that are not."""
-    openings, stretches = len(law.stiffness), law.stretches
-    wanted = np.empty(len(stretches), dtype=np.bool_)
-    for number in range(len(stretches)):
-        part = stretches[number]
-        wanted[number] = whole or not (near[part.near] and near[part.far])
-    far = np.ones(len(near) - openings, dtype=np.bool_)
-    for row in range(openings, len(near)):
-        far[row - openings] = whole or not near[row]
-    return np.flatnonzero(wanted), openings + np.flatnonzero(far)
-
-
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
     """Find λ where it may differ from zero, from the guess on, at which what joints carry is known.
 
@@ -180,47 +95,94 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
             return found
         for row in range(len(start)):
             law.guess[row] = law.start[row] + law.speed[row] / law.gain
-    local = np.full(len(start), -1)
+    if not force.any():
+        forget(compliance)
+    own, passes = compliance.vectors.force, _found(law, start, rows, compliance, enough)
     for k in range(len(rows)):
-        local[rows[k]] = k
-    known = local, _within(law.stretches, local), rows[np.searchsorted(rows, len(law.stiffness)) :]
-    own, z, free = np.zeros(len(rows)), chosen(law.guess, rows), chosen(start, rows)
-    problem = (compliance, no_columns(rows), known)
-    passes = _settled(law, problem, free, own, enough)
-    if passes < 0:
-        passes = _led(law, problem, (free, z), own, enough)
-    for k in range(len(rows)):
-        force[rows[k]] = own[k]
+        force[compliance.rows[k]] = own[k]
     return passes
 
 
-@numba.njit(cache=True)
-def _led(law, problem, ends, own, enough):  # type: ignore
+def _unloading(law, gap, rows, compliance, force):  # type: ignore
+    """Take from gaps what λ opens or moves."""
+    _unloaded(law, gap, rows, compliance, force)
+
+
+@computing
+def _unloaded(law, gap, rows, compliance, force):  # type: ignore
+    """Take from gaps what λ opens or moves."""
+    begin(compliance, rows)
+    taken, moved, own = compliance.vectors.force, compliance.vectors.free, compliance.rows
+    for k in range(len(rows)):
+        taken[k], moved[k] = force[own[k]], 0.0
+    take_in(compliance, taken[: len(rows)], law.work.places, 0)
+    add_gaps(compliance, taken, moved[: len(rows)])
+    for k in range(len(rows)):
+        gap[own[k]] -= moved[k]
+
+
+@computing
+def _found(law, start, rows, compliance, enough):  # type: ignore
+    """Find λ of the rows from the guess on, at once or led there.
+
+    Args:
+        law: `PathLaw`.
+        start: z₀ (p,).
+        rows: numbers of the rows (k,).
+        compliance: `Compliance`, in the room of which λ is left.
+        enough: error of λ that is left [N].
+
+    Returns:
+        Passes; -1 if it does not settle.
+    """
+    begin(compliance, rows)
+    count, inside, slips, vectors = len(rows), _within(law, compliance.place), 0, compliance.vectors
+    free, guess, own = vectors.free[:count], vectors.guess[:count], compliance.rows
+    for k in range(count):
+        free[k], guess[k] = start[own[k]], law.guess[own[k]]
+        if own[k] >= len(law.stiffness):
+            law.work.slips[slips] = own[k]
+            slips += 1
+    known = compliance.place, law.work.some[:inside], law.work.slips[:slips]
+    passes = _settled(law, (compliance, known), free, enough)
+    return passes if passes > 0 else _led(law, (compliance, known), count, enough)
+
+
+@computing
+def _led(law, problem, size, enough):  # type: ignore
     """Lead λ from where it fits a guess to where it is sought, as far at once as it settles.
 
     What is added to z₀ so that the guess fits is taken away bit by bit.
 
     Args:
         law: `PathLaw`.
-        problem: F (p, p), the rows' columns of it, and what is known of them.
-        ends: z₀ (k,) and the guess of z (k,).
-        own: filled with λ (k,).
+        problem: `Compliance`, in the room of which are z₀ and the guess of z; and what is known of
+            the rows.
+        size: how many there are.
         enough: error of λ that is left [N].
 
     Returns:
         Passes; -1 if it does not settle.
     """
-    (compliance, columns, known), (free, z), rows = problem, ends, problem[1].rows
+    (compliance, known), done, share, passes = problem, 0.0, FIRST, ITERATIONS
+    rows, vectors = compliance.rows[:size], compliance.vectors
+    free, z, own = vectors.free[:size], vectors.guess[:size], vectors.force[:size]
+    added, goal = vectors.added[:size], vectors.goal[:size]
     _go(law, (rows, known), z, own)
-    take_in(columns, compliance, own, law.work.places, 0)
-    added, done, share, passes = free - z, 0.0, FIRST, ITERATIONS
-    add_gaps(columns, own, added)
+    take_in(compliance, own, law.work.places, 0)
+    for k in range(size):
+        added[k] = free[k] - z[k]
+    add_gaps(compliance, own, added)
     while done < 1.0:
-        goal = min(done + share, 1.0)
-        taken = _settled(law, problem, free - (1.0 - goal) * added, own, enough)
+        end = min(done + share, 1.0)
+        for k in range(size):
+            goal[k] = free[k] - (1.0 - end) * added[k]
+        taken = _settled(law, problem, goal, enough)
         passes += abs(taken)
         if taken > 0:
-            done, share, z = goal, 2.0 * share, chosen(law.guess, rows)
+            done, share = end, 2.0 * share
+            for k in range(size):
+                z[k] = law.guess[rows[k]]
         else:
             share *= 0.25
             if share < LAST:
@@ -229,8 +191,8 @@ def _led(law, problem, ends, own, enough):  # type: ignore
     return passes
 
 
-@numba.njit(cache=True)
-def _settled(law, problem, free, own, enough):  # type: ignore
+@computing
+def _settled(law, problem, free, enough):  # type: ignore
     """Find λ by Newton's method from the guess on.
 
     A factor is used again where the last pass promises that it is enough for the next, its error
@@ -239,56 +201,67 @@ def _settled(law, problem, free, own, enough):  # type: ignore
     Returns:
         Passes; -1 if it does not settle.
     """
-    (compliance, columns, known), size = problem, len(free)
-    wanted, room, off = np.empty(size), np.empty(size**2), np.inf
+    (compliance, known), size, off = problem, len(free), np.inf
+    vectors, rows = compliance.vectors, compliance.rows
+    own, wanted = vectors.force[:size], vectors.wanted[:size]
+    rest, change = vectors.rest[:size], vectors.change[:size]
     taken_out(law, known, wanted)
-    own[:] = wanted
+    for k in range(size):
+        own[k] = wanted[k]
     entries, count = (law.work.places, law.work.values), rates(law, known)
-    take_in(columns, compliance, wanted, entries[0], count)
-    system = prepared(columns, entries, count, room)
+    keep(compliance, wanted, entries[0], count)
+    prepared(compliance, entries, count)
     for passes in range(1, TRIES + 1):
-        rest = free - chosen(law.guess, columns.rows)
-        add_gaps(columns, wanted, rest)
-        change = newton_change(rest, (entries, count), (columns, system))
-        last, off = off, _moved(law, problem, free, (own, wanted, change), passes >= WHOLE)
+        for k in range(size):
+            rest[k] = free[k] - law.guess[rows[k]]
+        add_gaps(compliance, wanted, rest)
+        newton_change(rest, (entries, count), compliance, change)
+        last, off = off, _moved(law, problem, free, passes >= WHOLE)
         if off <= enough or last <= off <= ROUNDED * enough:
             return passes
         if not off < np.inf:
             return -1
         renew = passes == 1 or off**2 > last * enough
         count = rates(law, known) if renew else count
-        take_in(columns, compliance, wanted, entries[0], count)
+        take_in(compliance, wanted, entries[0], count)
         if renew:
-            system = prepared(columns, entries, count, room)
+            prepared(compliance, entries, count)
     return -1
 
 
-@numba.njit(cache=True)
-def _moved(law, problem, free, forces, careful):  # type: ignore
+@computing
+def _moved(law, problem, free, careful):  # type: ignore
     """Move λ as Newton's method says, or so far that it errs less.
 
     Args:
         law: `PathLaw`.
-        problem: F (p, p), the rows' columns of it, and what is known of them.
+        problem: `Compliance`, in the room of which are λ, what is wanted there and the change of
+            that; and what is known of the rows.
         free: z₀ (k,).
-        forces: λ and what is wanted there, both changed, and the change of that (k,).
         careful: whether to go less far where λ errs more than it did.
 
     Returns:
         Its error [N].
     """
-    (_, columns, known), (own, wanted, change) = problem, forces
-    move, before, share = wanted + change - own, np.sum((wanted - own) ** 2), 1.0
-    was, held = wanted.copy(), np.empty(len(own))
+    (compliance, known), size, share = problem, len(free), 1.0
+    vectors = compliance.vectors
+    own, wanted, move = vectors.force[:size], vectors.wanted[:size], vectors.change[:size]
+    was, trial, z = vectors.was[:size], vectors.trial[:size], vectors.rest[:size]
+    before = lacking(own, wanted)[1]
+    for k in range(size):
+        was[k] = wanted[k]
+        move[k] += wanted[k] - own[k]
     while True:
-        trial, z = own + share * move, free.copy()
-        holding(was, trial, held)
-        add_gaps(columns, trial, z)
-        _go(law, (columns.rows, known), z, wanted)
-        error = wanted - trial
-        if not careful or share <= LEAST or np.sum(error**2) <= (1.0 - FALLS * share) * before:
-            own[:] = trial
-            return np.max(np.abs(error))
+        for k in range(size):
+            trial[k], z[k] = own[k] + share * move[k], free[k]
+        holding(was, trial, vectors.held[:size])
+        add_gaps(compliance, trial, z)
+        _go(law, (compliance.rows[:size], known), z, wanted)
+        off, left = lacking(trial, wanted)
+        if not careful or share <= LEAST or left <= (1.0 - FALLS * share) * before:
+            for k in range(size):
+                own[k] = trial[k]
+            return off
         share *= 0.5
 
 
@@ -305,20 +278,22 @@ def _go(law, known, z, wanted):  # type: ignore
 
 solved_by(
     PathLaw,
-    (expected, _foreseen),
+    (expected, foreseen),
     (release, _released),
-    (exact, _fits),
+    (unload, _unloading),
+    (exact, fits),
     (shift, _shifted),
     (largest, _largest),
     (add_held, _held),
 )
 
 
-@numba.njit(cache=True)
-def _within(stretches, local):  # type: ignore
-    """Numbers of the stretches of which both ends are among the rows."""
-    inside = np.empty(len(stretches), dtype=np.bool_)
+@computing
+def _within(law, local):  # type: ignore
+    """Name the stretches of which both ends are among the rows; how many."""
+    inside, count, stretches = law.work.some, 0, law.stretches
     for number in range(len(stretches)):
-        part = stretches[number]
-        inside[number] = local[part.near] >= 0 and local[part.far] >= 0
-    return np.flatnonzero(inside)
+        if local[stretches[number].near] >= 0 and local[stretches[number].far] >= 0:
+            inside[count] = number
+            count += 1
+    return count

@@ -48,12 +48,25 @@ def release(law: Any, start: Any, rows: Any, compliance: Any, force: Any, enough
         law: of the joints.
         start: z₀ (p,), of which the rows are used.
         rows: that may be at work, in order; of a facet both ends.
-        compliance: F (p, p), of which these rows and columns are used.
+        compliance: `Compliance`, of which these rows and columns are used.
         force: λ, as a first guess (p,); changed at the rows.
         enough: error of λ that is left [N].
 
     Returns:
         Passes; -1 if it does not settle.
+    """
+    raise NotImplementedError
+
+
+def unload(law: Any, gap: Any, rows: Any, compliance: Any, force: Any) -> None:
+    """Take from gaps what λ opens, to have those if all joints held tension, z₀ = z - F λ.
+
+    Args:
+        law: of the joints.
+        gap: z, then z₀, of which the rows are used (p,).
+        rows: that may be at work, among them all of which λ is not zero.
+        compliance: `Compliance`, of which these rows and columns are used.
+        force: λ (p,).
     """
     raise NotImplementedError
 

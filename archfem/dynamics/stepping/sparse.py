@@ -16,8 +16,8 @@ import numba
 import numpy as np
 from numba.extending import overload
 
-from archfem.arrays import Array
 from archfem.dynamics.stepping import passing  # noqa: F401  (steps of the conserving scheme)
+from archfem.dynamics.stepping.compliance import Compliance
 from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.equation import Equation
 from archfem.dynamics.stepping.linear import Linear, reordered, solve
@@ -30,6 +30,7 @@ from archfem.dynamics.stepping.small_problem import (
     largest,
     release,
     shift,
+    unload,
 )
 from archfem.dynamics.stepping.sparse_rows import add_rows, row_times, times, trimmed
 from archfem.dynamics.stepping.strategy import Reordered
@@ -52,7 +53,7 @@ class SparseSystem(NamedTuple):
     linear: Linear
     factor: Factor
     group: Any
-    compliance: Array
+    compliance: Compliance
     known: Any
 
 
@@ -105,7 +106,7 @@ class Sparse(Reordered):
             linear,
             factorised(effective[order][:, order], self._elimination),
             self._elimination.group_of,
-            np.empty((points, points)),
+            Compliance.of(np.empty((points, points))),
             np.zeros(points, dtype=np.bool_),
         )
 
@@ -141,7 +142,8 @@ def _solved(system, vector, gap, before, force):  # type: ignore
                     start[row] = row_times(opening, row, vector)
                 shift(law, start)
             else:
-                _unload(start, gap, rows, system.compliance, force)
+                start[:] = gap
+                unload(law, start, rows, system.compliance, force)
             taken = release(law, start, rows, system.compliance, force, enough)
             if taken < 0:
                 return -1
@@ -161,21 +163,9 @@ def _solved(system, vector, gap, before, force):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _unload(start, gap, rows, compliance, force):  # type: ignore
-    """Gaps at the rows without the forces that act, z₀ = z - F λ."""
-    for row in rows:
-        start[row] = gap[row]
-    for row in rows:
-        if force[row] != 0.0:
-            line = compliance[row]
-            for other in rows:
-                start[other] -= line[other] * force[row]
-
-
-@numba.njit(cache=True)
 def _know(rows, system, room):  # type: ignore
     """Find the rows of F that are not known yet, as far as they meet those that are."""
-    known, compliance, opening = system.known, system.compliance, system.linear.opening
+    known, compliance, opening = system.known, system.compliance.whole, system.linear.opening
     force = np.ones(len(known))
     for row in rows:
         if not known[row]:

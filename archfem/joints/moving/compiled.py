@@ -20,3 +20,6 @@ inlined: Any = numba.njit(**_SETTINGS, forceinline=True)
 
 summing: Any = numba.njit(**_SETTINGS, fastmath={"contract", "reassoc"})
 """Compiles one whose sums may be taken in any order, several terms at a time."""
+
+viewing: Any = numba.njit(**_SETTINGS, inline="always")
+"""Compiles one that returns parts of arrays it is given, as part of those that call it."""
