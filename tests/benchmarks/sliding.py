@@ -1,14 +1,16 @@
 """Time of a step with joints that slide, beside that of joints that never do.
 
     python tests/benchmarks/sliding.py [--repeat 5 --fidelity rigid]
-    python tests/benchmarks/sliding.py --fidelity bridge [--repeat 2]
+    python tests/benchmarks/sliding.py --fidelity bridge [--repeat 2 --scene]
 
 The validation ring, damped, under a synthetic motion of 0.5 g, by the compiled strategies and the
-conserving scheme; or the bridge, its stones with faces and all of its soil, likewise. The least of
-some runs by turns; passes a step, how far joints slid, and how many steps SNES had to take.
+conserving scheme; or the bridge, its stones with faces and all of its soil, likewise, or under the
+first pair of its own scene, as strong as there and three times so. The least of some runs by turns;
+passes a step, how far joints slid, and how many steps SNES had to take.
 """
 
 import argparse
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,11 +51,13 @@ class Case:
         left: steps taken by SNES.
     """
 
-    def __init__(self, fidelity: str, rule: str, method: str, friction: float | None) -> None:
+    def __init__(
+        self, fidelity: str, rule: str, method: str, friction: float | None, motion: af.Motion
+    ) -> None:
         bridge = fidelity == "bridge"
         rung = {"backfill": "full", "rest": "faces"} if bridge else fidelity
         model = af.build(rubbing(friction, bridge), fidelity=rung, quadrature=rule)
-        self._motion = BRIDGE if bridge else MOTION
+        self._motion = motion
         damping = BRIDGE_DAMPING if bridge else DAMPING
         equation = af.dynamics.Equation(model, self._motion, damping)
         dead = af.dead_load(model)
@@ -77,9 +81,15 @@ class Case:
         self.far = 0.0 if memory is None else float(np.abs(memory).max(initial=0.0))
 
 
-def compared(fidelity: str, rule: str, methods: dict[float | None, str], repeat: int) -> None:
+def compared(
+    fidelity: str,
+    rule: str,
+    methods: dict[float | None, str],
+    repeat: int,
+    motion: af.Motion = MOTION,
+) -> None:
     """Print a line for each coefficient of friction and its method; they run by turns."""
-    cases = {mu: Case(fidelity, rule, method, mu) for mu, method in methods.items()}
+    cases = {mu: Case(fidelity, rule, method, mu, motion) for mu, method in methods.items()}
     for _ in range(repeat):
         for case in cases.values():
             case.run()
@@ -97,14 +107,18 @@ def main() -> None:
     made = argparse.ArgumentParser(description=__doc__)
     made.add_argument("--repeat", type=int, default=5, help="times that each run is timed")
     made.add_argument("--fidelity", help="only this rung, or 'bridge'")
+    made.add_argument("--scene", action="store_true", help="the bridge under its own first pair")
     asked = made.parse_args()
     print(
         f"{'rung':10} {'rule':8} {'method':10} {'friction':>8} {'ms/step':>8} {'ratio':>6} "
         f"{'passes':>6} {'slid mm':>8} SNES"
     )
     if asked.fidelity == "bridge":
-        methods = dict.fromkeys((None, 0.6, 0.3), "compliance")
-        compared("bridge", "exact", methods, asked.repeat)
+        own = af.Case.read(SCENE).ground_suite().motions[0]
+        motions = [own, own.scaled(3.0)] if asked.scene else [BRIDGE]
+        for motion, method in itertools.product(motions, ("compliance", "tangent")):
+            methods = {None: "compliance", 0.6: method, 0.3: method}
+            compared("bridge", "exact", methods, asked.repeat, motion)
         return
     for fidelity in [asked.fidelity] if asked.fidelity else ["rigid", "faces", "condensed"]:
         for rule in ("lobatto", "exact"):

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 import archfem as af
 from archfem.dynamics.stepping.banded import Banded
-from archfem.dynamics.stepping.choice import SHORTEST, chosen, stepper_for
+from archfem.dynamics.stepping.choice import LEAD, SHORTEST, TIMED, _places, chosen, stepper_for
 from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.joint_law import Law
 from archfem.dynamics.stepping.loop import advance
@@ -355,3 +355,15 @@ def test_images_follow_the_state():
     follow(contact, before, after, numbers)
     follow(matrix @ contact, before @ matrix.T, image, numbers)
     assert image == pytest.approx(after @ matrix.T, rel=1e-9)
+
+
+def test_steps_are_timed_where_a_motion_is_weak_usual_strong_and_strongest():
+    """Of a motion that swells and fades; also where its peak is too late, or its lull too early."""
+    swelling = np.concatenate([np.linspace(0.0, 1.0, 600), np.linspace(1.0, 0.0, 601)[1:]])
+    places = _places(swelling)
+    means = [swelling[place : place + TIMED].mean() for place in places]
+    assert np.allclose(
+        means, [1 / 6, 1 / 2, 5 / 6, 1.0], atol=LEAD / 900
+    )  # nothing leads up to these
+    for strength in (swelling[600:], swelling[:600]):
+        assert all(LEAD <= place <= len(strength) - TIMED for place in _places(strength))

@@ -1,10 +1,11 @@
 """Which strategy takes a run: the fastest on the run's own motion, timed.
 
-What a step takes depends on how many joints are open, so a few steps are timed about the peak of
-the motion, where most are: there runs spend their time, and the ranking of strategies while all
-joints are closed says nothing of it. All strategies go from one state, to which the first of them
-has shaken the structure over the steps before. The time until a strategy can begin counts as well,
-spread over the run. As all give one history, to rounding, the choice changes nothing but the time.
+What a step takes depends on how many joints are open or slide, so a few steps are timed where the
+motion is weak, where it is as usual, where it is strong and about its peak: the ranking of
+strategies while all joints are closed says nothing of where most are open, nor this of the run. All
+strategies go from the same states, to which the first of them has shaken the structure over the
+steps before. The time until a strategy can begin counts as well, spread over the run. As all give
+one history, to rounding, the choice changes nothing but the time.
 """
 
 import logging
@@ -38,8 +39,12 @@ STRATEGIES: tuple[type[Strategy], ...] = (Sparse, Banded, Modal, Turning, Tangen
 
 METHODS = ("auto", *sorted(each.name for each in STRATEGIES), "snes")
 
+STRENGTHS = (1 / 6, 1 / 2, 5 / 6, 1.0)
+"""Parts of the run in which the motion is weaker than where steps are timed: in the middle of each
+third, and at the peak, from which on joints keep what they slid."""
+
 TIMED = 20
-"""Steps that are timed."""
+"""Steps that are timed at each of those."""
 
 LEAD = 40
 """Steps before those, in which joints open."""
@@ -141,23 +146,40 @@ def _fastest(
 ) -> Strategy | None:
     """Time those that apply, but for those whose set-up alone would take too much of the run."""
     times = start.time + dt * np.arange(1, round((equation.motion.duration - start.time) / dt) + 1)
-    peak = int(np.linalg.norm(equation.motion.at(times), axis=1).argmax())
-    first = min(max(peak, LEAD), len(times) - TIMED)
-    before, timed = times[first - LEAD : first], times[first : first + TIMED]
-    fastest, least, state = None, np.inf, None
+    places = _places(np.linalg.norm(equation.motion.at(times), axis=1))
+    windows = [times[place : place + TIMED] for place in places]
+    fastest, least, states = None, np.inf, None
     for kind in strategies:
         begun = time.process_time()
         strategy = kind.of(equation)
         if strategy is None or strategy.setup > WORTH * least:
             continue
         stepper = Stepper(equation, strategy)
-        stepper.prepared(start, dt, timed)
+        stepper.prepared(start, dt, windows[0])
         setup = time.process_time() - begun
-        state = state or _shaken(stepper, start, dt, before)
-        found = setup + len(times) * _clocked(stepper, state, dt, timed)
+        states = states or [
+            _shaken(stepper, start, dt, times[place - LEAD : place]) for place in places
+        ]
+        pairs = zip(states, windows, strict=True)
+        clocked = [_clocked(stepper, state, dt, window) for state, window in pairs]
+        found = setup + len(times) * float(np.mean(clocked))
         if found < CLEARLY * least:
             fastest, least = strategy, found
     return fastest
+
+
+def _places(strength: Array) -> list[int]:
+    """Steps from which on a motion is as strong, on the mean, as where steps are to be timed.
+
+    Args:
+        strength: of the motion at each step (steps,).
+
+    Returns:
+        The first step of each.
+    """
+    means = np.convolve(strength, np.full(TIMED, 1.0 / TIMED), "valid")[LEAD:]
+    order = np.argsort(means, kind="stable")
+    return [LEAD + int(order[int(part * (len(order) - 1))]) for part in STRENGTHS]
 
 
 def _shaken(stepper: Stepper, start: State, dt: float, times: Array) -> State:
