@@ -13,6 +13,7 @@ from scipy.sparse.linalg import splu
 import archfem as af
 from archfem.dynamics.stepping.banded import Banded
 from archfem.dynamics.stepping.choice import LEAD, SHORTEST, TIMED, _places, chosen, stepper_for
+from archfem.dynamics.stepping.compliance import Compliance
 from archfem.dynamics.stepping.elimination import Elimination
 from archfem.dynamics.stepping.joint_law import Law
 from archfem.dynamics.stepping.loop import advance
@@ -323,7 +324,7 @@ def test_released_forces_leave_no_tension(rule):
     start, force = rng.standard_normal(40), np.zeros(40)
     rows, stiffness = np.arange(40), np.full(40, 2.0 if facets else 1.0)
     compiled = Law(facets, stiffness, points.arm, points.joint)
-    passes = released(compiled, start, rows, compliance, force, 1e-13)
+    passes = released(compiled, start, rows, Compliance.of(compliance), force, 1e-13)
     gap = start + compliance @ force
     first, second = law.entries
     closed = sparse.csr_matrix((law.stiffness(np.full(40, -1.0)), (first, second)))
@@ -338,10 +339,11 @@ def test_a_facet_that_hardly_opens_is_released(others):
     """By so little that the integral of its nearer end is all rounding; directly and by CG."""
     size = 2 * others + 2
     law = Law(True, np.full(size, 2.0), np.zeros(size), np.zeros(size, dtype=int))
+    compliance = Compliance.of(0.1 * np.eye(size))
     start, force, rows = np.full(size, -1.0), np.zeros(size), np.arange(size)
     for part in np.geomspace(1e-9, 1e-5, 200):
         start[0], start[1] = -1.0, part / (1.0 - part)
-        assert released(law, start, rows, 0.1 * np.eye(size), force, 1e-13) > 0
+        assert released(law, start, rows, compliance, force, 1e-13) > 0
         assert force == pytest.approx(0.0, abs=2.0 * part)
 
 
