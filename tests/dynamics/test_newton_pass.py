@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from archfem.dynamics.stepping.columns import add_gaps, begin, forget, keep, take_in
-from archfem.dynamics.stepping.compliance import DEEP, NARROW, Compliance
-from archfem.dynamics.stepping.newton_pass import FEW, holding, newton_change, prepared
+from archfem.dynamics.stepping.compliance import DEEP, NARROW, WIDE, Compliance, broad, products
+from archfem.dynamics.stepping.newton_pass import (
+    FEW,
+    holding,
+    lacking_at,
+    newton_change,
+    prepared,
+)
 from archfem.dynamics.stepping.residuals import ROUGH
 
 NONE = np.zeros((0, 2), np.int64)
@@ -56,10 +62,14 @@ def test_rows_and_columns_come_and_go_from_problem_to_problem():
         rows = np.flatnonzero(rng.random(size) < rng.random())
         begin(compliance, rows)
         assert sorted(at_work(compliance)[0]) == rows.tolist()
-        force = np.where(rng.random(len(rows)) < rng.random(), rng.random(len(rows)), 0.0)
+        was, force = (
+            np.where(rng.random(len(rows)) < rng.random(), rng.random(len(rows)), 0.0)
+            for _ in range(2)
+        )
         entries = rng.integers(0, max(len(rows), 1), (len(rows) // 3, 2))
-        keep(compliance, force, entries, len(entries))
-        columns = set(np.flatnonzero(force)) | set(entries[:, 0])
+        stay = set(np.flatnonzero(was)) & set(at_work(compliance)[1].tolist())
+        keep(compliance, was, force, entries, len(entries))
+        columns = set(np.flatnonzero(force)) | set(entries[:, 0]) | stay
         assert set(at_work(compliance)[1].tolist()) == columns
         agrees(compliance, force)
         if problem % 20 == 19:
@@ -96,36 +106,63 @@ def test_a_pass_solves_however_many_columns_there_are(size, weight, spread):
     """Where each gap moves but the next, residuals need as many products as there are gaps."""
     assert DEEP < 2 * FEW
     compliance, rates, matrix = ring_of_gaps(size, weight)
-    rest, change = np.random.default_rng(1).random(size), np.empty(size)
-    places = np.stack([np.arange(size)] * 2, axis=1)
+    lacks = np.random.default_rng(1).random(size)
+    places, change = np.stack([np.arange(size)] * 2, axis=1), lacks.copy()
     prepared(compliance, (places, rates), size)
-    newton_change(rest, ((places, rates), size), compliance, change)
-    left = matrix @ change - rates * rest
-    assert np.linalg.norm(left) <= 1.01 * spread * np.linalg.norm(rates * rest)  # and rounding
+    newton_change(change, ((places, rates), size), compliance)
+    left = matrix @ change - lacks
+    assert np.linalg.norm(left) <= 1.01 * spread * np.linalg.norm(lacks)  # and rounding
 
 
 @pytest.mark.parametrize("size", [FEW // 2, 2 * FEW], ids=["few", "many"])
 def test_equations_that_are_used_again_leave_out_columns_that_came_since(size):
-    """What such a column's λ is to be, the next equations say."""
+    """What such a row's λ lacks, it gets; what that does to others, the next equations say."""
     compliance = symmetric(size + 1)
     compliance.whole[:] *= 0.1 / size
     begin(compliance, np.arange(size + 1))
     places, rates = np.stack([np.arange(size)] * 2, axis=1), np.linspace(0.5, 1.0, size)
     take_in(compliance, np.zeros(size + 1), places, size)
     prepared(compliance, (places, rates), size)
-    rest, changes = np.random.default_rng(1).random(size + 1), np.empty((2, size + 1))
-    newton_change(rest, ((places, rates), size), compliance, changes[0])
+    lacks = np.random.default_rng(1).random(size + 1)
+    changes = np.stack([lacks, lacks])
+    newton_change(changes[0], ((places, rates), size), compliance)
     take_in(compliance, np.eye(size + 1)[size], NONE, 0)
-    newton_change(rest, ((places, rates), size), compliance, changes[1])
-    assert changes[0].any()
+    newton_change(changes[1], ((places, rates), size), compliance)
+    assert (changes[0, :size] != lacks[:size]).all()
     assert (changes[1] == changes[0]).all()
-    assert changes[1, size] == 0.0
+    assert changes[1, size] == lacks[size]
 
 
 def test_nothing_lacking_changes_nothing():
     """Of a residual that is zero, none of which less could be left is sought."""
     compliance, rates, _ = ring_of_gaps(2 * FEW, 0.3)
-    places, change = np.stack([np.arange(2 * FEW)] * 2, axis=1), np.ones(2 * FEW)
+    places, change = np.stack([np.arange(2 * FEW)] * 2, axis=1), np.zeros(2 * FEW)
     prepared(compliance, (places, rates), 2 * FEW)
-    newton_change(np.zeros(2 * FEW), ((places, rates), 2 * FEW), compliance, change)
+    newton_change(change, ((places, rates), 2 * FEW), compliance)
     assert (change == 0.0).all()
+
+
+def test_what_is_lacking_is_what_gaps_that_are_off_would_bring():
+    """Entries of one place are summed, and rows without any lack nothing."""
+    places, values = np.array([[0, 1], [0, 1], [2, 0], [2, 3]]), np.array([2.0, 1.0, 4.0, -1.0])
+    rest, lacks = np.array([1.0, 10.0, 100.0, 7.0]), np.full(4, np.nan)
+    lacking_at(rest, ((places, values), 4), lacks)
+    assert lacks.tolist() == [30.0, 0.0, -3.0, 0.0]
+
+
+@pytest.mark.parametrize("kind", [np.float32, float])
+@pytest.mark.parametrize("rows", [1, 3, 4, 11])
+def test_products_are_those_of_the_rows_up_to_the_vector(kind, rows):
+    """Whole numbers, so exact; what else there is in the room of a row does not count."""
+    matrix = np.random.default_rng(rows).integers(-9, 9, (rows, 2 * WIDE)).astype(kind)
+    vector, images = np.arange(WIDE).astype(kind), np.full(rows, np.nan, kind)
+    products(matrix.ravel(), 2 * WIDE, vector, images)
+    assert (images == matrix[:, :WIDE] @ vector).all()
+
+
+def test_rows_begin_with_a_line_of_memory():
+    compliance = symmetric(WIDE + 1)
+    rooms = (compliance.entries, compliance.rough, compliance.basis, *compliance.vectors)
+    assert all(room.ctypes.data % 64 == 0 for room in rooms)
+    assert [broad(count) for count in (0, 1, WIDE, WIDE + 1)] == [0, WIDE, WIDE, 2 * WIDE]
+    assert compliance.sizes[2] == 2 * WIDE

@@ -7,8 +7,11 @@ from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.small_problem import AHEAD, EXACT, largest
 from archfem.joints.moving.compiled import computing
 
-LATER = 1.5
+LATER = 2.0
 """How much farther than to the guess gaps may go with what then works foreseen."""
+
+RUBBING = 0.5
+"""Share of its limit from which on the shear of a point that may open is taken to reach it."""
 
 
 def foreseen(law, gap, before, force):  # type: ignore
@@ -23,7 +26,7 @@ def foreseen(law, gap, before, force):  # type: ignore
     works, near, openings = force != 0.0, force != 0.0, len(law.stiffness)
     if law.chain.half > 0:
         near[:] = True
-    guess, start, speed, points = law.guess, law.start, law.speed, law.points
+    guess, start, speed = law.guess, law.start, law.speed
     for row in range(len(gap)):
         guess[row] = start[row] + speed[row] / law.gain
         if row < openings and gap[row] + AHEAD * (gap[row] - before[row]) > 0.0:
@@ -33,13 +36,24 @@ def foreseen(law, gap, before, force):  # type: ignore
     for part in law.stretches:
         if works[part.near] or works[part.far]:
             near[part.near] = near[part.far] = True
-            for k in range(part.begin, part.end):
-                if points[k].group >= 0:
-                    near[points[k].group] = True
-    _work_at(law, guess, near, True)
-    later = start + LATER * (guess - start)
-    _work_at(law, later, near, False)
+    _work_at(law, start + LATER * (guess - start), near, True)
+    _add_rubbing(law, near)
+    _involve(law, near)
     return near
+
+
+@computing
+def _add_rubbing(law, near):  # type: ignore
+    """Add slips of stretches at work that are not far from their limit, as found last."""
+    points, pressed = law.points, law.work.points
+    for part in law.stretches:
+        if not (near[part.near] and near[part.far]):
+            continue
+        for k in range(part.begin, part.end):
+            point, found = points[k], pressed[k]
+            limit = point.cohesion * found.area - point.friction * found.normal
+            if point.group >= 0 and abs(found.shear) > RUBBING * limit:
+                near[point.group] = True
 
 
 @computing

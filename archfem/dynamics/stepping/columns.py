@@ -7,7 +7,7 @@ structure is too large to lie near at hand: so the entries stay where they are, 
 column takes the place of one that goes, and only what comes is fetched.
 """
 
-from archfem.dynamics.stepping.compliance import NARROW, line
+from archfem.dynamics.stepping.compliance import NARROW, broad, line, products
 from archfem.joints.moving.compiled import computing, summing
 
 
@@ -21,7 +21,7 @@ def forget(compliance):  # type: ignore
     for k in range(compliance.sizes[0]):
         compliance.place[compliance.rows[k]] = -1
     compliance.sizes[0], compliance.sizes[1] = 0, 0
-    compliance.sizes[2] = min(NARROW, len(compliance.rows))
+    compliance.sizes[2] = min(NARROW, broad(len(compliance.rows)))
 
 
 @computing
@@ -53,7 +53,7 @@ def _come(compliance, row):  # type: ignore
     compliance.sizes[0] += 1
     compliance.rows[k], compliance.place[row], compliance.column[k] = row, k, -1
     own = line(compliance, k)
-    for j in range(len(own)):
+    for j in range(compliance.sizes[1]):
         own[j] = whole[compliance.rows[compliance.places[j]]]
 
 
@@ -89,12 +89,15 @@ def _drop(compliance, column):  # type: ignore
 
 
 @computing
-def keep(compliance, force, entries, count):  # type: ignore
+def keep(compliance, was, force, entries, count):  # type: ignore
     """Let columns go of rows where λ and its derivatives are zero, and take in those of others.
+
+    One that was at work in the last step stays: it often is again, and takes long to come by.
 
     Args:
         compliance: `Compliance`.
-        force: λ of the rows (k,).
+        was: λ of the last step (k,).
+        force: λ of the rows now (k,).
         entries: rows and columns of the derivatives of λ.
         count: how many of those there are.
     """
@@ -102,7 +105,8 @@ def keep(compliance, force, entries, count):  # type: ignore
     for entry in range(count):
         needed[entries[entry, 0]] = True
     while column < compliance.sizes[1]:
-        if force[places[column]] == 0.0 and not needed[places[column]]:
+        row = places[column]
+        if force[row] == 0.0 and was[row] == 0.0 and not needed[row]:
             _drop(compliance, column)
         else:
             column += 1
@@ -146,7 +150,7 @@ def _become(compliance, row):  # type: ignore
 def _widen(compliance):  # type: ignore
     """Make room for more columns."""
     entries, (rows, columns, wide, _) = compliance.entries, compliance.sizes
-    wider = min(wide + NARROW, len(compliance.rows))
+    wider = min(wide + NARROW, broad(len(compliance.rows)))
     for k in range(rows - 1, 0, -1):
         for j in range(columns - 1, -1, -1):
             entries[k * wider + j] = entries[k * wide + j]
@@ -162,11 +166,13 @@ def add_gaps(compliance, force, gaps):  # type: ignore
         force: λ of the rows (k,).
         gaps: of the rows, changed (k,).
     """
-    count, own = compliance.sizes[1], compliance.vectors.column
+    count, places = compliance.sizes[1], compliance.places
+    own = compliance.vectors.column[: broad(count)]
     for j in range(count):
-        own[j] = force[compliance.places[j]]
+        own[j] = force[places[j]]
+    for j in range(count, len(own)):
+        own[j] = 0.0
+    images = compliance.vectors.image[: len(gaps)]
+    products(compliance.entries, compliance.sizes[2], own, images)
     for i in range(len(gaps)):
-        row, total = line(compliance, i), 0.0
-        for j in range(count):
-            total += row[j] * own[j]
-        gaps[i] += total
+        gaps[i] += images[i]

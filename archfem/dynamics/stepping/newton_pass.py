@@ -1,11 +1,12 @@
 """One pass of Newton's method at the rows of a small problem: its equations, and their solution.
 
-Of (1 - λ' F) μ = λ' (z₀ + F λ - z) for the change μ of λ the rows matter where λ' has any entry.
+Of (1 - λ' F) μ = d for the change μ of λ, d what λ lacks, the rows matter where λ' has any entry;
+in the others μ is d.
 """
 
 import numpy as np
 
-from archfem.dynamics.stepping.compliance import line, square
+from archfem.dynamics.stepping.compliance import line, rows_in, square
 from archfem.dynamics.stepping.residuals import minimised
 from archfem.joints.moving.compiled import computing, inlined, summing
 
@@ -122,7 +123,7 @@ def prepared(compliance, entries, count):  # type: ignore
     if size <= FEW:
         _factorise(compliance, entries, count)
     else:
-        _equations(compliance, entries, count, square(compliance.rough, size))
+        _equations(compliance, entries, count, rows_in(compliance.rough, size))
 
 
 @computing
@@ -135,40 +136,59 @@ def _factorise(compliance, entries, count):  # type: ignore
 
 @summing
 def _equations(compliance, entries, count, matrix):  # type: ignore
-    """Fill 1 - λ' F of the columns."""
-    (places, values), size = entries, len(matrix)
+    """Fill 1 - λ' F of the columns, by two entries at a time where these follow in a row."""
+    (places, values), (size, wide) = entries, matrix.shape
     for i in range(size):
         own = matrix[i]
-        for k in range(size):
+        for k in range(wide):
             own[k] = 0.0
         own[i] = 1.0
-    for entry in range(count):
-        own, value = matrix[compliance.column[places[entry, 0]]], values[entry]
-        other = line(compliance, places[entry, 1])
-        for k in range(size):
-            own[k] -= value * other[k]
+    entry = 0
+    while entry < count:
+        row, entered = places[entry, 0], values[entry]
+        own, other = matrix[compliance.column[row]], line(compliance, places[entry, 1])
+        entry += 1
+        if entry < count and places[entry, 0] == row:
+            also, further = values[entry], line(compliance, places[entry, 1])
+            for k in range(wide):
+                own[k] -= entered * other[k] + also * further[k]
+            entry += 1
+        else:
+            for k in range(wide):
+                own[k] -= entered * other[k]
 
 
 @computing
-def newton_change(rest, entered, compliance, change):  # type: ignore
-    """Solve (1 - λ' F) μ = λ' r for the change μ of λ, which is 0 where no column was.
+def lacking_at(rest, entered, lacks):  # type: ignore
+    """Find what λ lacks, to first order, where gaps are off by a rest: λ' r.
 
     Args:
         rest: r (k,).
         entered: rows and columns of λ' with its values, and how many those are.
-        compliance: `Compliance`, in the room of which `prepared` has left the equations.
-        change: μ, filled (k,).
+        lacks: filled (k,).
     """
-    ((places, values), count), size = entered, compliance.sizes[3]
+    (places, values), count = entered
+    for k in range(len(lacks)):
+        lacks[k] = 0.0
+    for k in range(count):
+        lacks[places[k, 0]] += values[k] * rest[places[k, 1]]
+
+
+@computing
+def newton_change(change, entered, compliance):  # type: ignore
+    """Solve (1 - λ' F) μ = d in place for the change μ of λ.
+
+    Args:
+        change: d, then μ (k,).
+        entered: rows and columns of λ' with its values, and how many those are.
+        compliance: `Compliance`, in the room of which `prepared` has left the equations.
+    """
+    size = compliance.sizes[3]
     own = compliance.vectors.column[:size]
     for k in range(size):
-        own[k] = 0.0
-    for k in range(len(change)):
-        change[k] = 0.0
-    for k in range(count):
-        own[compliance.column[places[k, 0]]] += values[k] * rest[places[k, 1]]
+        own[k] = change[compliance.places[k]]
     if size > FEW and not minimised(compliance, own):
-        _factorise(compliance, entered[0], count)
+        _factorise(compliance, *entered)
         _substitute(square(compliance.matrix, size), compliance.exchanges, own)
     elif size <= FEW:
         _substitute(square(compliance.matrix, size), compliance.exchanges, own)

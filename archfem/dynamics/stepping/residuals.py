@@ -7,10 +7,10 @@ up once a factor takes no longer.
 
 import numpy as np
 
-from archfem.dynamics.stepping.compliance import DEEP, square
+from archfem.dynamics.stepping.compliance import DEEP, broad, products
 from archfem.joints.moving.compiled import computing, summing
 
-ROUGH = 1e-3
+ROUGH = 3e-4
 """Residual that many rows are left with, relative to the first: the next pass takes it up."""
 
 
@@ -26,7 +26,7 @@ def minimised(compliance, right):  # type: ignore
         Whether it is solved.
     """
     size, square_of, basis, (rotations, left) = len(right), 0.0, compliance.basis, compliance.turned
-    matrix, upper = square(compliance.rough, size), compliance.upper
+    upper, wide = compliance.upper, broad(size)
     for k in range(size):
         square_of += right[k] ** 2
     left[0] = first = np.sqrt(square_of)
@@ -34,9 +34,13 @@ def minimised(compliance, right):  # type: ignore
         return True
     for k in range(size):
         basis[0, k] = right[k] / first
+    for k in range(size, wide):
+        basis[0, k] = 0.0
     for step in range(DEEP):
-        _product(matrix, basis[step], basis[step + 1])
-        norm = _made_orthogonal(basis, step + 1, size, upper[step])
+        products(compliance.rough, wide, basis[step][:wide], basis[step + 1][:size])
+        for k in range(size, wide):
+            basis[step + 1, k] = 0.0
+        norm = _made_orthogonal(basis, step + 1, wide, upper[step])
         _rotate(upper[step], step, norm, rotations, left)
         if abs(left[step + 1]) <= ROUGH * first:
             _combined(basis, step + 1, compliance, right)
@@ -90,14 +94,3 @@ def _combined(basis, count, compliance, right):  # type: ignore
         own = basis[step]
         for k in range(len(right)):
             right[k] += left[step] * own[k]
-
-
-@summing
-def _product(matrix, vector, image):  # type: ignore
-    """Multiply a matrix by a vector, both in single precision."""
-    size, zero = len(matrix), np.float32(0.0)
-    for i in range(size):
-        row, total = matrix[i], zero
-        for k in range(size):
-            total += row[k] * vector[k]
-        image[i] = total

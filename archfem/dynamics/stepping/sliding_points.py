@@ -5,12 +5,12 @@ gradient of an energy, and the problem
 
     z = z₀ + F λ(z),
 
-is not symmetric. It is solved by Newton's method, (1 - F λ') δ = z₀ + F λ - z, in the rows that
-open or slide and in the openings that press on those, by a dense factor where they are few and by
-minimal residuals (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856) in single precision
-where they are many and these converge: a pass only leads to the next. Where some passes have not
-been enough, further ones go no farther than λ errs less; and where those are not, λ is led from
-where it is known to where it is sought.
+is not symmetric. It is solved by Newton's method, (1 - λ' F) μ = λ(z₀ + F λ) - λ for the change μ
+of λ, in the rows that open or slide and in the openings that press on those, by a dense factor
+where they are few and by minimal residuals (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986)
+856) in single precision where they are many and these converge: a pass only leads to the next.
+Where some passes have not been enough, further ones go no farther than λ errs less; and where those
+are not, λ is led from where it is known to where it is sought.
 """
 
 import numpy as np
@@ -26,7 +26,14 @@ from archfem.dynamics.stepping.chain_newton import (
 )
 from archfem.dynamics.stepping.columns import add_gaps, begin, forget, keep, take_in
 from archfem.dynamics.stepping.loop import ITERATIONS
-from archfem.dynamics.stepping.newton_pass import holding, newton_change, prepared, rates, taken_out
+from archfem.dynamics.stepping.newton_pass import (
+    holding,
+    lacking_at,
+    newton_change,
+    prepared,
+    rates,
+    taken_out,
+)
 from archfem.dynamics.stepping.path_forces import press, slide
 from archfem.dynamics.stepping.path_law import PathLaw
 from archfem.dynamics.stepping.small_problem import (
@@ -82,7 +89,7 @@ def _largest(law, gap):  # type: ignore
 
 
 def _released(law, start, rows, compliance, force, enough):  # type: ignore
-    """Find λ where it may differ from zero, from the guess on, at which what joints carry is known.
+    """Find λ where it may differ from zero, from the guess on.
 
     Returns:
         Passes; -1 if it does not settle.
@@ -97,7 +104,7 @@ def _released(law, start, rows, compliance, force, enough):  # type: ignore
             law.guess[row] = law.start[row] + law.speed[row] / law.gain
     if not force.any():
         forget(compliance)
-    own, passes = compliance.vectors.force, _found(law, start, rows, compliance, enough)
+    own, passes = compliance.vectors.force, _found(law, start, rows, compliance, force, enough)
     for k in range(len(rows)):
         force[compliance.rows[k]] = own[k]
     return passes
@@ -122,7 +129,7 @@ def _unloaded(law, gap, rows, compliance, force):  # type: ignore
 
 
 @computing
-def _found(law, start, rows, compliance, enough):  # type: ignore
+def _found(law, start, rows, compliance, force, enough):  # type: ignore
     """Find λ of the rows from the guess on, at once or led there.
 
     Args:
@@ -130,6 +137,7 @@ def _found(law, start, rows, compliance, enough):  # type: ignore
         start: z₀ (p,).
         rows: numbers of the rows (k,).
         compliance: `Compliance`, in the room of which λ is left.
+        force: λ of the last step, or as it was found last (p,).
         enough: error of λ that is left [N].
 
     Returns:
@@ -139,11 +147,13 @@ def _found(law, start, rows, compliance, enough):  # type: ignore
     count, inside, slips, vectors = len(rows), _within(law, compliance.place), 0, compliance.vectors
     free, guess, own = vectors.free[:count], vectors.guess[:count], compliance.rows
     for k in range(count):
+        vectors.force[k] = force[own[k]]
         free[k], guess[k] = start[own[k]], law.guess[own[k]]
         if own[k] >= len(law.stiffness):
             law.work.slips[slips] = own[k]
             slips += 1
     known = compliance.place, law.work.some[:inside], law.work.slips[:slips]
+    _go(law, (own[:count], known), guess, vectors.wanted[:count])
     passes = _settled(law, (compliance, known), free, enough)
     return passes if passes > 0 else _led(law, (compliance, known), count, enough)
 
@@ -166,13 +176,13 @@ def _led(law, problem, size, enough):  # type: ignore
     """
     (compliance, known), done, share, passes = problem, 0.0, FIRST, ITERATIONS
     rows, vectors = compliance.rows[:size], compliance.vectors
-    free, z, own = vectors.free[:size], vectors.guess[:size], vectors.force[:size]
+    free, z, wanted = vectors.free[:size], vectors.guess[:size], vectors.wanted[:size]
     added, goal = vectors.added[:size], vectors.goal[:size]
-    _go(law, (rows, known), z, own)
-    take_in(compliance, own, law.work.places, 0)
+    _go(law, (rows, known), z, wanted)
+    take_in(compliance, wanted, law.work.places, 0)
     for k in range(size):
         added[k] = free[k] - z[k]
-    add_gaps(compliance, own, added)
+    add_gaps(compliance, wanted, added)
     while done < 1.0:
         end = min(done + share, 1.0)
         for k in range(size):
@@ -187,16 +197,17 @@ def _led(law, problem, size, enough):  # type: ignore
             share *= 0.25
             if share < LAST:
                 return -1
-            _go(law, (rows, known), z, own)
+            _go(law, (rows, known), z, wanted)
     return passes
 
 
 @computing
 def _settled(law, problem, free, enough):  # type: ignore
-    """Find λ by Newton's method from the guess on.
+    """Find λ by Newton's method from the guess on, of which λ is wanted.
 
-    A factor is used again where the last pass promises that it is enough for the next, its error
-    falling as much as before.
+    At first λ lacks what the gaps are off the guess, later what they ask for. The equations are
+    used again where the last pass promises that they are enough for the next, its error falling as
+    much as before, and no row was added to them.
 
     Returns:
         Passes; -1 if it does not settle.
@@ -205,27 +216,30 @@ def _settled(law, problem, free, enough):  # type: ignore
     vectors, rows = compliance.vectors, compliance.rows
     own, wanted = vectors.force[:size], vectors.wanted[:size]
     rest, change = vectors.rest[:size], vectors.change[:size]
-    taken_out(law, known, wanted)
+    entries, count = (law.work.places, law.work.values), rates(law, known)
+    keep(compliance, own, wanted, entries[0], count)
     for k in range(size):
         own[k] = wanted[k]
-    entries, count = (law.work.places, law.work.values), rates(law, known)
-    keep(compliance, wanted, entries[0], count)
     prepared(compliance, entries, count)
+    for k in range(size):
+        rest[k] = free[k] - law.guess[rows[k]]
+    add_gaps(compliance, wanted, rest)
+    lacking_at(rest, (entries, count), change)
     for passes in range(1, TRIES + 1):
-        for k in range(size):
-            rest[k] = free[k] - law.guess[rows[k]]
-        add_gaps(compliance, wanted, rest)
-        newton_change(rest, (entries, count), compliance, change)
+        newton_change(change, (entries, count), compliance)
         last, off = off, _moved(law, problem, free, passes >= WHOLE)
         if off <= enough or last <= off <= ROUNDED * enough:
             return passes
         if not off < np.inf:
             return -1
-        renew = passes == 1 or off**2 > last * enough
-        count = rates(law, known) if renew else count
-        take_in(compliance, wanted, entries[0], count)
-        if renew:
+        take_in(compliance, wanted, entries[0], 0)
+        added = compliance.sizes[1] > compliance.sizes[3]
+        if passes == 1 or added or off**2 > last * enough:
+            count = rates(law, known)
+            take_in(compliance, wanted, entries[0], count)
             prepared(compliance, entries, count)
+        for k in range(size):
+            change[k] = wanted[k] - own[k]
     return -1
 
 
@@ -250,7 +264,6 @@ def _moved(law, problem, free, careful):  # type: ignore
     before = lacking(own, wanted)[1]
     for k in range(size):
         was[k] = wanted[k]
-        move[k] += wanted[k] - own[k]
     while True:
         for k in range(size):
             trial[k], z[k] = own[k] + share * move[k], free[k]
