@@ -17,9 +17,6 @@ it and says where it is defined. Everything is loaded when first used, so the ma
 
 import lazy_loader
 
-from archfem._promised import keep
-
 __version__ = "0.2.0"
 
-keep()
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,6 +2,6 @@
 
 import sys
 
-from archfem.commands.line import main
+from archfem.commands.cli import main
 
 sys.exit(main())

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Load SLEPc when it is first asked for: only vibrations need it."""
+    """Load SLEPc at first use: only modes of vibration require it."""
     if name != "SLEPc":
         raise AttributeError(f"module '{__name__}' has no attribute {name!r}")
     import slepc4py

@@ -1,22 +1,19 @@
-"""What can go wrong: one class for each remedy; messages say what, why and what to do."""
+"""Exception classes, one for each remedy; messages give the value, the reason and the remedy."""
 
 from typing import Any
 
-LONGEST = 4000
-"""Most letters of an error: what it quotes may have been of any length."""
-
 
 class ArchfemError(Exception):
-    """Anything archfem refuses or fails to do."""
+    """Base class of all errors that archfem raises on purpose."""
 
     def __init__(self, message: str = "") -> None:
-        if len(message) > LONGEST:
-            message = f"{message[: LONGEST - 500]} … {message[-490:]}"
+        if len(message) > 4000:  # a quoted value may have any length
+            message = f"{message[:3500]} … {message[-490:]}"
         super().__init__(message)
 
 
 class InvalidInput(ArchfemError, ValueError):
-    """A value, a file or a key that cannot be meant: correct it and call again."""
+    """A value, file or key that is not valid: correct it and call again."""
 
 
 class InvalidStructure(ArchfemError, ValueError):
@@ -28,14 +25,14 @@ class MeshError(ArchfemError):
 
 
 class StudyStopped(ArchfemError):
-    """A study that could not go on; what was finished is kept: make good what is said, go on."""
+    """A study that was interrupted: finished rows are stored; remove the cause and run again."""
 
 
 class DiskFull(ArchfemError, OSError):
-    """A file for which there is no room: make room, or give another folder, and run again.
+    """A file that did not fit on the disk: free space, or give another folder, and run again.
 
     Attributes:
-        errno: as the system has it.
+        errno: error number of the operating system.
     """
 
     def __init__(self, code: int, message: str) -> None:
@@ -44,15 +41,15 @@ class DiskFull(ArchfemError, OSError):
 
 
 class NotInstalled(ArchfemError, ImportError):
-    """A package that is asked for and not there: get it as said, or ask for what needs it not."""
+    """A package that is required and missing: install it, or choose options without it."""
 
 
 class DidNotConverge(ArchfemError):
-    """No equilibrium was found; what was computed up to there is kept.
+    """No equilibrium was found; results up to that point are attached.
 
     Attributes:
         last: the last equilibrium found (`Equilibrium` or `State`), or None.
-        history: the `History` up to there, for a time history, or None.
+        history: the `History` up to that point, for a time history, or None.
     """
 
     def __init__(self, message: str, *, last: Any = None, history: Any = None) -> None:

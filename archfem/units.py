@@ -1,15 +1,11 @@
-"""Units: multipliers into SI, `young=30 * GPa`, and quantities as people write them.
-
-"1.48 MPa/mm" is 1.48e9 Pa/m.
-"""
+"""Units: factors into SI, as in `young=30 * GPa`, and quantities as text, as in "1.48 MPa/mm"."""
 
 import re
 from functools import cache
 from math import degrees, inf, isfinite, pi, prod, tan
 from typing import Any
 
-from archfem.annotated import as_annotated
-from archfem.arguments import is_number, said
+from archfem._validation import is_number, short_repr, validate_arguments
 from archfem.errors import InvalidInput
 
 mm = 1e-3  # m
@@ -18,78 +14,75 @@ kPa = 1e3  # Pa
 MPa = 1e6  # Pa
 GPa = 1e9  # Pa
 
+# Default acceleration of gravity [m/s²]
 G = 9.81
-"""Acceleration of gravity wherever none is given [m/s²]."""
 
+# Standard gravity, the unit g of accelerograms and spectra [m/s²]
 STANDARD_GRAVITY = 9.80665
-"""The g in which accelerograms are recorded and spectra are given [m/s²]."""
 
-
-ACCELERATION = "m/s**2"
-"""Where it is wanted, g is gravity and gal is Galileo's unit, not gram and gallon."""
-
-ANGLES = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
-"""Units that pass for pure numbers and are none."""
-
-LONGEST = 100
-"""Most letters of a quantity."""
-
-HIGHEST = 12
-"""Highest power that a unit has, all those in a quantity multiplied."""
+# Units that pint takes for dimensionless numbers
+ANGLE_UNITS = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
 
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
 _RAISED = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
 
+# Degrees, read without loading the registry of units, which is slow
 _DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
-"""Degrees as most write them, read without the registry of units."""
 
 
 @cache
 def _registry() -> Any:
-    import pint  # slow to import, and only case files need it
+    """Load the registry of units."""
+    import pint  # takes a second to import
 
     return pint.UnitRegistry()
 
 
-@as_annotated
+@validate_arguments
 def in_unit(value: Any, unit: str, key: str) -> float:
-    """Return a number, or a number with a unit, as a number in the given unit.
+    """Convert a number, or a quantity as text, to a unit.
 
     Args:
         value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already. For an
             acceleration "0.3 g" is 0.3 times standard gravity.
-        unit: the unit wanted, "1" for a pure number.
-        key: what to call the value in an error.
+        unit: of the result, "1" for a pure number.
+        key: name of the value in an error.
+
+    Returns:
+        The number in that unit.
 
     Raises:
         InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
-            number is wanted.
+            number is required.
 
     Example:
         >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
         1480000000.0
     """
     if isinstance(value, str):
-        number = _converted(value, unit, key)
+        number = _convert(value, unit, key)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         number = float(value) if is_number(value) else inf
     else:
-        raise InvalidInput(f"{key} = {said(value)} is not a number: give one in {unit}")
+        raise InvalidInput(f"{key} = {short_repr(value)} is not a number: give one in {unit}")
     if not isfinite(number):
-        raise InvalidInput(f"{key} = {said(value)} is not finite: give a number in {unit}")
+        raise InvalidInput(f"{key} = {short_repr(value)} is not finite: give a number in {unit}")
     return number
 
 
 def in_degrees(value: Any, key: str) -> float:
-    """Return an angle as a number of degrees.
+    """Convert an angle to degrees.
 
     Args:
-        value: 159, "159 degree", "2.775 rad"; a bare number is in degrees, and refused up to 2π,
-            where it is more likely meant in radians: with its unit it is taken at its word.
-        key: what to call the value in an error.
+        value: 159, "159 degree", "2.775 rad"; a bare number is in degrees. Bare numbers up to 2π
+            are refused, as they are probably radians: give the unit.
+        key: name of the value in an error.
+
+    Returns:
+        The angle [degree].
 
     Raises:
-        InvalidInput: it is no angle, text without a unit, or a bare number of so few degrees.
+        InvalidInput: it is no angle, text without a unit, or a bare number up to 2π.
     """
     if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
         return float(plain[1])
@@ -99,49 +92,51 @@ def in_degrees(value: Any, key: str) -> float:
     if not isinstance(value, str) and 0.0 < abs(number) <= 2.0 * pi:
         raise InvalidInput(
             f"{key} = {value!r} would be a few degrees only, and looks like radians: give "
-            f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if you mean that'
+            f'{degrees(number):.4g} for {number:.4g} rad, or "{number:.6g} degree" if that is right'
         )
     return number
 
 
 def _check_text(text: str, unit: str, key: str) -> None:
-    """Refuse what would be worked out for hours before it is found not to be a quantity."""
-    if len(text) > LONGEST:
+    """Refuse long text and high powers, which pint would evaluate for hours."""
+    if len(text) > 100:
         raise InvalidInput(
-            f"{key} = {said(text)} is no quantity, for it has {len(text)} letters: write a number "
-            f"in {unit}"
+            f"{key} = {short_repr(text)} is no quantity, for it has {len(text)} letters: write a "
+            f"number in {unit}"
         )
-    powers = [found[1] for found in _POWER.finditer(text)]
-    if _RAISED.search(text) or None in powers or prod(int(power) for power in powers) > HIGHEST:
+    powers = [match[1] for match in _POWER.finditer(text)]
+    # no unit of mechanics has a power above 12
+    if _RAISED.search(text) or None in powers or prod(int(power) for power in powers) > 12:
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 
-def _converted(text: str, unit: str, key: str) -> float:
+def _convert(text: str, unit: str, key: str) -> float:
+    """Convert a quantity in text to a unit."""
     import pint
 
-    for words in (text, unit):
-        _check_text(words, unit, key)
+    for part in (text, unit):
+        _check_text(part, unit, key)
     registry = _registry()
-    wanted = "dimensionless" if unit == "1" else unit
-    if unit == ACCELERATION:
+    target = "dimensionless" if unit == "1" else unit
+    if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
         text = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", text))
     try:
         quantity = registry.Quantity(text)
-        if unit == "1" and ANGLES & {name for name, _ in quantity.unit_items()}:
+        if unit == "1" and ANGLE_UNITS & {name for name, _ in quantity.unit_items()}:
             angle = float(quantity.to("radian").magnitude)
             raise InvalidInput(
-                f"{key} = {text!r} is an angle, and a pure number is wanted: a coefficient of "
+                f"{key} = {text!r} is an angle, and this must be a pure number: a coefficient of "
                 f"friction is the tangent of its angle, {tan(angle):.3f}"
             )
-        return float(quantity.to(wanted).magnitude)
+        return float(quantity.to(target).magnitude)
     except InvalidInput:
         raise
     except pint.DimensionalityError as error:
-        raise InvalidInput(f"{key} = {text!r} is not in a unit like {wanted}: {error}") from error
+        raise InvalidInput(f"{key} = {text!r} is not in a unit like {target}: {error}") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
         raise InvalidInput(
             f"{key} = {text!r} is not a quantity ({error}): write a number and a unit, e.g. "
-            f'"1.5 {wanted}"'
+            f'"1.5 {target}"'
         ) from error
-    except Exception as error:  # pint lets its tokenizer's errors through
+    except Exception as error:  # of pint's tokenizer
         raise InvalidInput(f"{key} = {text!r} is not a quantity: {error}") from error

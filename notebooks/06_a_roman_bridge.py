@@ -65,7 +65,7 @@ af.view.draw_instants({name: (case.structure, None) for name, case in cases.item
 # nodes. Weight and support must balance, whatever the mesh.
 
 # %%
-dead = {name: af.cases.at_rest(case) for name, case in cases.items()}
+dead = {name: af.cases.dead_load_of_case(case) for name, case in cases.items()}
 model = dead["as it stands"].model
 print(f"{model.size} coordinates: {model.fidelity}")
 joints = dead["as it stands"].joints
@@ -78,7 +78,7 @@ af.view.draw_eccentricity(
 
 # %%
 use = af.statics.strength_use(model, dead["as it stands"].q)
-print(af.statics.use_table(use))
+print(af.statics.strength_use_table(use))
 af.view.draw_stress(model, dead["as it stands"])
 
 # %% [markdown]
@@ -182,7 +182,7 @@ af.view.draw_joint(paper, "north arch, joint 5")
 exact = {name: run(each.model, name) for name, each in dead.items()}
 tell(exact)
 for label, runs in {"five springs": paper, "exact": exact}.items():
-    hinges = af.joints.judged(runs["as it stands"].joints)["hinge"] != 0
+    hinges = af.joints.assessed_joints(runs["as it stands"].joints)["hinge"] != 0
     print(f"{label}: at most {int(hinges.sum('joint').max())} hinges at once")
 af.view.draw_envelope(
     {"five springs": paper["as it stands"], "exact": exact["as it stands"]}, dotted=["five springs"]

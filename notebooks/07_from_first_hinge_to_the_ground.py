@@ -184,7 +184,7 @@ runs = {
     scale: af.time_history(model, motion.scaled(scale), dt=0.005, **shake) for scale in (0.8, 1.0)
 }
 for scale, run in runs.items():
-    print(f"× {scale}: the ring {run.fall.words}")
+    print(f"× {scale}: the ring {run.fall.text}")
 
 # %%
 figure = Figure(figsize=(6.4, 2.8), layout="constrained")
@@ -237,7 +237,7 @@ def arch_of_seven(friction):
 
 
 giving = af.build(arch_of_seven(None), fidelity="rigid", displacements="large")
-stones = af.dynamics.Falling(arch_of_seven(5.0), dt=1e-3)  # so rough that nothing slides
+stones = af.dynamics.RigidBlockSimulation(arch_of_seven(5.0), dt=1e-3)  # so rough that nothing slides
 
 
 def push(length, peak, every=1e-3, rest=4.0):
@@ -250,7 +250,7 @@ def falls_by_joints(length, peak):
 
 
 def falls_by_stones(length, peak):
-    start, motion = af.dynamics.Loose.built(stones.structure), push(length, peak)
+    start, motion = af.dynamics.LooseBlocks.as_built(stones.structure), push(length, peak)
     frames = stones.frames(start, motion.duration, motion, spacing=0.1)
     return any(np.abs(frame.poses[:, :2]).max() > 2.0 for frame in frames)
 
@@ -302,7 +302,7 @@ figure
 # %%
 rocking = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 1e9, friction=5.0))
 rate = np.sqrt(0.75 * G / (0.5 * np.hypot(0.6, 2.4)))  # p of a slender block [1/s]
-free = af.dynamics.Falling(rocking, dt=1e-3)
+free = af.dynamics.RigidBlockSimulation(rocking, dt=1e-3)
 
 
 def overturns(ratio, peak):
@@ -310,7 +310,7 @@ def overturns(ratio, peak):
     steps = int(np.ceil(end / 1e-3))
     wave = np.sin(2.0 * np.pi * np.arange(steps + 1) / steps)
     frames = free.frames(
-        af.dynamics.Loose.built(rocking), 8.0, af.Motion(peak * G * wave, end / steps), spacing=0.1
+        af.dynamics.LooseBlocks.as_built(rocking), 8.0, af.Motion(peak * G * wave, end / steps), spacing=0.1
     )
     return any(abs(frame.poses[-1, 2]) > 0.8 for frame in frames)
 

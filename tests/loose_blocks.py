@@ -42,7 +42,7 @@ def rocking_block():
 
 def tilted(structure, turn, number=1):
     """Pose of all blocks with a box turned clockwise about its lower right corner, at rest."""
-    start = af.dynamics.Loose.built(structure)
+    start = af.dynamics.LooseBlocks.as_built(structure)
     block = structure.blocks[number]
     arm = block.centroid - block.points[1]
     c, s = np.cos(turn), np.sin(turn)

@@ -11,8 +11,8 @@ ROOT = Path(__file__).parents[1]
 
 STUDY = """
 case = "ring.toml"
-find = "history"
-[over]
+compute = "history"
+[vary]
 motion.scale = [0.1, 0.2]
 """
 

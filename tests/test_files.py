@@ -2,12 +2,12 @@
 
 import pytest
 
-from archfem.files import in_one_stroke
+from archfem._files import atomic_write
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
     path = tmp_path / "new" / "run.txt"
-    with in_one_stroke(path) as draft:
+    with atomic_write(path) as draft:
         draft.write_text("half")
         assert draft.suffix == ".txt"
         assert not path.exists()
@@ -20,7 +20,7 @@ def test_what_breaks_off_leaves_the_old_file(tmp_path):
     path.write_text("old")
 
     def broken_off():
-        with in_one_stroke(path) as draft:
+        with atomic_write(path) as draft:
             draft.write_text("half")
             raise KeyboardInterrupt
 

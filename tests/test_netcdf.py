@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.netcdf import read_dataset, write_dataset
+from archfem._netcdf import read_dataset, write_dataset
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def test_a_file_is_read_once(written, monkeypatch):
     dataset, path = written
     content = path.read_bytes()
     monkeypatch.setattr(
-        "archfem.netcdf.content_of", lambda path, what, largest: path.unlink() or content
+        "archfem._netcdf.read_bytes", lambda path, what, max_bytes: path.unlink() or content
     )
     assert read_dataset(path, "history").identical(dataset)
 

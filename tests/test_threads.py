@@ -8,14 +8,14 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import archfem as af
-from archfem.threads import on_one_thread
+from archfem._threads import single_threaded
 
 WORK = """
 import hashlib
 import archfem as af
 quake = af.Motion.synthetic(duration=2.0, pga=6.0, seed=3)
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
-for rung, method in (("full", "contact"), ("faces", "contact"), ("full", "compliance")):
+for rung, method in (("full", "newton"), ("faces", "newton"), ("full", "compliance")):
     model = af.build(ring, fidelity=rung, cells=(4, 4))
     given = {"dt": 0.005, "damping": af.Rayleigh(0.05, (8.0, 16.0)), "method": method}
     run = af.time_history(model, quake, **given)
@@ -29,10 +29,10 @@ def threads():
 
 
 def test_what_is_decorated_takes_one_thread_and_gives_them_back():
-    inner = on_one_thread(threads)
+    inner = single_threaded(threads)
     with threadpool_limits(limits=2, user_api="blas"):
         assert threads() == {2}
-        assert on_one_thread(lambda: (inner(), threads()))() == ({1}, {1})
+        assert single_threaded(lambda: (inner(), threads()))() == ({1}, {1})
         assert threads() == {2}
 
 

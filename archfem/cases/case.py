@@ -1,7 +1,7 @@
-"""One analysis as one value, read from a TOML file.
+"""One analysis as a value, read from a TOML file.
 
-Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/mm". A key that is
-not known, a wrong unit or an impossible geometry is an error that names the key and the remedy.
+Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/mm". An unknown key,
+a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
 from collections.abc import Sequence
@@ -12,90 +12,71 @@ from typing import Any
 
 import tomli_w
 
-from archfem.annotated import as_annotated
-from archfem.arguments import instance
-from archfem.cases import motions as ground
-from archfem.cases.based import based_tables
-from archfem.cases.building import stages_asked
-from archfem.cases.limits import Limit, limit_asked
-from archfem.cases.settings import Table, change, checked, refuse_unknown
-from archfem.cases.stepping import check_scheme, damping_asked, scheme_asked
-from archfem.cases.structures import structure_of
-from archfem.dynamics.schemes import EffectiveDamping, Scheme, Viscous
-from archfem.dynamics.time_history import LEAST_STEP
+from archfem._validation import check_type, validate_arguments
+from archfem.cases.analysis_keys import (
+    LimitAnalysis,
+    check_scheme,
+    parse_analysis,
+    parse_damping,
+    parse_limit,
+    parse_scheme,
+)
+from archfem.cases.motion_keys import (
+    build_motion,
+    build_pairs,
+    build_suite,
+    build_target_spectrum,
+    parse_motion,
+    parse_suite,
+)
+from archfem.cases.structure_keys import cached_structure, parse_stages
+from archfem.cases.toml_file import Table, apply_change, check_table, read_with_base, refuse_unknown
+from archfem.dynamics.schemes import MIN_TIME_STEP, EffectiveDamping, Scheme, Viscous
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.masonry.stages import Stage
+from archfem.masonry.construction import Stage
 from archfem.masonry.structure import Structure
 from archfem.models.discretisation import Discretisation
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
-MODEL = {
-    "fidelity": (str, dict),
-    "cells": [int],
-    "cell": str,
-    "coarse": "m",
-    "degree": int,
-    "quadrature": str,
-    "points": int,
-    "tolerance": "1",
-    "displacements": str,
-    "file": str,
+# Keywords of `build`, and the error tolerance of fidelity "auto".
+MODEL_KEYS = {
+    **{"fidelity": (str, dict), "cells": [int], "cell": str, "max_cell_size": "m", "degree": int},
+    **{"quadrature": str, "quadrature_points": int, "tolerance": "1", "displacements": str},
+    "mesh_file": str,
 }
-"""What a `Discretisation` takes, which checks it, and a tolerance."""
-
-DAMPING = {
-    "ratio": "1",
-    "frequency": "Hz",
-    "frequencies": ["Hz"],
-    "modes": str,
-    "kind": str,
-    "share": "1",
-    "joints": str,
-}
-ANALYSIS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "halt": bool}
-CRITERIA = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
-OUTPUT = {
-    "every": int,
-    "fields_every": int,
-    "joints": [(int, str)],
-    "animation": bool,
+# Keywords of `build` which have another name in a case file.
+BUILD_KEYWORDS = {"max_cell_size": "coarse", "quadrature_points": "points", "mesh_file": "file"}
+CRITERIA_KEYS = {"hinge": "1", "failures": int, "friction": "1", "duration": "s"}
+OUTPUT_KEYS = {
+    **{"save_every": int, "save_fields_every": int, "joints": [(int, str)], "animation": bool},
     "free_body": str,
 }
-SECTIONS = (
-    "title",
-    "structure",
-    "materials",
-    "contacts",
-    "model",
-    "motion",
-    "suite",
-    "analysis",
-    "criteria",
-    "limit",
-    "dead_load",
-    "output",
+TABLE_SECTIONS = (
+    *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
+    *("criteria", "limit", "dead_load", "output"),
 )
 
 
 @dataclass(frozen=True)
 class Case:
-    """One analysis: structure, model, motion, and what to do with them.
+    """One analysis: structure, model, motion, and settings of the analysis.
 
     Attributes:
-        title: in words.
-        structure: what stands; its name is the title of the case.
+        title: title of the case, which is also the name of the structure.
+        structure: blocks and joints.
         model: keywords of `build`.
-        motion: what the file says of one ground motion, or None.
-        suite: what it says of a suite of them, or None; without either there is dead load alone.
-        analysis: what it says of the time history.
-        criteria: what makes a joint fail, and how many failed joints make a mechanism.
-        limit: what it asks of limit analysis, or None.
-        output: what it says of what to keep and draw.
-        settings: the whole case as it was understood, to be written again.
-        folder: where relative file names start.
+        motion: checked keys of [motion], or None.
+        suite: checked keys of [suite], or None; without motion and suite only the dead load is
+            analysed.
+        analysis: checked keys of [analysis]: time step, scheme, damping, when to stop.
+        criteria: criteria of joint failure, and the number of failed joints of a mechanism.
+        limit: limit analysis, or None.
+        output: checked keys of [output]: records, pictures and films.
+        settings: tables of the case as they were read, changes included.
+        folder: folder that relative file names start from.
     """
 
     title: str
@@ -105,74 +86,79 @@ class Case:
     suite: dict[str, Any] | None
     analysis: dict[str, Any]
     criteria: Criteria
-    limit: Limit | None
+    limit: LimitAnalysis | None
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
 
     @classmethod
-    @as_annotated
+    @validate_arguments
     def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Case":
         """Read a case file.
 
-        With `base = "other.toml"` a file says only what differs from another one: its tables go
-        over those of the other, key by key, after `without = ["section.key", …]` has taken out
-        what the other has and this one has not. Relative names start from the file's folder.
+        With `base = "other.toml"` a file contains only its differences from another one: its
+        tables are merged over those of the base key by key, after the keys of
+        `remove = ["section.key", …]` have been removed from the base. Relative file names start
+        from the folder of the file.
 
         Args:
-            path: a TOML file.
-            changes: "section.key=value" each, instead of what the file says.
+            path: TOML file.
+            changes: "section.key=value" each, which replaces a value of the file.
 
         Returns:
             The case.
 
         Raises:
-            InvalidInput: what cannot be meant, with the key, the value and the remedy.
-            InvalidStructure: lengths that do not make a structure.
+            InvalidInput: a key or value is invalid; the message names it and the remedy.
+            InvalidStructure: the lengths of the structure contradict each other.
         """
         path = Path(path)
-        settings = based_tables(path)
+        settings = read_with_base(path)
         for text in changes:
-            change(settings, text)
+            apply_change(settings, text)
         try:
             return cls.of(settings, path.parent)
         except ArchfemError as error:
             raise type(error)(f"{path}: {error}") from error
 
     @classmethod
-    @as_annotated
+    @validate_arguments
     def of(cls, settings: Table, folder: Path = Path()) -> "Case":
-        """Return a case of tables such as a TOML file holds.
+        """Return the case of tables such as a TOML file contains.
 
         Args:
-            settings: the tables by name.
-            folder: where relative file names start.
+            settings: tables by section.
+            folder: folder that relative file names start from.
+
+        Returns:
+            The case.
 
         Raises:
-            InvalidInput: what cannot be meant, with the key, the value and the remedy.
-            InvalidStructure: lengths that do not make a structure.
+            InvalidInput: a key or value is invalid; the message names it and the remedy.
+            InvalidStructure: the lengths of the structure contradict each other.
         """
-        refuse_unknown(settings, SECTIONS)
-        instance(settings.get("title", ""), str, "title", 'write words in quotes: title = "…"')
-        for key in set(SECTIONS) - {"title"}:
+        refuse_unknown(settings, ("title", *TABLE_SECTIONS))
+        check_type(settings.get("title", ""), str, "title", 'write words in quotes: title = "…"')
+        for key in TABLE_SECTIONS:
             if not isinstance(settings.get(key, {}), dict):
                 raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-        analysis = checked(settings.get("analysis", {}), ANALYSIS, "analysis")
-        if "damping" in analysis:
-            analysis["damping"] = checked(analysis["damping"], DAMPING, "analysis.damping")
+        analysis = parse_analysis(settings.get("analysis", {}))
+        model = check_table(settings.get("model", {}), MODEL_KEYS, "model")
         motion, suite, limit = (settings.get(key) for key in ("motion", "suite", "limit"))
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         case = cls(
             title=settings.get("title", "case"),
-            structure=structure_of(settings, folder),
-            model=checked(settings.get("model", {}), MODEL, "model"),
-            motion=None if motion is None else ground.motion_settings(motion),
-            suite=None if suite is None else ground.suite_settings(suite),
+            structure=cached_structure(settings, folder),
+            model={BUILD_KEYWORDS.get(key, key): value for key, value in model.items()},
+            motion=None if motion is None else parse_motion(motion),
+            suite=None if suite is None else parse_suite(suite),
             analysis=analysis,
-            criteria=Criteria(**checked(settings.get("criteria", {}), CRITERIA, "criteria")),
-            limit=None if limit is None else limit_asked(limit),
-            output=checked(settings.get("output", {}), OUTPUT, "output"),
+            criteria=Criteria(
+                **check_table(settings.get("criteria", {}), CRITERIA_KEYS, "criteria")
+            ),
+            limit=None if limit is None else parse_limit(limit),
+            output=check_table(settings.get("output", {}), OUTPUT_KEYS, "output"),
             settings=dict(settings),
             folder=folder,
         )
@@ -180,45 +166,50 @@ class Case:
         return case
 
     def _check(self) -> None:
-        """Refuse what would otherwise be found out only after the dead load."""
+        """Refuse settings whose errors would otherwise appear after the dead load only."""
+        # These properties parse and check their settings.
         _ = self.discretisation, self.tolerance, self.damping, self.scheme, self.joints
         _ = self.stages
-        displacements = self.discretisation.displacements
-        check_scheme(self.analysis, self.structure, displacements)
-        step = self.analysis.get("dt", 0.005)
-        if not LEAST_STEP <= step <= 0.1:
-            raise InvalidInput(f"analysis.dt = {step:g} s is not between {LEAST_STEP:g} and 0.1 s")
+        check_scheme(self.analysis, self.structure, self.discretisation.displacements)
+        step = self.analysis.get("dt", MIN_TIME_STEP)
+        if not MIN_TIME_STEP <= step <= 0.1:
+            raise InvalidInput(
+                f"analysis.dt = {step:g} s is not between {MIN_TIME_STEP:g} and 0.1 s"
+            )
         if "free_body" in self.output:
             self.structure.block_number(self.output["free_body"])
 
     @cached_property
     def stages(self) -> Sequence[Stage] | None:
-        """In which the structure is built; None where it is in one go."""
-        return stages_asked(self.settings.get("dead_load", {}), self.structure)
+        """Construction stages of the structure; None if it is built at once."""
+        return parse_stages(self.settings.get("dead_load", {}), self.structure)
 
     @property
-    def moves(self) -> bool:
-        """Whether the ground moves, under one motion or a suite."""
+    def has_motion(self) -> bool:
+        """Whether the case has a ground motion or a suite."""
         return self.motion is not None or self.suite is not None
 
     @property
-    def chooses(self) -> bool:
-        """Whether the model is to be chosen, by fidelity = "auto"."""
+    def selects_model(self) -> bool:
+        """Whether the model is selected by its predicted error, fidelity = "auto"."""
         return self.model.get("fidelity") == "auto"
 
     @cached_property
     def discretisation(self) -> Discretisation:
-        """What the structure is modelled by; its mesh does not count where "auto" is to choose."""
-        idle = {"tolerance", "fidelity"} if self.chooses else {"tolerance"}
-        told = {key: self.model[key] for key in self.model if key not in idle}
-        if "file" in told and self.chooses:
-            raise InvalidInput("model.file is one mesh, and fidelity = 'auto' chooses: name a rung")
-        told |= {key: self.folder / told[key] for key in ("file",) if key in told}
-        return Discretisation(**told)
+        """Fidelity, mesh and quadrature; with fidelity = "auto" the default ones."""
+        unused = {"tolerance", "fidelity"} if self.selects_model else {"tolerance"}
+        keywords = {key: value for key, value in self.model.items() if key not in unused}
+        if "file" in keywords:
+            if self.selects_model:
+                raise InvalidInput(
+                    "model.mesh_file is one mesh, and fidelity = 'auto' chooses: name a fidelity"
+                )
+            keywords["file"] = self.folder / keywords["file"]
+        return Discretisation(**keywords)
 
     @property
     def tolerance(self) -> float:
-        """Error in the largest |e| of every joint that a model to be chosen may have [-]."""
+        """Permitted error of the largest |e| of every joint with fidelity = "auto" [-]."""
         tolerance = float(self.model.get("tolerance", 0.005))
         if not 0.0 < tolerance < 1.0:
             raise InvalidInput(f"tolerance {tolerance:g} on |e| is not between 0 and 1: try 0.005")
@@ -226,57 +217,70 @@ class Case:
 
     @property
     def damping(self) -> Viscous | EffectiveDamping | None:
-        """Damping of the time history; its frequencies may be left to the modes."""
-        return damping_asked(self.analysis)
+        """Damping of the time history; `EffectiveDamping` takes its frequencies from the modes."""
+        return parse_damping(self.analysis)
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Numbers of the joints to draw over time, which the file may name; none if not said."""
+        """Numbers of the joints to draw over time; empty if the case names none."""
         return tuple(map(self.structure.joint_number, self.output.get("joints", ())))
 
     @property
     def scheme(self) -> Scheme:
-        """Time stepping of the time history."""
-        return scheme_asked(self.analysis)
+        """Time integration scheme."""
+        return parse_scheme(self.analysis)
 
     def ground_motion(self) -> Motion:
-        """Return the ground motion, read or made.
+        """Return the ground motion, read or synthetic.
+
+        Returns:
+            The motion as applied: resampled, cut and scaled.
 
         Raises:
-            InvalidInput: there is none, or its file cannot be read.
+            InvalidInput: the case has none, or its file cannot be read.
         """
         if self.motion is None:
             raise InvalidInput("the case has no [motion]: give a file, or synthetic = { seed = 1 }")
-        return ground.ground_motion(self.motion, self.folder)
+        return build_motion(self.motion, self.folder)
 
     def ground_suite(self) -> Suite:
-        """Return the suite of ground motions, read or made, and matched where the case says so.
+        """Return the suite of ground motions, matched to its target if the case says so.
+
+        Returns:
+            The suite.
 
         Raises:
-            InvalidInput: there is none, or a pair cannot be read or matched.
-            DidNotConverge: a pair did not come near the target.
+            InvalidInput: the case has none, or a pair cannot be read or matched.
+            DidNotConverge: spectral matching of a pair did not converge.
         """
         if self.suite is None:
             raise InvalidInput("the case has no [suite]: give a table for each of its pairs")
-        return ground.ground_suite(self.suite, self.folder)
+        return build_suite(self.suite, self.folder)
 
     def check_ground(self) -> None:
-        """Refuse motions that cannot be read, before anything is computed (`InvalidInput`)."""
+        """Refuse motions that cannot be read, before anything is computed.
+
+        Raises:
+            InvalidInput: a file cannot be read.
+        """
         if self.motion is not None:
             self.ground_motion()
         if self.suite is not None:
-            ground.ground_pairs(self.suite, self.folder)
+            build_pairs(self.suite, self.folder)
 
     @property
     def target(self) -> DesignSpectrum | None:
         """Target spectrum of the suite, or None."""
-        return ground.target_spectrum(self.suite or {})
+        return build_target_spectrum(self.suite or {})
 
     def alone(self, *pairs: str) -> "Case":
-        """Return the case with some of the pairs of its suite.
+        """Return the case with some pairs of its suite alone.
 
         Args:
-            pairs: their names; they keep the order of the suite.
+            pairs: names of the pairs; they stay in the order of the suite.
+
+        Returns:
+            The changed copy.
 
         Raises:
             InvalidInput: the case has no such pair.
@@ -284,12 +288,16 @@ class Case:
         if self.suite is None:
             raise InvalidInput("the case has no [suite] to take pairs of: give a table for each")
         refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
-        kept, told = (
-            {**said, "pairs": {key: said["pairs"][key] for key in said["pairs"] if key in pairs}}
-            for said in (self.suite, self.settings["suite"])
+        # Checked keys and original tables must agree: the digest is that of the tables.
+        suite, table = (
+            {
+                **keys,
+                "pairs": {name: keys["pairs"][name] for name in keys["pairs"] if name in pairs},
+            }
+            for keys in (self.suite, self.settings["suite"])
         )
-        return replace(self, suite=kept, settings={**self.settings, "suite": told})
+        return replace(self, suite=suite, settings={**self.settings, "suite": table})
 
     def text(self) -> str:
-        """The case as TOML, changes included."""
+        """Return the case as TOML, changes included."""
         return tomli_w.dumps(self.settings)

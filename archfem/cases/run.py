@@ -1,56 +1,91 @@
-"""Carry out what a case describes: limit analysis, dead load, runs; go on where one was ended."""
+"""Carry out a case: limit analysis, dead load and time histories.
 
-from collections.abc import Callable, Collection, Iterator
+`run_case` yields each result as soon as it is computed. Histories are saved in a folder; those of
+an earlier call are reused if case, input files, program and ground motion are the same.
+"""
+
+import logging
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
 import xarray as xr
 
+from archfem._display import call_late_bound
 from archfem.cases.case import Case
-from archfem.cases.inputs import inputs_digest
-from archfem.cases.kept import HISTORY, finished
-from archfem.cases.reportable import Reportable
-from archfem.cases.told import told_of
-from archfem.dynamics.damping import effective_range, first_effective
+from archfem.cases.provenance import hash_inputs
+from archfem.dynamics.damping import effective_mode_range, first_effective_mode
 from archfem.dynamics.events import CountedMechanism
-from archfem.dynamics.history import Ending, History, history_of
-from archfem.dynamics.ladder import Damping, choose
+from archfem.dynamics.history import Ending, History, partial_history
+from archfem.dynamics.model_selection import DampingChoice, select_model
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
-from archfem.dynamics.stepping.stepper import Stepper
+from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import Record, time_history
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
-from archfem.models.build import build
+from archfem.models.builder import build
 from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.statics.plausible import dead_load_doubts
-from archfem.statics.strength import strength_use
+from archfem.statics.equilibrium import Equilibrium, dead_load, dead_load_warnings
+from archfem.statics.stress import strength_use
 
 if TYPE_CHECKING:
-    from archfem.cases.dossier.results import Results
+    from archfem.view.pages.player import Player
 
-FRAMES = 10
-"""Steps between two fields that are kept for an animation, unless the case says otherwise."""
+logger = logging.getLogger("archfem")
 
-Shake = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
-"""Runs a motion of a case from its dead load, with damping, as `shaken` does."""
+# Name of the file of a history in a result folder.
+HISTORY_FILE = "history.nc"
+
+# Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
+RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
+
+
+class CaseResult:
+    """Base class of results of a case: they have a report and a player."""
+
+    def report(self, path: str | Path) -> Path:
+        """Write an HTML report in one file, for print.
+
+        Args:
+            path: the file, .html; missing folders are created.
+
+        Returns:
+            The file.
+        """
+        return call_late_bound("CaseResult.report", self, path)
+
+    def player(self, run: str | None = None) -> "Player":
+        """Return the player of a run, which displays in notebooks and can be saved as a page.
+
+        Args:
+            run: name of the run; required if there are several.
+
+        Returns:
+            The player.
+
+        Raises:
+            InvalidInput: there is no run, or none of that name, or several and none is named.
+        """
+        return call_late_bound("CaseResult.player", self, run)
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
-    """A case under its dead load, from which its runs start.
+class DeadLoadResult:
+    """Equilibrium of a case under dead load, from which its runs start.
 
-    What follows from the dead load is worked out when first asked for, and once.
+    Quantities that follow from the equilibrium are computed at first use and cached.
 
     Attributes:
-        case: what was asked.
-        dead: the equilibrium.
-        seconds: that finding it took [s].
+        case: the case.
+        dead: equilibrium under dead load.
+        seconds: wall time of the computation [s].
     """
 
     case: Case
@@ -58,190 +93,204 @@ class Rest:
     seconds: float = 0.0
 
     @classmethod
-    def of(cls, case: Case) -> "Rest":
-        """Return a case with its dead load, as found by `at_rest`.
+    def of(cls, case: Case) -> "DeadLoadResult":
+        """Compute the dead load of a case, as `dead_load_of_case` does.
 
         Args:
-            case: what was asked.
+            case: the case.
+
+        Returns:
+            The result, with the time of its computation.
         """
         start = perf_counter()
-        dead = at_rest(case)
+        dead = dead_load_of_case(case)
         return cls(case, dead, perf_counter() - start)
 
     @cached_property
-    def use(self) -> xr.Dataset | None:
-        """Stress in the blocks and use of their strength, as by `strength_use`; None if rigid."""
+    def strength_use(self) -> xr.Dataset | None:
+        """Stress in the blocks and use of their strength (`strength_use`); None if rigid."""
         model = self.dead.model
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
 
     @cached_property
-    def doubts(self) -> tuple[str, ...]:
-        """What makes the dead load doubtful, its model's rung included, a sentence each."""
-        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, self.case.criteria.friction))
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings of the model's fidelity and of the equilibrium, a sentence each."""
+        friction = self.case.criteria.friction
+        return (*self.dead.model.warnings, *dead_load_warnings(self.dead, friction))
 
     @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
-        """Damping of the runs, and in words how it was found, as by `damping_of`."""
+        """Damping of the runs and its description, as `damping_of` returns them."""
         return damping_of(self.case, self.dead)
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Reportable):
-    """A case under one motion.
+class Run(CaseResult):
+    """Time history of a case under one motion.
 
     Attributes:
-        case: what was asked, with this motion alone.
-        motion: as it was applied.
-        history: what happened, also where a step failed or Ctrl-C ended it.
-        path: file of the history; None where it was not to be kept.
-        kept: whether an earlier command had finished it.
-        seconds: that it took [s]; zero where it was kept.
-        error: of the step that failed, if one did.
+        case: the case with this motion alone.
+        motion: ground motion as applied.
+        history: recorded response; after a failed step or Ctrl-C, up to that step.
+        path: file of the history, or None.
+        reused: whether the history is that of an earlier call.
+        seconds: wall time of the integration [s]; zero if reused.
+        error: error of the failed step, or None.
     """
 
     case: Case
     motion: Motion
     history: History
     path: Path | None = None
-    kept: bool = False
+    reused: bool = False
     seconds: float = 0.0
     error: DidNotConverge | None = None
 
-    def results(self) -> "Results":
-        """Return what its report is written from."""
-        from archfem.cases.dossier.results import Results  # loads matplotlib, which is slow
+    # The report reads these, as of a `ResultFolder`.
+    missing: ClassVar[tuple[str, ...]] = ()
 
-        folder = None if self.path is None else self.path.parent
-        return Results(self.case, {self.motion.name: self.history}, folder)
+    @property
+    def runs(self) -> Mapping[str, History]:
+        """The history by the name of its motion."""
+        return {self.motion.name: self.history}
+
+    @property
+    def folder(self) -> Path | None:
+        """Folder of the history, or None."""
+        return None if self.path is None else self.path.parent
 
 
-Result = Collapse | Rest | Suite | Run
-"""What carrying out a case finds."""
+# Results that `run_case` yields.
+Result = Collapse | DeadLoadResult | Suite | Run
 
 
-def carried_out(
+def run_case(
     case: Case,
     folder: str | Path | None = None,
     *,
     pairs: Collection[str] | None = None,
-    shake: Shake | None = None,
+    run_motion: RunMotion | None = None,
 ) -> Iterator[Result]:
-    """Carry out a case, and give each result as soon as it is found.
+    """Carry out a case, and yield each result as soon as it is computed.
 
-    Where there is a folder, each history is kept in it, one motion's as history.nc, that of a pair
-    in a folder of the pair's name. A pair that an earlier call has finished, of the same case and
-    under the same motion, is taken from there, so that the same call again goes on where one was
-    ended. A step that fails ends its run only; Ctrl-C ends the run, which is still given, and with
-    it the suite.
+    With a folder each history is saved: that of one motion as history.nc, that of a pair of a suite
+    in a folder of the pair's name. Pairs that an earlier call has finished are reused, if case,
+    input files, program and motion are the same, so that an interrupted call can be repeated. A
+    failed step ends its run alone; Ctrl-C ends the run, which is still yielded, and the suite.
 
     Args:
-        case: what is asked.
-        folder: for the histories; None keeps none.
-        pairs: names of the pairs of its suite that are run; None for all.
-        shake: runs a motion; by default `shaken`.
+        case: the case.
+        folder: folder of the histories; None saves none.
+        pairs: names of the pairs of the suite to run; None runs all.
+        run_motion: function that integrates one motion; by default `run_time_history`.
 
     Yields:
-        A `Collapse` where the case asks for limit analysis; a `Rest`, the dead load; where there
-        is a suite, the `Suite`; and for each motion a `Run`.
+        A `Collapse` if the case has [limit]; the `DeadLoadResult`; the `Suite` if there is one; and
+        a `Run` for each motion.
 
     Raises:
-        InvalidInput: a motion cannot be read, or a structure not be taken as rigid blocks.
-        DidNotConverge: the structure does not stand, a motion cannot be matched, or not even the
-            first step of a run could be made.
+        InvalidInput: a motion cannot be read, or limit analysis is not possible.
+        DidNotConverge: the structure has no equilibrium under dead load, a motion cannot be
+            matched, or the first step of a run failed.
     """
-    shake, folder = shake or shaken, None if folder is None else Path(folder)
-    (case if pairs is None else case.alone(*pairs)).check_ground()
+    run_motion = run_motion or run_time_history
+    folder = None if folder is None else Path(folder)
+    # Unreadable records are errors before the dead load is computed.
+    selected = case if pairs is None else case.alone(*pairs)
+    selected.check_ground()
     if case.limit is not None:
-        yield case.limit.of(case.structure)
-    rest = Rest.of(case)
-    yield rest
+        yield case.limit.solve(case.structure)
+    at_rest = DeadLoadResult.of(case)
+    yield at_rest
     if case.suite is not None:
-        suite = (case if pairs is None else case.alone(*pairs)).ground_suite()
+        suite = selected.ground_suite()  # spectral matching takes a second a pair
         yield suite
         for motion in suite.motions:
-            run = _of_pair(rest, motion, folder, shake)
+            run = _run_pair(at_rest, motion, folder, run_motion)
             yield run
-            if run.history.ended is Ending.INTERRUPTED:
+            if run.history.ending is Ending.INTERRUPTED:  # by Ctrl-C, or SIGTERM
                 break
     elif case.motion is not None:
-        path = None if folder is None else folder / HISTORY
-        yield _run(case, case.ground_motion(), rest, path, shake)
+        path = None if folder is None else folder / HISTORY_FILE
+        yield _run_motion(case, case.ground_motion(), at_rest, path, run_motion)
 
 
-def at_rest(case: Case) -> Equilibrium:
-    """Return the dead load of a case, on the model that it names.
+def dead_load_of_case(case: Case) -> Equilibrium:
+    """Compute the equilibrium of a case under dead load, built in the stages of the case.
 
-    With fidelity "auto" the model is chosen for the case's own motion, or the first of its suite.
+    With fidelity "auto" the model is selected for the motion of the case, or the first pair of its
+    suite.
 
     Args:
-        case: what was asked.
+        case: the case.
+
+    Returns:
+        The equilibrium.
 
     Raises:
-        DidNotConverge: the structure does not stand.
+        DidNotConverge: the structure has no equilibrium.
     """
-    model = _chosen(case) if case.chooses else build(case.structure, case.discretisation)
+    if case.selects_model:
+        model = _select_model_of(case)
+    else:
+        model = build(case.structure, case.discretisation)
     return dead_load(model, stages=case.stages)
 
 
-def _chosen(case: Case) -> Model:
-    """Choose a model for the runs to come, by the case's motion where it has one."""
+def _select_model_of(case: Case) -> Model:
+    """Select a model by its predicted error under the motion of the case, if it has one."""
     motion = None
     if case.motion is not None:
         motion = case.ground_motion()
     elif case.suite is not None:
-        first = next(iter(case.suite["pairs"]))  # the others need not be matched for this
+        first = next(iter(case.suite["pairs"]))  # matching the other pairs would only take time
         motion = case.alone(first).ground_suite().motions[0]
     damping, dt = expected_damping(case), case.analysis.get("dt")
     displacements = case.discretisation.displacements
-    return choose(case.structure, case.tolerance, motion, damping, dt, displacements=displacements)
+    return select_model(
+        case.structure, case.tolerance, motion, damping, dt, displacements=displacements
+    )
 
 
-def expected_damping(case: Case) -> Damping:
-    """Return the damping of a case whose model is not chosen yet.
-
-    Args:
-        case: what was asked.
-
-    Returns:
-        What the case says, or a function that finds it of the finest model.
-    """
+def expected_damping(case: Case) -> DampingChoice:
+    """Return the damping of a case, or a function of the model if the modes determine it."""
     if isinstance(case.damping, EffectiveDamping):
         return lambda model: damping_of(case, dead_load(model))[0]
     return case.damping
 
 
 def damping_of(case: Case, dead: Equilibrium) -> tuple[Viscous | None, str]:
-    """Return the damping of a case about its dead load, and in words how it was found.
+    """Return the damping of a case, whose frequencies may be those of modes about the dead load.
 
     Args:
-        case: what was asked.
-        dead: its dead load.
+        case: the case.
+        dead: its equilibrium under dead load.
+
+    Returns:
+        The damping, and a sentence with ratio, frequencies, and how these were determined.
 
     Raises:
-        InvalidInput: it is to be that of the effective modes, and fewer than two are.
+        InvalidInput: damping by effective modes, of which there are fewer than two.
     """
-    damping, how = case.damping, ""
+    damping, reason = case.damping, ""
     if isinstance(damping, EffectiveDamping):
-        damping, how = _found(damping, dead)
+        ratio, joints = damping.ratio, damping.joints
+        if damping.kind == "rayleigh":
+            modes = effective_mode_range(dead.model, dead, mass_share=damping.mass_share)
+            damping, reason = Rayleigh(ratio, modes.frequencies, joints), f"; {modes.text}"
+        else:
+            mode = first_effective_mode(dead.model, dead)
+            damping, reason = StiffnessDamping(ratio, mode.frequency, joints), f"; {mode.text}"
     if damping is None:
         return None, "damping: none"
-    ratio = f"damping: {100.0 * damping.ratio:g} % at"
+    text = f"damping: {100.0 * damping.ratio:g} % at"
     if isinstance(damping, StiffnessDamping):
-        return damping, f"{ratio} {damping.frequency:.2f} Hz, proportional to stiffness{how}"
+        return damping, f"{text} {damping.frequency:.2f} Hz, proportional to stiffness{reason}"
     low, high = damping.frequencies
-    return damping, f"{ratio} {low:.2f} and {high:.2f} Hz{how}"
+    return damping, f"{text} {low:.2f} and {high:.2f} Hz{reason}"
 
 
-def _found(wanted: EffectiveDamping, dead: Equilibrium) -> tuple[Viscous, str]:
-    """Damping by effective modes about a dead load, and in words which modes they are."""
-    if wanted.kind == "rayleigh":
-        ends = effective_range(dead.model, dead, share=wanted.share)
-        return Rayleigh(wanted.ratio, ends.frequencies, wanted.joints), f"; {ends.text}"
-    first = first_effective(dead.model, dead)
-    return StiffnessDamping(wanted.ratio, first.frequency, wanted.joints), f"; {first.text}"
-
-
-def shaken(
+def run_time_history(
     case: Case,
     motion: Motion,
     dead: Equilibrium,
@@ -249,23 +298,27 @@ def shaken(
     *,
     method: str | Stepper = "auto",
 ) -> History:
-    """Return the time history of a case under a motion; the history carries the case.
+    """Compute the time history of a case under a motion; the history contains the case.
 
     Args:
-        case: tells steps, scheme, damping, and what to record.
-        motion: of the ground.
-        dead: where it starts.
-        damping: as by `damping_of`, which is asked where it is not given.
-        method: as for `time_history`.
+        case: time step, scheme, damping, criteria, and quantities to record.
+        motion: ground motion.
+        dead: equilibrium that the run starts from.
+        damping: damping of the run; by default that of `damping_of`.
+        method: solver of the time steps, as for `archfem.time_history`.
+
+    Returns:
+        The history.
 
     Raises:
-        DidNotConverge: a step failed; `history` is the record up to it.
+        DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
     output = case.output
-    of_case = {"case": case.text(), "inputs": inputs_digest(case.settings, case.folder)}
-    animated = FRAMES if output.get("animation", False) else None
+    # Records of fields for a film, 10 steps apart unless the case says otherwise.
+    fields_every = output.get("save_fields_every", 10 if output.get("animation", False) else None)
+    attrs = {"case": case.text(), "inputs": hash_inputs(case.settings, case.folder)}
     try:
-        with told_of(case.title, motion.name):
+        with log_prefix(case.title, motion.name):
             run = time_history(
                 dead.model,
                 motion,
@@ -273,42 +326,77 @@ def shaken(
                 start=dead,
                 damping=damping or damping_of(case, dead)[0],
                 scheme=case.scheme,
-                record=Record(
-                    every=output.get("every", 1), fields_every=output.get("fields_every", animated)
-                ),
-                until=CountedMechanism() if case.analysis.get("halt", False) else None,
+                record=Record(every=output.get("save_every", 1), fields_every=fields_every),
+                until=CountedMechanism() if case.analysis.get("stop_at_mechanism", False) else None,
                 criteria=case.criteria,
                 method=method,
             )
     except DidNotConverge as error:
+        # The partial history is saved like a complete one.
         if error.history is not None:
-            error.history.dataset.attrs |= of_case
+            error.history.dataset.attrs |= attrs
         raise
-    run.dataset.attrs |= of_case
+    run.dataset.attrs |= attrs
     return run
 
 
-def _of_pair(rest: Rest, motion: Motion, folder: Path | None, shake: Shake) -> Run:
-    """Run a pair, or take what an earlier command left of it."""
-    case = rest.case.alone(motion.name)
-    path = None if folder is None else folder / motion.name / HISTORY
-    if path is not None and (history := finished(path, case, motion)) is not None:
-        chosen = rest.dead.model.prediction  # by the first pair, which this one may not be
-        if chosen is None or history.dataset.attrs.get("predicted_error") == chosen.error:
-            return Run(case, motion, history, path, kept=True)
-    return _run(case, motion, rest, path, shake)
+@contextmanager
+def log_prefix(*names: str) -> Iterator[None]:
+    """Prefix warnings of a block with names, so that those of many runs can be distinguished."""
+
+    def add_prefix(record: logging.LogRecord) -> bool:
+        if not getattr(record, "named", False):  # an inner block has added its own prefix
+            record.msg, record.args = f"{', '.join(names)}: {record.getMessage()}", ()
+            record.named = True
+        return True
+
+    logger.addFilter(add_prefix)
+    try:
+        yield
+    finally:
+        logger.removeFilter(add_prefix)
 
 
-def _run(case: Case, motion: Motion, rest: Rest, path: Path | None, shake: Shake) -> Run:
-    """Run a motion and keep its history, also where a step fails."""
+def _run_pair(
+    at_rest: DeadLoadResult, motion: Motion, folder: Path | None, run_motion: RunMotion
+) -> Run:
+    """Run a pair of a suite, or reuse the history of an earlier call."""
+    case = at_rest.case.alone(motion.name)
+    path = None if folder is None else folder / motion.name / HISTORY_FILE
+    if path is not None and (history := load_finished_run(path, case, motion)) is not None:
+        # A model that was selected for the first pair may differ from that of the earlier call.
+        prediction = at_rest.dead.model.prediction
+        if prediction is None or history.dataset.attrs.get("predicted_error") == prediction.error:
+            return Run(case, motion, history, path, reused=True)
+    return _run_motion(case, motion, at_rest, path, run_motion)
+
+
+def _run_motion(
+    case: Case, motion: Motion, at_rest: DeadLoadResult, path: Path | None, run_motion: RunMotion
+) -> Run:
+    """Run a motion and save its history, also if a step fails."""
     start, failure = perf_counter(), None
     try:
-        history = shake(case, motion, rest.dead, rest.damping[0])
+        history = run_motion(case, motion, at_rest.dead, at_rest.damping[0])
     except DidNotConverge as error:
-        history, failure = history_of(error), error
+        history, failure = partial_history(error), error
     seconds = perf_counter() - start
-    doubts = dict.fromkeys((*rest.doubts, *history.doubts))
-    history.dataset.attrs["doubts"] = "\n".join(doubts)
+    warnings = dict.fromkeys((*at_rest.warnings, *history.warnings))  # each once, in order
+    history.dataset.attrs["doubts"] = "\n".join(warnings)
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)
+
+
+def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:
+    """Return the finished history of an earlier call, if its inputs and motion are the same."""
+    try:
+        run = History.read(path, case.structure)
+        finished = run.ending.is_complete
+    except InvalidInput:
+        return None
+    if not finished or run.dataset.attrs.get("inputs") != hash_inputs(case.settings, case.folder):
+        return None
+    # Spectral matching reproduces accelerations up to round-off, far below 1e-6 m/s².
+    saved, applied = run.dataset["ground"].values, motion.at(run.time)
+    return run if np.allclose(saved, applied, rtol=0.0, atol=1e-6) else None

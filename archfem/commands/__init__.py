@@ -1,14 +1,11 @@
-"""The command line: words after `archfem`, and what each command prints.
+"""Command line: arguments, exit codes and printed results.
 
-    line      words as a command, and its exit code
-    cases     commands for one case, and for records
-    telling   what is said of a case as its results come
-    films     the command for films
-    studies   the command for studies
-    examples  cases that archfem brings
-    doctor    what is installed, and what is missing
+    cli    argument parser, exit codes
+    run    run, check, modes, mesh, accuracy, report, motion, compile
+    study  study
+    tools  animate, examples, example, doctor
 
-It imports from all rooms. Start reading at `line`.
+Imports all rooms. Start reading at `cli`.
 """
 
 import lazy_loader

@@ -1,1 +1,1 @@
-from .line import main as main
+from .cli import main as main

@@ -1,312 +1,400 @@
-"""Events that end a time history: enough joints have failed, or the blocks can move.
+"""Events that end a time history: enough joints have failed, or the failed joints permit a motion.
 
-An event says what to look for. Each run has a fresh watch of its own made by it, so that one event
-serves any number of runs.
+An event is a condition without state, so that one event serves any number of runs. At the start of
+a run it creates a monitor, which evaluates the condition at every step.
+
+Most steps repeat a pattern of failed joints. Monitors therefore scan N, V, M for the pattern, and
+evaluate the costly condition (mechanism count, rigid-block motion) once per distinct pattern.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import InitVar, dataclass
+from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from archfem.arrays import Array
-from archfem.dynamics.glance import Glance, Look, Seen
+from archfem._typing import Array
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, chosen
-from archfem.joints.duration import Unbroken
-from archfem.joints.resultants import joint_dataset
-from archfem.limit.counted import (
-    KINDS,
+from archfem.joints.criteria import (
+    Criteria,
+    DurationCounter,
+    judge_joints,
+    merge_criteria,
+    sliding_ratio,
+    tension_margin,
+)
+from archfem.joints.resultants import eccentricity_and_friction, joint_dataset
+from archfem.limit.mechanism_count import (
+    MECHANISM_KINDS,
     Mechanism,
     counted_mechanism,
     counted_mechanisms,
-    definitions_met,
+    matching_definitions,
 )
-from archfem.limit.verified import freedoms_of, verifier_of
-from archfem.masonry.naming import listed_joints
-from archfem.masonry.roles import judged_parts
-from archfem.masonry.structure import Structure
+from archfem.limit.mechanism_kinematics import cached_verifier, joint_freedoms
+from archfem.masonry.parts import select_assessed_parts
+from archfem.masonry.structure import Structure, join_joint_names
 
-Watch = Callable[[Array, float], str | None]
-"""Looks at N, V, M (n_joints, 3) of a step and its length [s]; words that say why the run ends, or
-None."""
+
+@dataclass(frozen=True, eq=False)
+class FailureState:
+    """Failure pattern of the scanned joints at a step."""
+
+    side: NDArray[np.int8]  # face of each hinge, 1 extrados, -1 intrados, 0 none (n,)
+    sense: NDArray[np.int8]  # sign of the shear force of each sliding joint, else 0 (n,)
+    slides: NDArray[np.bool_]  # whether friction is exhausted (n,)
+    apart: NDArray[np.bool_]  # whether the joint has lost contact (n,)
+    joint_states: Callable[[], xr.Dataset]  # labels and flags of all joints, by `joint_dataset`
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether each joint has failed (n,)."""
+        return (self.side != 0) | self.slides | self.apart
+
+
+class FailureScan:
+    """Scan of joints for failures at every step; a query runs once per distinct failure pattern.
+
+    The query maps a pattern to the names of the conditions that hold; results are cached.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        criteria: Criteria,
+        numbers: Sequence[int],
+        query: Callable[[FailureState], frozenset[str]],
+    ) -> None:
+        self._structure, self._criteria, self._query = structure, criteria, query
+        self._numbers = np.array(numbers, dtype=np.intp)
+        self._depth = structure.depths[self._numbers]
+        self._laws = (
+            criteria.coefficients(structure.friction[self._numbers]),
+            criteria.cohesions(structure.cohesion[self._numbers]),
+        )
+        self._tension = structure.tension[self._numbers]
+        self._cache: dict[bytes, frozenset[str]] = {}
+
+    def __call__(self, resultants: Array, min_failures: int) -> Iterator[frozenset[str]]:
+        """Yield the conditions that hold at each step; none below the number of failures."""
+        forces = resultants[:, self._numbers]
+        e, friction = eccentricity_and_friction(forces, self._depth)
+        limits = sliding_ratio(forces[..., 0], e, *self._laws)
+        hinges, slides = judge_joints(e, friction, limits, self._criteria.hinge)
+        apart = tension_margin(forces[..., 0], self._tension) <= 0.0
+        failures = np.count_nonzero(hinges | slides | apart, axis=1)
+        senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(forces[..., 1]), 0.0)
+        states = np.stack([*senses, slides, apart], axis=1).astype(np.int8)
+        for step, count in enumerate(failures.tolist()):
+            if count < min_failures:
+                yield frozenset()
+                continue
+            key = states[step].tobytes()
+            if key not in self._cache:
+                side, sense, slid, loose = states[step]
+                joints = partial(self.joint_states, resultants[step])
+                state = FailureState(side, sense, slid.astype(bool), loose.astype(bool), joints)
+                self._cache[key] = self._query(state)
+            yield self._cache[key]
+
+    def joint_states(self, resultants: Array) -> xr.Dataset:
+        """Return labels and flags of all joints at a step, by `joint_dataset`."""
+        return joint_dataset(self._structure, resultants, criteria=self._criteria)
+
+
+@dataclass(frozen=True, eq=False)
+class FailureMonitor:
+    """Monitor that evaluates many steps at once."""
+
+    scan: FailureScan
+    min_failures: int  # number of failed joints below which no condition can hold
+    # from the conditions that hold at a step, its N, V, M and its length [s] to the reason to end
+    reason: Callable[[frozenset[str], Array, float], str | None]
+
+    def __call__(self, resultants: Array, step: float) -> str | None:
+        """Return the reason to end the run at a step, or None."""
+        event = self.find_first(resultants[None], [step])
+        return None if event is None else event[1]
+
+    def find_first(self, resultants: Array, steps: Iterable[float]) -> tuple[int, str] | None:
+        """Return the first step that ends the run and the reason, or None."""
+        states = zip(self.scan(resultants, self.min_failures), resultants, steps, strict=True)
+        for number, (conditions, forces, step) in enumerate(states):
+            if reason := self.reason(conditions, forces, step):
+                return number, reason
+        return None
+
+
+# From N, V, M (n_joints, 3) of a step and its length [s] to the reason to end the run, or None
+EventMonitor = Callable[[Array, float], str | None]
 
 
 @runtime_checkable
 class Event(Protocol):
-    """What may end a run.
+    """Condition that ends a run.
 
     Attributes:
-        criteria: what makes a joint fail, or None for those of the run.
+        criteria: failure criteria of joints, or None for those of the run.
     """
 
     @property
     def criteria(self) -> Criteria | None:
-        """What makes a joint fail, or None for those of the run."""
+        """Failure criteria of joints, or None for those of the run."""
 
-    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Return a fresh watch over one run.
+    def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
+        """Create the monitor of one run.
 
         Args:
-            structure: that moves.
-            criteria: of the run.
+            structure: structure of the run.
+            criteria: failure criteria of the run.
+
+        Returns:
+            Function of N, V, M (n_joints, 3) [N, N, N m] of a step and the length of the step [s];
+            it returns the reason to end the run, or None.
         """
 
 
-Until = Event | Callable[[Structure, Array], str | None]
-"""An event, or a function of the structure and N, V, M of a step that gives words or None."""
+# An event, or a function of the structure and N, V, M of a step that returns a reason or None
+StopCondition = Event | Callable[[Structure, Array], str | None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CountedMechanism:
-    """Event: so many joints of one part, or of several, hinge, slide or have come apart at once.
+    """Event: enough joints of a part, or of several parts, fail at once to make a mechanism.
 
-    They do for as long as the criteria say. Its words say whether the blocks can also move.
+    A joint fails by a hinge, by sliding or by loss of contact. The condition must last for the
+    duration of the criteria. The reason says whether the blocks can also move.
 
     Attributes:
-        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
-            run. Given here and not to the run, they become those of the run.
+        criteria: failure criteria of joints and number of failures of a mechanism; None for those
+            of the run. Criteria given here alone become those of the run.
         kinds: classes that end the run, of "local", "semi-global" and "global".
 
     Args:
         criteria: as above.
         kinds: as above.
-        limit: of |e| for a hinge, instead of criteria [-].
-        failures: how many make a mechanism, instead of criteria.
+        limit: |e| of a hinge, instead of criteria [-].
+        failures: number of failures of a mechanism, instead of criteria.
 
     Raises:
-        InvalidInput: a class is not known, or a value cannot be meant.
+        InvalidInput: unknown class, or a value out of range.
     """
 
     criteria: Criteria | None = None
-    kinds: tuple[str, ...] = KINDS
+    kinds: tuple[str, ...] = MECHANISM_KINDS
     limit: InitVar[float | None] = None
     failures: InitVar[int | None] = None
 
     def __post_init__(self, limit: float | None, failures: int | None) -> None:
-        own = chosen(self.criteria, hinge=limit, failures=failures)
-        object.__setattr__(self, "criteria", own)
+        criteria = merge_criteria(self.criteria, hinge=limit, failures=failures)
+        object.__setattr__(self, "criteria", criteria)
         _check_kinds(self.kinds)
 
-    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Return a fresh watch, whose words say which joints have failed.
+    def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
+        """Create the monitor of one run; its reason names the failed joints.
 
         Args:
-            structure: that moves.
-            criteria: of the run.
+            structure: structure of the run.
+            criteria: failure criteria of the run.
         """
-        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
+        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
 
-        def found(joints: xr.Dataset) -> Mechanism | None:
+        def count(joints: xr.Dataset) -> Mechanism | None:
             return counted_mechanism(joints, kinds=self.kinds)
 
-        judged = np.flatnonzero(structure.judged).tolist()
-        glance = Glance(structure, criteria, judged, lambda seen: _named(found(seen.labelled())))
+        assessed = np.flatnonzero(structure.judged).tolist()
+        scan = FailureScan(
+            structure, criteria, assessed, lambda state: _as_condition(count(state.joint_states()))
+        )
 
-        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(now), step):
+        def reason(conditions: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.add_step(bool(conditions), step):
                 return None
-            joints = glance.labelled(resultants)
-            counted, motion = found(joints), verifier.verified(joints)
+            joints = scan.joint_states(resultants)
+            counted, motion = count(joints), verifier.verify(joints)
             assert counted is not None
-            return f"a mechanism of {counted.part} by {listed_joints(counted.names)}; {motion}"
+            return f"a mechanism of {counted.part} by {join_joint_names(counted.names)}; {motion}"
 
-        return Look(glance, criteria.failures, told)
+        return FailureMonitor(scan, criteria.failures, reason)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MovingMechanism:
-    """Event: the failed joints, and they alone, permit a motion of the blocks.
+    """Event: the failed joints, with all others rigid, permit a motion of the blocks.
 
-    They do for as long as the criteria say. Its words say whether the count of failures agrees.
+    The condition must last for the duration of the criteria. The reason says whether the number of
+    failures agrees.
 
     Attributes:
-        criteria: what makes a joint fail; None for those of the run. Given here and not to the
-            run, they become those of the run.
+        criteria: failure criteria of joints; None for those of the run. Criteria given here alone
+            become those of the run.
         kinds: classes that end the run, of "local", "semi-global" and "global".
 
     Args:
         criteria: as above.
         kinds: as above.
-        limit: of |e| for a hinge, instead of criteria [-].
+        limit: |e| of a hinge, instead of criteria [-].
 
     Raises:
-        InvalidInput: a class is not known, or a value cannot be meant.
+        InvalidInput: unknown class, or a value out of range.
     """
 
     criteria: Criteria | None = None
-    kinds: tuple[str, ...] = KINDS
+    kinds: tuple[str, ...] = MECHANISM_KINDS
     limit: InitVar[float | None] = None
 
     def __post_init__(self, limit: float | None) -> None:
-        own = chosen(self.criteria, hinge=limit)
-        object.__setattr__(self, "criteria", own)
+        object.__setattr__(self, "criteria", merge_criteria(self.criteria, hinge=limit))
         _check_kinds(self.kinds)
 
-    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Return a fresh watch, whose words say which joints permit which motion.
+    def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
+        """Create the monitor of one run; its reason names the joints that permit the motion.
 
         Args:
-            structure: that moves.
-            criteria: of the run.
+            structure: structure of the run.
+            criteria: failure criteria of the run.
         """
-        verifier, unbroken = verifier_of(structure), Unbroken(criteria.duration)
+        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
 
-        def moves(seen: Seen) -> frozenset[str]:
-            found = verifier.moving(seen.labelled())
-            return _named(found if found is not None and found.kind in self.kinds else None)
+        def moves(state: FailureState) -> frozenset[str]:
+            motion = verifier.verify_if_moving(state.joint_states())
+            return _as_condition(motion if motion and motion.kind in self.kinds else None)
 
-        glance = Glance(structure, criteria, verifier.skeleton.joints, moves)
+        scan = FailureScan(structure, criteria, verifier.rigid_regions.joints, moves)
 
-        def told(now: frozenset[str], resultants: Array, step: float) -> str | None:
-            if not unbroken.lasts(bool(now), step):
+        def reason(conditions: frozenset[str], resultants: Array, step: float) -> str | None:
+            if not unbroken.add_step(bool(conditions), step):
                 return None
-            found = verifier.verified(glance.labelled(resultants))
-            return f"a mechanism that moves, by {listed_joints(found.moved.names)}; {found}"
+            motion = verifier.verify(scan.joint_states(resultants))
+            return f"a mechanism that moves, by {join_joint_names(motion.moved.names)}; {motion}"
 
-        return Look(glance, 1, told)
+        return FailureMonitor(scan, 1, reason)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EveryMechanism:
-    """Event: a mechanism by each definition has been met, at one time of the run or another.
+    """Event: mechanisms by all definitions have occurred, each at some time of the run.
 
-    Each lasts for as long as the criteria say. Definitions that the structure has no joints for are
-    not waited for.
+    Each must last for the duration of the criteria. Definitions for which the structure has too few
+    joints are left out.
 
     Attributes:
-        criteria: what makes a joint fail, and how many make a mechanism; None for those of the
-            run. Given here and not to the run, they become those of the run.
+        criteria: failure criteria of joints and number of failures of a mechanism; None for those
+            of the run. Criteria given here alone become those of the run.
 
     Args:
         criteria: as above.
-        limit: of |e| for a hinge, instead of criteria [-].
+        limit: |e| of a hinge, instead of criteria [-].
 
     Raises:
-        InvalidInput: a value cannot be meant.
+        InvalidInput: a value is out of range.
     """
 
     criteria: Criteria | None = None
     limit: InitVar[float | None] = None
 
     def __post_init__(self, limit: float | None) -> None:
-        own = chosen(self.criteria, hinge=limit)
-        object.__setattr__(self, "criteria", own)
+        object.__setattr__(self, "criteria", merge_criteria(self.criteria, hinge=limit))
 
-    def watch(self, structure: Structure, criteria: Criteria) -> Watch:
-        """Return a fresh watch, which remembers what has been met.
+    def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
+        """Create the monitor of one run, which stores the definitions met so far.
 
         Args:
-            structure: that moves.
-            criteria: of the run.
+            structure: structure of the run.
+            criteria: failure criteria of the run.
         """
-        verifier = verifier_of(structure)
-        concerned = sorted({*np.flatnonzero(structure.judged), *verifier.skeleton.joints})
+        verifier = cached_verifier(structure)
+        scanned = sorted({*np.flatnonzero(structure.judged), *verifier.rigid_regions.joints})
         roles = {joint.part: joint.role for joint in structure.joints}
-        parts = np.array([structure.joints[number].part for number in concerned])
-        own = np.searchsorted(concerned, verifier.skeleton.joints)
-        wanted = {"verified", *possible_counts(structure, criteria)}
-        times = {name: Unbroken(criteria.duration) for name in wanted}
+        parts = np.array([structure.joints[number].part for number in scanned])
+        columns = np.searchsorted(scanned, verifier.rigid_regions.joints)
+        required = {"verified", *applicable_definitions(structure, criteria)}
+        timers = {name: DurationCounter(criteria.duration) for name in required}
         met: set[str] = set()
 
-        def moves(seen: Seen) -> bool:
-            free = freedoms_of(seen.side[own], seen.slides[own], seen.apart[own], seen.sense[own])
-            if not verifier.screen.permit(free):
+        def moves(state: FailureState) -> bool:
+            pattern = (state.side, state.slides, state.apart, state.sense)
+            # the closed loops of blocks decide most patterns without a linear programme
+            freedoms = joint_freedoms(*(values[columns] for values in pattern))
+            if not verifier.loop_check.permits_motion(freedoms):
                 return False
-            return verifier.verified(seen.labelled()).kind != "none"
+            return verifier.verify(state.joint_states()).kind != "none"
 
-        def holding(seen: Seen) -> frozenset[str]:
-            count = {part: int(seen.failed[parts == part].sum()) for part in judged_parts(roles)}
-            counted = definitions_met(count, roles, criteria.failures)
-            return counted | ({"verified"} if "verified" not in met and moves(seen) else set())
+        def conditions_of(state: FailureState) -> frozenset[str]:
+            count = {
+                part: int(state.failed[parts == part].sum())
+                for part in select_assessed_parts(roles)
+            }
+            counted = matching_definitions(count, roles, criteria.failures)
+            return counted | ({"verified"} if "verified" not in met and moves(state) else set())
 
-        glance = Glance(structure, criteria, concerned, holding)
+        def reason(conditions: frozenset[str], _: Array, step: float) -> str | None:
+            # every timer takes every step: one that does not hold starts again
+            met.update(
+                name for name, time in timers.items() if time.add_step(name in conditions, step)
+            )
+            return "a mechanism by each definition" if met >= required else None
 
-        def told(now: frozenset[str], _: Array, step: float) -> str | None:
-            met.update(name for name, time in times.items() if time.lasts(name in now, step))
-            return "a mechanism by each definition" if met >= wanted else None
-
-        return Look(glance, 1, told)
+        return FailureMonitor(FailureScan(structure, criteria, scanned, conditions_of), 1, reason)
 
 
-def agreed(criteria: Criteria | None, until: Until | None) -> Criteria:
-    """Criteria of a run and of the event that may end it, which are the same.
-
-    Args:
-        criteria: given to the run, or None.
-        until: the event, or None.
-
-    Returns:
-        Those given to the run, or else to the event, or else the usual ones.
-
-    Raises:
-        InvalidInput: both were given, and differ: what ends the run would be no mechanism of it.
-    """
-    own = until.criteria if isinstance(until, Event) else None
-    if criteria is not None and own is not None and criteria != own:
+def resolve_criteria(criteria: Criteria | None, until: StopCondition | None) -> Criteria:
+    """Return the criteria shared by a run and the event that may end it."""
+    of_event = until.criteria if isinstance(until, Event) else None
+    if criteria is not None and of_event is not None and criteria != of_event:
         raise InvalidInput(
-            f"the run is judged by {criteria}, and its event by {own}: give criteria to the run "
-            "alone, which its event then obeys"
+            f"the run is judged by {criteria}, and its event by {of_event}: give criteria to the "
+            "run alone, which its event then obeys"
         )
-    return criteria or own or Criteria()
+    return criteria or of_event or Criteria()
 
 
-def begun(until: Until, structure: Structure, criteria: Criteria) -> Watch:
-    """Return a fresh watch over one run.
-
-    Args:
-        until: an event, or a function of structure and resultants.
-        structure: that moves.
-        criteria: of the run.
-
-    Raises:
-        InvalidInput: it is neither.
-    """
+def start_monitor(until: StopCondition, structure: Structure, criteria: Criteria) -> EventMonitor:
+    """Create the monitor of one run from an event or a function."""
     if isinstance(until, type) or not (isinstance(until, Event) or callable(until)):
         raise InvalidInput(
             f"until = {until!r} is no event: give one, e.g. CountedMechanism(), or a function of "
             "the structure and of N, V, M of its joints"
         )
     if isinstance(until, Event):
-        return until.watch(structure, criteria)
+        return until.start_monitor(structure, criteria)
     return lambda resultants, step: until(structure, resultants)
 
 
-def first_told(watch: Watch, resultants: Array, steps: Sequence[float]) -> tuple[int, str] | None:
-    """Return the first step at which a watch ends the run, and its words; None where it does not.
-
-    Args:
-        watch: over the run.
-        resultants: N, V, M of steps one after another (steps, n_joints, 3) [N, N, N m].
-        steps: their lengths (steps,) [s].
-    """
-    if isinstance(watch, Look):
-        return watch.first(resultants, steps)
+def first_event(
+    monitor: EventMonitor, resultants: Array, steps: Sequence[float]
+) -> tuple[int, str] | None:
+    """Return the first step at which a monitor ends the run and the reason, or None."""
+    if isinstance(monitor, FailureMonitor):
+        return monitor.find_first(resultants, steps)
     for number, step in enumerate(steps):
-        if words := watch(resultants[number], step):
-            return number, words
+        if reason := monitor(resultants[number], step):
+            return number, reason
     return None
 
 
-def possible_counts(structure: Structure, criteria: Criteria | None = None) -> tuple[str, ...]:
-    """Return the definitions of `counted_mechanisms` that the structure has joints enough for.
-
-    Args:
-        structure: what may fail.
-        criteria: say how many joints it takes; by default the usual ones.
-    """
-    apart = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
-    return tuple(name for name, found in counted_mechanisms(apart).items() if found is not None)
+def applicable_definitions(
+    structure: Structure, criteria: Criteria | None = None
+) -> tuple[str, ...]:
+    """Return the definitions of `counted_mechanisms` for which the structure has enough joints."""
+    # without forces all joints are apart, so that all definitions that can be met are
+    joints = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
+    return tuple(name for name, mechanism in counted_mechanisms(joints).items() if mechanism)
 
 
-def _named(found: object) -> frozenset[str]:
-    """What a look has found, by name: a mechanism, or nothing."""
-    return frozenset() if found is None else frozenset({"mechanism"})
+def _as_condition(mechanism: object) -> frozenset[str]:
+    """Return the condition "mechanism", or none."""
+    return frozenset() if mechanism is None else frozenset({"mechanism"})
 
 
 def _check_kinds(kinds: Any) -> None:
-    """Refuse classes that no mechanism has."""
-    if not isinstance(kinds, list | tuple) or not kinds or not all(each in KINDS for each in kinds):
-        raise InvalidInput(f"kinds = {kinds!r}: give some of {KINDS}, as a tuple")
+    """Refuse unknown classes of mechanisms."""
+    if (
+        not isinstance(kinds, list | tuple)
+        or not kinds
+        or not all(kind in MECHANISM_KINDS for kind in kinds)
+    ):
+        raise InvalidInput(f"kinds = {kinds!r}: give some of {MECHANISM_KINDS}, as a tuple")

@@ -1,38 +1,49 @@
-"""What was recorded of a time history, and its file."""
+"""History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from archfem.annotated import as_annotated
-from archfem.arrays import Array
-from archfem.dynamics.corners import displacement_of
-from archfem.dynamics.exports import Exports
-from archfem.dynamics.falling.verdict import Fall
-from archfem.dynamics.sentences import extremes, in_a_line, mechanism_lines
+from archfem._display import ResultDisplay, call_late_bound
+from archfem._netcdf import read_dataset, write_dataset
+from archfem._typing import Array
+from archfem._validation import check_type, validate_arguments
+from archfem.dynamics.export import write_vtk, write_xdmf
+from archfem.dynamics.fall import CollapseState
+from archfem.dynamics.run_text import extremes_text, mechanism_text, one_line
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria, flagged
-from archfem.joints.duration import step_lengths
-from archfem.joints.resultants import one_joint
-from archfem.limit.counted import Mechanism, counted_mechanism, demirel_aldemir_mechanism
-from archfem.limit.verified import (
+from archfem.joints.criteria import Criteria, step_lengths, with_failure_flags
+from archfem.joints.resultants import select_joint, write_joint_table
+from archfem.limit.mechanism_count import (
+    Mechanism,
+    counted_mechanism,
+    counted_mechanisms,
+    demirel_aldemir_mechanism,
+)
+from archfem.limit.mechanism_kinematics import (
     VerifiedMechanism,
     first_verified_mechanism,
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
-from archfem.netcdf import read_dataset, write_dataset
-from archfem.shown import Shown
+from archfem.models.model import Model
 
-SIGNS = (
+SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
     "higher block slips toward the extrados; rotation > 0 opens the intrados; "
     "gravity along -y; displacements relative to the ground"
 )
+
+MECHANISM_DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
+"""Definitions of a mechanism, in the order of tables."""
+
+# Criterion of `demirel_aldemir_mechanism`, satisfied whenever "four in a ring" is
+PUBLISHED_DEFINITION = "Demirel and Aldemir"
 
 
 class Ending(StrEnum):
@@ -40,10 +51,10 @@ class Ending(StrEnum):
 
     Attributes:
         FINISHED: at the end of its motion.
-        EVENT: by the event that it was to run until.
+        EVENT: by the event given as `until`.
         INTERRUPTED: by Ctrl-C.
         FAILED: at a step without equilibrium.
-        PARTED: because blocks came loose, and were followed to the ground.
+        PARTED: by separation of blocks, whose fall was then followed to the ground.
     """
 
     FINISHED = "finished"
@@ -53,21 +64,21 @@ class Ending(StrEnum):
     PARTED = "parted"
 
     @property
-    def by_itself(self) -> bool:
-        """Whether the run came to its end, and was not broken off."""
+    def is_complete(self) -> bool:
+        """Whether the run was neither interrupted nor failed."""
         return self in (Ending.FINISHED, Ending.EVENT, Ending.PARTED)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class History(Exports, Shown, picture="joints.draw_joints"):
-    """The record of one run.
+class History(ResultDisplay):
+    """Record of one run.
 
     Attributes:
-        dataset: everything that was recorded, with units, signs, versions, the criteria by which
-            joints are judged and, where one was given, the case. Resultants and flags are over
-            (time, joint), fields over (frame, coordinate).
-        structure: what was shaken; the file does not hold it. Without it motions of the blocks
-            are unknown.
+        dataset: all recorded variables with units, signs, library versions, failure criteria and,
+            if there is one, the case. Resultants and flags are over (time, joint), fields over
+            (frame, coordinate).
+        structure: structure of the run, which the file does not contain. Motions of the blocks
+            cannot be verified without it.
     """
 
     dataset: xr.Dataset
@@ -84,22 +95,35 @@ class History(Exports, Shown, picture="joints.draw_joints"):
 
     @property
     def displacement(self) -> xr.DataArray:
-        """Displacements of corners of the blocks, as by `displacement_of` (time, point, xy) [m]."""
-        return displacement_of(self.dataset)
+        """Displacements of the corners of the free blocks (time, point, xy) [m].
+
+        Raises:
+            InvalidInput: the run has no fields.
+        """
+        if "displacement" not in self.dataset:
+            raise InvalidInput(
+                "the run has no displacements of points: record fields with "
+                "time_history(..., record=Record(fields_every=10)), or run it again"
+            )
+        values = self.dataset["displacement"].drop_vars("frame_time", errors="ignore")
+        names = {"corner_block": "block", "corner_x": "x", "corner_y": "y"}
+        values = values.rename({"frame": "time", "corner": "point", "axis": "xy", **names})
+        times = self.dataset["frame_time"].values
+        return values.assign_coords(time=("time", times, {"units": "s"}))
 
     @property
     def criteria(self) -> Criteria:
-        """What makes a joint fail, and how many failed joints make a mechanism."""
+        """Failure criteria of joints, and number of failed joints of a mechanism."""
         return Criteria.of(self.dataset)
 
-    @as_annotated
-    def judged_by(self, criteria: Criteria) -> "History":
-        """Return the same run, judged by other criteria.
+    @validate_arguments
+    def with_criteria(self, criteria: Criteria) -> "History":
+        """Return the same run with other failure criteria.
 
         Args:
-            criteria: instead of its own. What ended the run stays as it was.
+            criteria: criteria in place of those of the run; its ending does not change.
         """
-        return History(flagged(self.dataset, criteria), self.structure)
+        return History(with_failure_flags(self.dataset, criteria), self.structure)
 
     @property
     def time(self) -> Array:
@@ -112,116 +136,113 @@ class History(Exports, Shown, picture="joints.draw_joints"):
         return str(self.dataset.attrs["outcome"])
 
     @property
-    def ended(self) -> Ending:
+    def ending(self) -> Ending:
         """How the run ended.
 
         Raises:
-            InvalidInput: it was written by a version that kept words alone.
+            InvalidInput: the file was written by an early version, with `outcome` only.
         """
         if "ended" not in self.dataset.attrs:
             raise InvalidInput(
-                "this history tells only in words how its run ended, as earlier versions wrote it: "
+                "this history says only in words how its run ended, as earlier versions wrote it: "
                 f"'{self.outcome}'; run it again"
             )
         return Ending(self.dataset.attrs["ended"])
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What makes the run doubtful, a sentence each.
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings on the validity of the run, one sentence each.
 
-        Energy that drifts by more than 5 % at any step, joints that turn or blocks that move too
-        far for small displacements, a rung that is wrong for a block or whose predicted error is
-        larger than was asked for. Files of earlier versions tell none.
+        They concern energy drift above 5 % at any step, rotations and displacements too large for
+        a model of small displacements, a fidelity that does not suit a block, and a predicted error
+        above its tolerance. Files of earlier versions have none.
         """
-        told = str(self.dataset.attrs.get("doubts", ""))
-        return tuple(words for words in told.split("\n") if words)
+        text = str(self.dataset.attrs.get("doubts", ""))
+        return tuple(words for words in text.split("\n") if words)
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
-        """The first mechanism by count, or None; with the blocks that can then move, if any."""
-        found = counted_mechanism(self.joints)
-        if found is None or self.structure is None:
-            return found
-        motion = verified_mechanism(self.structure, self.joints.sel(time=found.time))
-        return found if motion.kind == "none" else replace(found, blocks=motion.moved.blocks)
+        """First mechanism by count, or None; with the blocks that can then move, if any."""
+        counted = counted_mechanism(self.joints)
+        if counted is None or self.structure is None:
+            return counted
+        motion = verified_mechanism(self.structure, self.joints.sel(time=counted.time))
+        return counted if motion.kind == "none" else replace(counted, blocks=motion.moved.blocks)
 
     @cached_property
     def verified(self) -> VerifiedMechanism | None:
-        """The first mechanism that the blocks' motion verifies, or None.
+        """First mechanism verified by a motion of the blocks, or None.
 
         Raises:
-            InvalidInput: the structure is not known.
+            InvalidInput: the history has no structure.
         """
         if self.structure is None:
             raise InvalidInput(
-                "this history does not know its structure, so that no motion of its blocks can be "
-                "looked for: read it with History.read(path, structure)"
+                "this history has no structure, so that motions of its blocks cannot be verified: "
+                "read it with History.read(path, structure)"
             )
         return first_verified_mechanism(self.structure, self.joints)
 
     @cached_property
     def demirel_aldemir(self) -> Mechanism | None:
-        """The first mechanism by the criterion of `demirel_aldemir_mechanism`, or None."""
+        """First mechanism by the criterion of `demirel_aldemir_mechanism`, or None."""
         return demirel_aldemir_mechanism(self.joints)
 
     @cached_property
-    def fall(self) -> Fall | None:
-        """What the run has left of the structure; None where displacements were taken as small."""
-        told = self.dataset.attrs
-        if "fall" not in told:
+    def fall(self) -> CollapseState | None:
+        """State of collapse at the end of the run; None for small displacements."""
+        attrs = self.dataset.attrs
+        if "fall" not in attrs:
             return None
-        time = float(told["fall_time"])
-        return Fall(
-            str(told["fall"]),
+        time = float(attrs["fall_time"])
+        return CollapseState(
+            str(attrs["fall"]),
             None if np.isnan(time) else time,
-            tuple(name for name in str(told["fall_blocks"]).split("\n") if name),
-            float(told["fall_residual"]),
-            bool(told["fall_resting"]),
+            tuple(name for name in str(attrs["fall_blocks"]).split("\n") if name),
+            float(attrs["fall_residual"]),
+            bool(attrs["fall_resting"]),
         )
 
     @cached_property
     def verdict(self) -> str:
-        """What the run means, in words: a sentence, and a line for each way to find a mechanism.
+        """Assessment of the run: a sentence on extremes, and a line for each mechanism.
 
-        The sentence tells the largest hinge rotation, slip and displacement, and what is left at
-        the end; the lines tell the first mechanism by count, by the words of Demirel and Aldemir
-        and, where the structure is known, verified, each with its duration and its opening, and
-        whether any before it was too short to count. A run that did not finish, and one that is in
-        doubt, say so first.
+        The sentence states the largest hinge rotation, slip and displacement, and the residual
+        displacement. The lines state the first mechanism by count, by Demirel and Aldemir and, if
+        the history has its structure, verified, with duration and opening, and whether earlier ones
+        were too short to count. Warnings, and an outcome other than the end of the motion, precede.
         """
         names = None
         if self.structure is not None:
             names = [block.name for block in self.structure.blocks]
-        told = self.dataset.attrs
-        whole = told.get("ended") == Ending.FINISHED or "outcome" not in told
-        lines = ["" if self.fall is None else f"the structure {self.fall.words}"]
-        lines += [f"in doubt: {words}" for words in self.doubts]
-        lines += ["" if whole else f"outcome: {self.outcome}", extremes(self.dataset)]
-        lines += mechanism_lines(self.joints, self._first, names, self._first_of_any_duration)
+        attrs = self.dataset.attrs
+        finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
+        lines = ["" if self.fall is None else f"the structure {self.fall.text}"]
+        lines += [f"in doubt: {words}" for words in self.warnings]
+        lines += ["" if finished else f"outcome: {self.outcome}", extremes_text(self.dataset)]
+        lines += mechanism_text(self.joints, self._first, names, self._first_of_any_duration)
         return "\n".join(line for line in lines if line)
 
     @property
     def _first(self) -> dict[str, Mechanism | None]:
-        """The first mechanism, or None, by each way to look for one."""
-        found = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
+        """First mechanism, or None, by each method of detection."""
+        first = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
         if self.structure is not None:
-            found["verified"] = None if self.verified is None else self.verified.moved
-        return found
+            first["verified"] = None if self.verified is None else self.verified.moved
+        return first
 
     @property
     def _first_of_any_duration(self) -> dict[str, Mechanism | None]:
-        """The same, however short they are."""
+        """First mechanisms by each method without a minimum duration."""
         if step_lengths(self.time).min() >= self.criteria.duration:
             return self._first
-        return self.judged_by(replace(self.criteria, duration=0.0))._first
+        return self.with_criteria(replace(self.criteria, duration=0.0))._first
 
-    @as_annotated
-    def _words(self) -> str:
-        """What it is, in a line or two."""
-        return in_a_line(self.dataset)
+    def _summary(self) -> str:
+        return one_line(self.dataset)
 
     def joint(self, joint: str | int) -> xr.Dataset:
-        """Return what one joint did over time.
+        """Return the variables of one joint over time.
 
         Args:
             joint: name or number.
@@ -229,13 +250,13 @@ class History(Exports, Shown, picture="joints.draw_joints"):
         Raises:
             InvalidInput: there is no such joint.
         """
-        return one_joint(self.joints, joint)
+        return select_joint(self.joints, joint)
 
     def save(self, path: str | Path) -> Path:
-        """Write one NetCDF file, in one stroke: a killed run leaves the old file or the new one.
+        """Write a NetCDF file atomically: an interrupted write does not damage an existing file.
 
         Args:
-            path: the file; folders are made.
+            path: file to write; folders are created.
 
         Returns:
             The file.
@@ -244,55 +265,133 @@ class History(Exports, Shown, picture="joints.draw_joints"):
         return write_dataset(self.dataset, Path(path), encoding)
 
     @classmethod
-    @as_annotated
+    @validate_arguments
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
-        """Return what `save` wrote; an earlier version's file is judged by the usual criteria.
+        """Read a file written by `save`; files of earlier versions get the default criteria.
 
         Args:
-            path: the file.
-            structure: what was shaken, for `verified` and the blocks of `mechanism`. It also says
-                what roles its parts have.
+            path: file to read.
+            structure: structure of the run, for `verified`, for the blocks of `mechanism` and for
+                the roles of its parts.
 
         Raises:
             InvalidInput: there is no such file, or it is damaged, something else, or of another
-                structure; or nothing tells the roles of the parts.
+                structure; or it has no roles of parts and no structure is given.
         """
         dataset = read_dataset(path, "history file")
         missing = {"N", "V", "M", "eccentricity", "name"} - set(dataset.variables)
         if missing:
             raise InvalidInput(f"{path} is not a time history: it lacks {sorted(missing)}")
-        names = dataset["name"].values.astype(str).tolist()
-        if structure is not None and names != [joint.name for joint in structure.joints]:
-            raise InvalidInput(
-                f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
-                f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
-            )
-        if structure is not None and dataset.attrs.get("structure") not in (
-            None,
-            structure.fingerprint,
-        ):
-            raise InvalidInput(
-                f"{path} is of another structure: its joints have the names of those of "
-                f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
-            )
         if structure is not None:
+            _check_structure(path, dataset, structure)
             roles = [joint.role for joint in structure.joints]
             dataset = dataset.assign_coords(role=("joint", roles))
         elif "role" not in dataset.coords:
             raise InvalidInput(
-                f"{path} does not tell which parts are rings and piers, as files of earlier "
+                f"{path} does not say which parts are rings and piers, as files of earlier "
                 "versions do not: give the structure that was shaken too"
             )
-        return cls(flagged(dataset), structure)
+        return cls(with_failure_flags(dataset), structure)
+
+    def to_vtk(self, model: Model, path: str | Path) -> Path:
+        """Write a series for ParaView: blocks, and joints as the gaps between their faces.
+
+        Blocks share no points, so that openings remain. Points have `displacement` [m], cells the
+        number of their `block` and, where blocks deform, mean stresses `stress_xx`, `stress_yy`,
+        `stress_xy` [Pa]. Joints are quadrilaterals, flat at rest, with N, V, M, eccentricity,
+        opening, slip and flags.
+
+        Args:
+            model: model of the run, which must have fields.
+            path: list to write, *.pvd; the files it names are in a folder beside it.
+
+        Returns:
+            The list.
+
+        Raises:
+            InvalidInput: the run has no fields or another model, or the name ends otherwise.
+        """
+        return write_vtk(model, self.dataset, path)
+
+    def to_xdmf(self, model: Model, path: str | Path) -> Path:
+        """Write the fields as XDMF and HDF5: displacements [m] and mean stresses [Pa].
+
+        Blocks share no points, so that openings remain.
+
+        Args:
+            model: model of the run, which must have fields.
+            path: text file to write, *.xdmf; the numbers get the same name with .h5.
+
+        Returns:
+            The text file.
+
+        Raises:
+            InvalidInput: the run has no fields or another model, or the name ends otherwise.
+        """
+        return write_xdmf(model, self.dataset, path)
+
+    def to_table(self, path: str | Path) -> Path:
+        """Write the joint results as a table with one row per joint and step.
+
+        Args:
+            path: *.csv, *.parquet or *.xlsx.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: the name ends otherwise, the package that writes such files is not
+                installed, or there are more rows than a sheet has.
+        """
+        return write_joint_table(self.joints, path)
+
+    def player(self, model: Model | None = None, *, title: str = "") -> Any:
+        """Return the player of the run, see `archfem.view.player`.
+
+        Args:
+            model: model of the run; required if the run has fields.
+            title: title above the picture; by default the run's own.
+
+        Returns:
+            The player, which displays itself in a notebook and can be saved as a page.
+
+        Raises:
+            InvalidInput: as in `archfem.view.player`.
+        """
+        return call_late_bound("History.player", self, model, title=title)
+
+    def report(self, path: str | Path) -> Path:
+        """Write an HTML report of the run and of its case, in one file for print.
+
+        Args:
+            path: file to write, .html; folders are created.
+
+        Returns:
+            The file.
+
+        Raises:
+            InvalidInput: the run was made in Python, without a case.
+        """
+        return call_late_bound("History.report", self, path)
 
 
-def with_fall(history: History, fall: Fall) -> History:
-    """Return a history that tells what its run has left of the structure.
+def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure) -> None:
+    """Refuse a file of another structure, by names of joints and by fingerprint."""
+    names = dataset["name"].values.astype(str).tolist()
+    if names != [joint.name for joint in structure.joints]:
+        raise InvalidInput(
+            f"{path} is of another structure: it has {len(names)} joints from '{names[0]}' to "
+            f"'{names[-1]}', and '{structure.name}' has others; give the one that was shaken"
+        )
+    if dataset.attrs.get("structure") not in (None, structure.fingerprint):
+        raise InvalidInput(
+            f"{path} is of another structure: its joints have the names of those of "
+            f"'{structure.name}', but blocks are elsewhere; give the one that was shaken"
+        )
 
-    Args:
-        history: of a run.
-        fall: what it has left.
-    """
+
+def with_fall(history: History, fall: CollapseState) -> History:
+    """Return a history with the state of collapse at its end."""
     dataset = history.dataset.assign_attrs(
         fall=fall.kind,
         fall_time=np.nan if fall.time is None else fall.time,
@@ -303,15 +402,74 @@ def with_fall(history: History, fall: Fall) -> History:
     return History(dataset, history.structure)
 
 
-def history_of(error: DidNotConverge) -> History:
-    """Return the history up to a failure.
+def partial_history(error: DidNotConverge) -> History:
+    """Return the history up to the failed step of a run.
 
     Args:
-        error: of a time history.
+        error: error raised by `time_history`.
 
     Raises:
-        DidNotConverge: that error, where it has no history: no step was recorded.
+        DidNotConverge: that error, if it has no history since no step was recorded.
     """
     if not isinstance(error.history, History):
         raise error
     return error.history
+
+
+def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str, Mechanism | None]:
+    """Find the first mechanism of a run by each definition.
+
+    - "any four joints": four joints of rings and piers, anywhere, hinge or slide at once;
+    - "four in a ring": four of one ring do, whatever else fails (local);
+    - "ring and pier": four of one ring and one pier do, at least one of each (semi-global);
+    - "verified": the failed joints permit a motion of rings or piers, however many they are;
+    - "Demirel and Aldemir": as they word it, four of one ring, its class by the failures of piers.
+
+    The number four is `Criteria.failures`.
+
+    Args:
+        run: history with its structure.
+        criteria: failure criteria of joints; by default those of the run.
+
+    Returns:
+        By definition, the mechanism with its time, joints and class, or None.
+
+    Raises:
+        InvalidInput: the history has no structure.
+    """
+    check_type(run, History, "run", "give what time_history returns")
+    if run.structure is None:
+        raise InvalidInput(
+            "this history has no structure, which a verified mechanism needs: read it with "
+            "History.read(path, structure)"
+        )
+    joints = with_failure_flags(run.joints, criteria)
+    motion = first_verified_mechanism(run.structure, joints)
+    return {
+        **counted_mechanisms(joints),
+        "verified": None if motion is None else motion.moved,
+        PUBLISHED_DEFINITION: demirel_aldemir_mechanism(joints),
+    }
+
+
+def corner_displacements(model: Model, fields: Array) -> xr.Dataset:
+    """Return the displacements of the corners of the free blocks, for each row of coordinates."""
+    structure, cells = model.structure, model.cells
+    points, names = [], []
+    for number in structure.free:
+        block = structure.blocks[number]
+        nodes = np.flatnonzero(cells.block == number)
+        for corner in block.points:
+            points.append(nodes[np.linalg.norm(cells.places[nodes] - corner, axis=1).argmin()])
+            names.append(block.name)
+    displacements = np.array([cells.displacement(q)[points] for q in fields])
+    x, y = cells.places[points].T
+    return xr.Dataset(
+        {"displacement": (("frame", "corner", "axis"), displacements, {"units": "m"})},
+        {
+            "corner_block": ("corner", names),
+            "corner_x": ("corner", x, {"units": "m"}),
+            "corner_y": ("corner", y, {"units": "m"}),
+            "axis": ["x", "y"],
+        },
+    )

@@ -1,4 +1,4 @@
-"""What a run leaves behind: records of its steps, the effort they took, and its energy balance."""
+"""Recording of a run: joint resultants, block displacements, solver effort and energy drift."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -9,48 +9,34 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from archfem.arrays import Array
-from archfem.dynamics.corners import corner_displacements
-from archfem.dynamics.guard import Guard
-from archfem.dynamics.history import SIGNS, Ending, History
-from archfem.dynamics.steps import Batch, State
+from archfem._typing import Array
+from archfem.dynamics.history import SIGN_CONVENTION, Ending, History, corner_displacements
+from archfem.dynamics.monitor import RunMonitor
+from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
-from archfem.models.gauges import Gauges, Readings
-from archfem.models.model import Model
-from archfem.models.moving import Moving
+from archfem.models.model import Model, Observer
 from archfem.motion.motion import Motion
 
-_EFFORT = {
+_EFFORT_ATTRIBUTES = {
     "iterations": {"long_name": "Newton iterations, or passes, since the last record"},
     "smallest_step": {"units": "s", "long_name": "smallest step taken since the last record"},
     "energy_drift": {"units": "J", "long_name": "energy from nowhere since the start"},
 }
 
 
-class Rows:
-    """Rows of one array, filled step by step; it is made anew, twice as long, where it is full.
+class GrowingArray:
+    """Array filled row by row, reallocated at twice the size when full."""
 
-    Args:
-        most: rows that there may be.
-        shape: of each row.
-        kind: of the numbers.
-    """
-
-    def __init__(self, most: int, shape: tuple[int, ...] = (), kind: type = float) -> None:
-        self._array: NDArray[Any] = np.empty((most, *shape), kind)
+    def __init__(self, capacity: int, shape: tuple[int, ...] = (), dtype: type = float) -> None:
+        self._array: NDArray[Any] = np.empty((capacity, *shape), dtype)
         self.count = 0
 
     def add(self, rows: NDArray[Any]) -> None:
-        """Fill the next rows.
-
-        Args:
-            rows: (some, …), with the shape of the others.
-        """
+        """Fill the next rows."""
         if self.count + len(rows) > len(self._array):
-            longer = np.empty(
-                (2 * self.count + len(rows), *self._array.shape[1:]), self._array.dtype
-            )
+            capacity = 2 * self.count + len(rows)
+            longer = np.empty((capacity, *self._array.shape[1:]), self._array.dtype)
             longer[: self.count] = self.values
             self._array = longer
         self._array[self.count : self.count + len(rows)] = rows
@@ -58,120 +44,93 @@ class Rows:
 
     @property
     def values(self) -> NDArray[Any]:
-        """The rows filled so far (count, …)."""
+        """Rows filled so far (count, …)."""
         return self._array[: self.count]
 
 
-class Reach:
-    """How far each block has moved from where it was at the start of a run.
+class BlockDisplacements:
+    """Largest and residual displacement of each block's middle, from the start of a run."""
 
-    Args:
-        gauges: of the model that moves.
-    """
-
-    def __init__(self, gauges: Readings) -> None:
-        self._gauges = gauges
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
         self._start: Array | None = None
 
     def add(self, times: Array, readings: Array) -> None:
-        """Look at some steps.
-
-        Args:
-            times: at their ends (steps,) [s]; the first step of all is the start.
-            readings: of the gauges (steps, r).
-        """
-        middles = self._gauges.middles(readings)
+        """Add the readings of the next steps (steps, r)."""
+        middles = self._observer.middles(readings)
         if self._start is None:
             blocks = middles.shape[1]
             self._start, self._when = middles[0], np.full(blocks, times[0])
             self._square = np.zeros(blocks)
+        # squares are compared, since their order is that of the distances
         squares = np.square(middles - self._start).sum(axis=-1)
         farthest = squares.argmax(axis=0)
-        found = squares[farthest, np.arange(len(farthest))]
-        self._when = np.where(found > self._square, times[farthest], self._when)
-        self._square, self._last = np.maximum(found, self._square), squares[-1]
+        largest = squares[farthest, np.arange(len(farthest))]
+        self._when = np.where(largest > self._square, times[farthest], self._when)
+        self._square, self._last = np.maximum(largest, self._square), squares[-1]
 
-    def variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
-        """What was found, as variables of a dataset over block."""
-        about = "displacement of its middle"
-        words = {
-            "largest_displacement": (np.sqrt(self._square), "m", f"largest {about}"),
-            "largest_displacement_time": (self._when, "s", f"time of the largest {about}"),
-            "residual_displacement": (np.sqrt(self._last), "m", f"{about} at the end"),
+    def to_variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
+        """Return variables of a dataset over block."""
+        subject = "displacement of its middle"
+        columns = {
+            "largest_displacement": (np.sqrt(self._square), "m", f"largest {subject}"),
+            "largest_displacement_time": (self._when, "s", f"time of the largest {subject}"),
+            "residual_displacement": (np.sqrt(self._last), "m", f"{subject} at the end"),
         }
         return {
             name: ("block", values, {"units": units, "long_name": text})
-            for name, (values, units, text) in words.items()
+            for name, (values, units, text) in columns.items()
         }
 
 
 @dataclass(kw_only=True)
 class Recorder:
-    """What has been recorded so far, from the start of a run.
-
-    Attributes:
-        model: that moves.
-        method: name of its stepper.
-        dt: time step that was asked for [s]; None where steps have lengths of their own.
-        steps: that the run may take, its start not counted.
-        every: the joints' resultants are kept at every n-th step.
-        fields_every: coordinates are kept at every n-th step; None keeps none.
-        criteria: by which joints are judged.
-        guard: watches over what is recorded.
-        state: at the end of the steps added last.
-        fallback: steps that a strategy left to SNES.
-    """
+    """Record of a run from its start, with its validity checks."""
 
     model: Model
-    method: str
-    dt: float | None
-    steps: int
-    every: int
-    fields_every: int | None
-    criteria: Criteria
-    guard: Guard
-    state: State
-    fallback: int = 0
+    method: str  # name of the solver
+    dt: float | None  # constant time step [s]; None for steps of varying length
+    steps: int  # largest number of steps of the run, its start not counted
+    every: int  # interval of steps at which joint resultants are recorded
+    fields_every: int | None  # interval at which coordinates are recorded; None for none
+    criteria: Criteria  # for the failure flags of joints
+    monitor: RunMonitor
+    state: State  # at the end of the steps added last
+    fallback: int = 0  # number of steps at which a compiled solver fell back to SNES
 
     def __post_init__(self) -> None:
-        most, frames = self.steps + 1, self.steps // (self.fields_every or self.steps + 1) + 1
-        records = self.steps // self.every + 2  # the start, and a last one that an event asks for
-        self._iterations = Rows(most, kind=np.int64)
-        self._smallest, self._drift = Rows(most), Rows(most)
-        self._numbers, self._times = Rows(records, kind=np.intp), Rows(records)
+        capacity = self.steps + 1
+        frames = self.steps // (self.fields_every or self.steps + 1) + 1
+        # two more: the start, and the last step if an event ends the run
+        records = self.steps // self.every + 2
+        self._iterations = GrowingArray(capacity, dtype=np.int64)
+        self._smallest, self._drift = GrowingArray(capacity), GrowingArray(capacity)
+        self._numbers, self._times = GrowingArray(records, dtype=np.intp), GrowingArray(records)
         joints = len(self.model.structure.joints)
-        self._gauges = Gauges.on(self.model)
-        self._faces = Rows(records, (3, joints))
-        self._reach = Reach(self._gauges)
-        self._resultants = Rows(records, (joints, 3))
-        self._frames, self._fields = Rows(frames), Rows(frames, (self.model.size,))
+        self._observer = self.model.observer()
+        self._faces = GrowingArray(records, (3, joints))
+        self._displacements = BlockDisplacements(self._observer)
+        self._resultants = GrowingArray(records, (joints, 3))
+        self._frames, self._fields = GrowingArray(frames), GrowingArray(frames, (self.model.size,))
 
     def add(self, batch: Batch, *, last: bool = False) -> None:
-        """Keep of a batch what was asked for.
-
-        Args:
-            batch: steps that follow those kept so far; the first is the start, alone.
-            last: whether an event ends the run with it; its last resultants are then kept anyhow,
-                since they are what ended it.
-
-        Raises:
-            DidNotConverge: the guard is certain that what was kept is wrong.
-        """
+        """Record the steps of a batch that are due, and check all of them."""
         self.state = batch.state(len(batch.times) - 1)
-        readings = batch.read(self._gauges)
-        drift = self.guard.add(batch, readings)
-        self._reach.add(batch.times, readings)
+        readings = batch.read(self._observer)
+        drift = self.monitor.add(batch, readings)
+        self._displacements.add(batch.times, readings)
         numbers = self._drift.count + np.arange(len(batch.times))
-        kept = numbers % self.every == 0
-        kept[-1] |= last
-        for rows, values in (  # Ctrl-C may come between any two: what is filled last counts
+        due = numbers % self.every == 0
+        due[-1] |= last
+        # Ctrl-C may come between any two: the number of resultants, filled last, counts
+        for rows, values in (
             (self._iterations, batch.iterations),
-            (self._smallest, batch.smallest),
+            (self._smallest, batch.smallest_step),
             (self._drift, drift),
-            (self._numbers, numbers[kept]),
-            (self._times, batch.times[kept]),
-            (self._faces, self._gauges.faces(readings[kept])),
-            (self._resultants, batch.resultants[kept]),
+            (self._numbers, numbers[due]),
+            (self._times, batch.times[due]),
+            (self._faces, self._observer.faces(readings[due])),
+            (self._resultants, batch.resultants[due]),
         ):
             rows.add(values)
         self.fallback += batch.fallback * len(batch.times)
@@ -179,57 +138,58 @@ class Recorder:
             for k in np.flatnonzero(numbers % self.fields_every == 0).tolist():
                 self._frames.add(batch.times[k : k + 1])
                 self._fields.add(batch.state(k).q[None])
-        self.guard.judge()
+        self.monitor.check_run()
 
-    def history(self, motion: Motion, ended: Ending, outcome: str) -> History:
-        """Return everything as one dataset.
-
-        Args:
-            motion: of the ground.
-            ended: how the run ended.
-            outcome: the same in words.
-        """
+    def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
+        """Return the record as a history."""
         structure, resultants = self.model.structure, self._resultants.values
         times, faces = (rows.values[: len(resultants)] for rows in (self._times, self._faces))
-        moved = isinstance(self.model, Moving)
+        moved = self.model.large_displacements
         dataset = joint_dataset(
             structure, resultants, times, self.criteria, faces=faces, moved=moved
         )
-        about = {"units": "m/s2", "long_name": "acceleration of the ground"}
-        variables: dict[str, Any] = self._reach.variables()
-        variables["ground"] = ("time", "axis"), motion.at(times), about
-        for (name, words), values in zip(_EFFORT.items(), self._effort(), strict=True):
-            variables[name] = "time", values, words
+        attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
+        variables: dict[str, Any] = self._displacements.to_variables()
+        variables["ground"] = ("time", "axis"), motion.at(times), attributes
+        for (name, attrs), values in zip(_EFFORT_ATTRIBUTES.items(), self._effort(), strict=True):
+            variables[name] = "time", values, attrs
         dataset = dataset.assign_coords(
             block=[block.name for block in structure.blocks], axis=["x", "y"]
         ).assign(variables)
         dataset = self._with_coordinates(dataset)
-        dataset.attrs |= {
+        dataset.attrs |= self._attributes(motion, ending, outcome)
+        return History(dataset, structure)
+
+    def _attributes(self, motion: Motion, ending: Ending, outcome: str) -> dict[str, Any]:
+        """Return the scalar results and settings of the run."""
+        structure, monitor, smallest = self.model.structure, self.monitor, self._smallest.values
+        attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
             "motion": motion.name,
             "outcome": outcome,
-            "ended": str(ended),
+            "ended": str(ending),
             "fidelity": self.model.fidelity,
             "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
-            "energy_drift": self.guard.worst,
-            "largest_displacement": self.guard.largest_displacement,
-            "largest_turn": self.guard.largest_turn,
-            "doubts": "\n".join(self.guard.doubts),
-            "halved_steps": int(np.sum(self._smallest.values < 0.75 * self.dt)) if self.dt else 0,
-            "shortest_step": float(self._smallest.values[1:].min(initial=np.inf)),
+            "energy_drift": monitor.worst_drift,
+            "largest_displacement": monitor.largest_displacement,
+            "largest_turn": monitor.largest_turn,
+            "doubts": "\n".join(monitor.warnings),
+            # halved steps are dt/2 or shorter; 0.75 lies clear of round-off
+            "halved_steps": int(np.sum(smallest < 0.75 * self.dt)) if self.dt else 0,
+            "shortest_step": float(smallest[1:].min(initial=np.inf)),
             "steps": self._drift.count - 1,
             "fallback_steps": self.fallback,
-            "signs": SIGNS,
-            "versions": versions(),
+            "signs": SIGN_CONVENTION,
+            "versions": library_versions(),
         }
         if self.model.prediction:
-            dataset.attrs["predicted_error"] = self.model.prediction.error
-        return History(dataset, structure)
+            attributes["predicted_error"] = self.model.prediction.error
+        return attributes
 
     def _effort(self) -> tuple[NDArray[np.int64], Array, Array]:
-        """Iterations and smallest step since the record before, and drift, at each record."""
+        """Return iterations and smallest step since the previous record, and drift, by record."""
         ends = self._numbers.values[: self._resultants.count]
         starts, recorded = np.append(0, ends[:-1] + 1), ends[-1] + 1
         return (
@@ -239,7 +199,7 @@ class Recorder:
         )
 
     def _with_coordinates(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the dataset with the coordinates that were kept, and the state at the end."""
+        """Return the dataset with the recorded coordinates and the state at the end."""
         if frames := self._fields.count:
             dataset.coords["frame_time"] = "frame", self._frames.values[:frames], {"units": "s"}
             dataset["q"] = ("frame", "coordinate"), self._fields.values
@@ -254,12 +214,12 @@ class Recorder:
 
 
 @cache
-def versions() -> str:
-    """Versions of the libraries that results depend on."""
-    found = []
+def library_versions() -> str:
+    """Return the versions of the libraries that results depend on."""
+    versions = []
     for name in ("archfem", "numpy", "scipy", "petsc4py", "fenics-dolfinx", "gmsh"):
         try:
-            found.append(f"{name} {version(name)}")
+            versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             continue
-    return ", ".join(found)
+    return ", ".join(versions)

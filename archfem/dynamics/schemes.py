@@ -1,37 +1,48 @@
-"""Settings of a time history: damping, and the scheme that steps it."""
+"""Time integration schemes and viscous damping of a time history.
+
+Damping forces are C v with C = a M + b K: Rayleigh damping has both parts, stiffness damping b K
+alone. A scheme is given by the weights β, γ of the new acceleration and by the instant
+t + (1 + α) Δt at which forces are taken.
+"""
 
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
-from archfem.arguments import among, real, reals
+from archfem._validation import check_number, check_numbers, is_one_of
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
-JOINTS = ("closed", "initial", "none")
+# Shortest time step accepted [s]: anything below is a slip of the unit
+MIN_TIME_STEP = 1e-6
 
-KINDS = ("stiffness", "rayleigh")
+# Values of `joints` of all kinds of damping: closed part of the joints, all joints closed, blocks
+DAMPED_JOINTS = ("closed", "initial", "none")
 
-EFFECTIVE = 0.90
-"""Share of the mass along an axis that the modes up to the last effective one have together."""
+# Kinds of damping whose frequencies are taken from the modes
+DAMPING_KINDS = ("stiffness", "rayleigh")
+
+# Share of the mass along x up to the last effective mode (EN 1998-1, 4.3.3.3.1(3)) [-]
+EFFECTIVE_MASS_SHARE = 0.90
 
 
 @dataclass(frozen=True)
 class Rayleigh:
     """Damping proportional to mass and stiffness.
 
-    The ratio at a frequency f is a/(4 π f) + b π f; the two coefficients make it the wanted one
-    at two frequencies (Clough and Penzien, 1993, section 12-4). The mass part drags whatever moves
-    against the ground, also a block that is loose: 5 % at 8 and 16 Hz are 27 % of critical at 1 Hz.
-    `StiffnessDamping` has none.
+    The ratio at a frequency f is a/(4 π f) + b π f. Both coefficients follow from one ratio at two
+    frequencies (Clough and Penzien, 1993, section 12-4). The mass part drags all motion relative to
+    the ground, also that of a loose block: 5 % at 8 and 16 Hz are 27 % of critical at 1 Hz.
+    `StiffnessDamping` has no such part.
 
     Attributes:
-        ratio: of critical damping at both frequencies [-].
-        frequencies: between which damping is at most the ratio [Hz].
+        ratio: damping ratio at both frequencies, ζ [-].
+        frequencies: the two frequencies, the lower first; between them damping is below the
+            ratio [Hz].
         joints: what the stiffness part acts on: blocks and the closed part of joints ("closed"),
-            blocks and all joints as if they were closed ("initial", which leaves a dashpot in an
-            open joint), or the blocks alone ("none").
+            blocks and all joints as if they were closed ("initial", a dashpot even in an open
+            joint), or the blocks alone ("none").
     """
 
     ratio: float
@@ -40,7 +51,7 @@ class Rayleigh:
 
     def __post_init__(self) -> None:
         """Refuse negative damping, frequencies out of order and unknown words."""
-        low, high = reals(self.frequencies, "damping frequencies [Hz]", 2)
+        low, high = check_numbers(self.frequencies, "damping frequencies [Hz]", 2)
         _check_ratio(self.ratio)
         if not 0.0 < low < high:
             raise InvalidInput(
@@ -50,30 +61,30 @@ class Rayleigh:
 
     @property
     def mass(self) -> float:
-        """Coefficient of the mass matrix [1/s]."""
+        """Coefficient of the mass matrix, a [1/s]."""
         low, high = self.frequencies
         return 4.0 * pi * self.ratio * low * high / (low + high)
 
     @property
     def stiffness(self) -> float:
-        """Coefficient of the stiffness matrix [s]."""
+        """Coefficient of the stiffness matrix, b [s]."""
         return self.ratio / (pi * sum(self.frequencies))
 
 
 @dataclass(frozen=True)
 class StiffnessDamping:
-    """Damping proportional to stiffness alone: what moves without deforming is not dragged.
+    """Damping proportional to stiffness alone; rigid motion is not damped.
 
-    The ratio at a frequency f is b π f: the wanted one at one frequency, less below, more above. A
-    block in flight loses nothing and one that turns on its edge hardly anything; energy is lost
+    The ratio at a frequency f is b π f: prescribed at one frequency, less below, more above. A
+    block in flight loses no energy, and a block that rocks on its edge almost none. Energy is lost
     where blocks and the closed part of joints deform, above all when a block lands
     (`restitution_damping` sets how much).
 
     Attributes:
-        ratio: of critical damping at the frequency [-].
-        frequency: at which damping has the ratio [Hz].
-        joints: what it acts on beside the blocks, as in `Rayleigh`; only with "closed", the
-            default, do open joints stay free.
+        ratio: damping ratio at the frequency, ζ [-].
+        frequency: frequency at which damping has the ratio [Hz].
+        joints: what it acts on besides the blocks, as in `Rayleigh`; only with "closed", the
+            default, are open joints undamped.
 
     Example:
         >>> round(af.StiffnessDamping(0.05, 8.0).stiffness, 6)
@@ -87,58 +98,51 @@ class StiffnessDamping:
     mass = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse negative damping, a frequency that is none and unknown words."""
+        """Refuse negative damping, frequencies out of range and unknown words."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if not 1e-3 <= real(self.frequency, "damping frequency [Hz]") <= 1e6:
+        if not 1e-3 <= check_number(self.frequency, "damping frequency [Hz]") <= 1e6:
             raise InvalidInput(
                 f"damping frequency {self.frequency} Hz is not between 1 mHz and 1 MHz: try 8.0"
             )
 
     @property
     def stiffness(self) -> float:
-        """Coefficient of the stiffness matrix [s]."""
+        """Coefficient of the stiffness matrix, b [s]."""
         return self.ratio / (pi * self.frequency)
 
 
+# Damping of a run
 Viscous = Rayleigh | StiffnessDamping
-"""Damping of a run."""
 
 
 @dataclass(frozen=True)
 class EffectiveDamping:
-    """Damping whose frequencies are yet to be found, for want of a model.
+    """Damping settings of a case; the frequencies follow from the effective modes of its model."""
 
-    Attributes:
-        ratio: at the first mode effective along x, and with kind "rayleigh" at the last [-].
-        kind: "stiffness" or "rayleigh", as in `effective_damping`.
-        joints: what the stiffness part acts on, as in `Rayleigh`.
-        share: of the mass along x, of the modes up to the last effective one [-].
-    """
-
-    ratio: float
-    kind: str = "stiffness"
-    joints: str = "closed"
-    share: float = EFFECTIVE
+    ratio: float  # at the first mode effective along x, and with kind "rayleigh" at the last [-]
+    kind: str = "stiffness"  # "stiffness" or "rayleigh", as in `effective_damping`
+    joints: str = "closed"  # joints that the stiffness part acts on, as in `Rayleigh`
+    mass_share: float = EFFECTIVE_MASS_SHARE  # of the modes up to the last effective one [-]
 
     def __post_init__(self) -> None:
-        """Refuse what could not become damping."""
+        """Refuse values out of range and unknown words."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
-        if not among(self.kind, KINDS):
-            raise InvalidInput(f"damping kind = {self.kind!r}: use one of {KINDS}")
-        if not 0.0 < real(self.share, "damping share [-]") < 1.0:
-            raise InvalidInput(f"share {self.share} of the mass is not between 0 and 1")
+        if not is_one_of(self.kind, DAMPING_KINDS):
+            raise InvalidInput(f"damping kind = {self.kind!r}: use one of {DAMPING_KINDS}")
+        if not 0.0 < check_number(self.mass_share, "damping share [-]") < 1.0:
+            raise InvalidInput(f"share {self.mass_share} of the mass is not between 0 and 1")
 
 
 def _check_ratio(ratio: float) -> None:
-    if not 0.0 <= real(ratio, "damping ratio [-]") < 1.0:
+    if not 0.0 <= check_number(ratio, "damping ratio [-]") < 1.0:
         raise InvalidInput(f"damping ratio {ratio} is not between 0 and 1: 5 % is 0.05")
 
 
 def _check_joints(joints: str) -> None:
-    if not among(joints, JOINTS):
-        raise InvalidInput(f"damping joints = {joints!r}: use one of {JOINTS}")
+    if not is_one_of(joints, DAMPED_JOINTS):
+        raise InvalidInput(f"damping joints = {joints!r}: use one of {DAMPED_JOINTS}")
 
 
 @dataclass(frozen=True)
@@ -148,8 +152,8 @@ class Newmark:
     Reference: Newmark, J. Eng. Mech. Div. ASCE 85 (1959).
 
     Attributes:
-        beta: weight of the new acceleration in the displacement.
-        gamma: weight of the new acceleration in the velocity.
+        beta: weight of the new acceleration in the displacement, β [-].
+        gamma: weight of the new acceleration in the velocity, γ [-].
     """
 
     beta: float = 0.25
@@ -158,9 +162,10 @@ class Newmark:
     alpha = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse schemes that are explicit or grow by themselves."""
-        real(self.beta, "Newmark beta [-]")
-        real(self.gamma, "Newmark gamma [-]")
+        """Refuse explicit and unstable schemes."""
+        check_number(self.beta, "Newmark beta [-]")
+        check_number(self.gamma, "Newmark gamma [-]")
+        # unconditional stability; 1e-12 admits values that round below the bound
         if not (self.gamma >= 0.5 and self.beta >= 0.25 * (0.5 + self.gamma) ** 2 - 1e-12):
             raise InvalidInput(
                 f"Newmark with beta {self.beta}, gamma {self.gamma} is not stable at every step: "
@@ -170,42 +175,42 @@ class Newmark:
 
 @dataclass(frozen=True)
 class HHT:
-    """Hilber, Hughes and Taylor's method: second order, damping what a step cannot resolve.
+    """Hilber, Hughes and Taylor's method: second order, with damping of unresolved frequencies.
 
-    Internal forces and loads are taken at t + (1 + α) dt.
+    Internal forces and loads are taken at t + (1 + α) Δt.
     Reference: Earthquake Eng. Struct. Dyn. 5 (1977) 283.
 
     Attributes:
-        alpha: from -1/3 (most damping) to 0 (average acceleration).
+        alpha: α, from -1/3 (most damping) to 0 (average acceleration) [-].
     """
 
     alpha: float = -0.1
 
     def __post_init__(self) -> None:
         """Refuse values outside the range of stability."""
-        if not -1.0 / 3.0 - 1e-12 <= real(self.alpha, "HHT alpha [-]") <= 0.0:
+        if not -1.0 / 3.0 - 1e-12 <= check_number(self.alpha, "HHT alpha [-]") <= 0.0:
             raise InvalidInput(f"HHT alpha {self.alpha} is not between -1/3 and 0")
 
     @property
     def beta(self) -> float:
-        """Newmark's β that keeps second order."""
+        """Newmark's β for second order."""
         return 0.25 * (1.0 - self.alpha) ** 2
 
     @property
     def gamma(self) -> float:
-        """Newmark's γ that keeps second order."""
+        """Newmark's γ for second order."""
         return 0.5 - self.alpha
 
 
 @dataclass(frozen=True)
 class Conserving:
-    """The midpoint rule with forces averaged along each step: energy is neither made nor lost.
+    """Midpoint rule with forces averaged along each step; it conserves energy at any step length.
 
-    Displacements go straight over a step, and what acts is the mean of each force on the way:
-    of blocks and closed joints that at its middle, of a joint that opens, closes or slides its
-    own. The work of a step then is the change of the stored energy, and what friction, damping and
-    the ground take or give, whatever the length of the step (the averaged vector field of Quispel
-    and McLaren, J. Phys. A 41 (2008) 045206; of second order). Resultants are means over steps.
+    Displacements are linear over a step, and every force is its mean along that path: blocks and
+    closed joints at the middle of the step, joints that open, close or slide by integration. The
+    work of a step is then the change of the stored energy plus the energy exchanged by friction,
+    damping and ground motion (averaged vector field, Quispel and McLaren, J. Phys. A 41 (2008)
+    045206; second order). Resultants are means over steps.
     """
 
     beta = 0.5
@@ -216,15 +221,8 @@ class Conserving:
 Scheme = Newmark | HHT | Conserving
 
 
-def check_turning(scheme: Scheme) -> None:
-    """Refuse a scheme that cannot follow blocks which move as far as they like.
-
-    Args:
-        scheme: that is to step.
-
-    Raises:
-        InvalidInput: it writes the equation at an instant, and makes energy of blocks that turn.
-    """
+def check_large_displacement_scheme(scheme: Scheme) -> None:
+    """Refuse schemes that do not conserve energy at large rotations."""
     if not isinstance(scheme, Conserving):
         raise InvalidInput(
             f"{scheme} does not keep the energy of blocks that turn far, and makes some from "
@@ -232,16 +230,8 @@ def check_turning(scheme: Scheme) -> None:
         )
 
 
-def check_sliding(scheme: Scheme, structure: Structure) -> None:
-    """Refuse schemes that write the equation at an instant where joints can slide, or break.
-
-    Args:
-        scheme: of the run to come.
-        structure: whose joints they are.
-
-    Raises:
-        InvalidInput: joints can slide or have tensile strength, and the scheme has no memory.
-    """
+def check_friction_scheme(scheme: Scheme, structure: Structure) -> None:
+    """Refuse schemes with forces at an instant where joints can slide or break."""
     if isinstance(scheme, Conserving):
         return
     name, friction = type(scheme).__name__, structure.friction

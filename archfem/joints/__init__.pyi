@@ -1,11 +1,11 @@
 from .criteria import Criteria as Criteria
-from .criteria import flags as flags
-from .criteria import judged as judged
-from .criteria import roles_of as roles_of
+from .criteria import assessed_joints as assessed_joints
+from .criteria import failure_flags as failure_flags
+from .criteria import part_roles as part_roles
 from .operator import JointOperator as JointOperator
 from .quadrature import Quadrature as Quadrature
 from .resultants import joint_dataset as joint_dataset
-from .resultants import one_joint as one_joint
+from .resultants import joint_table as joint_table
+from .resultants import select_joint as select_joint
 from .resultants import thrust_line as thrust_line
-from .table import joint_table as joint_table
-from .table import write_joint_table as write_joint_table
+from .resultants import write_joint_table as write_joint_table

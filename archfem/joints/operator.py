@@ -1,121 +1,214 @@
-"""The joint operator: from coordinates to opening and slip at points, and back to forces.
+"""The joint operator: from generalised coordinates to gaps and slips at joint points, and back.
 
-With G the sparse operator of `kinematics`, that takes generalised coordinates q to (opening, slip)
-at points along the joints, the forces of all joints are Gᵀ f(G q) and their tangent is Gᵀ f' G.
-How openings become normal forces is told in `springs` and `facets`; how slips become shear, and
-what of it friction holds, in `law`.
+The sparse operator G takes coordinates q to (opening, slip) at points along the joints, its
+transpose takes forces there to generalised forces. Whatever the coordinates are (nodal
+displacements, rigid motions, modes), the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G,
+with the law f of `contact_law` and the effects of dilatancy and tensile bonds of `bonds`.
 
-Joints have memory: how far each point has slid for good, and which bonds are broken. It belongs to
-the operator, whose forces are those after a load has changed since; `remembered` takes in what has
-slid and broken meanwhile. What teeth and bonds do is told in `bonds`.
+Joints have memory: the irreversible slip of each point, and which bonds are broken. Forces follow
+from the displacements since the memory was updated.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from archfem.arrays import Array
-from archfem.joints.bonds import Bonds, ridden
-from archfem.joints.facets import Facets
-from archfem.joints.kinematics import JointKinematics
-from archfem.joints.law import held, is_closed
+from archfem._typing import Array
+from archfem.joints.bonds import Bonds, dilatancy_opening
+from archfem.joints.contact_law import Facets, Law, clip_to_friction, is_closed
+from archfem.joints.quadrature import JointPoints
+from archfem.joints.sparsity import Pattern
 
-Status = NDArray[np.bool_]
+Flags = NDArray[np.bool_]
 
-TOUCHING = 1e-9
-"""Excess over Coulomb's limit, relative to it, that is rounding of a point which holds."""
-
-SLIDING = 1e-9
-"""Share of its elastic stiffness that the tangent leaves a point which slides: a body that slides
-at all its joints, to either side, would be free, though it holds as soon as it moves back."""
+# Excess over Coulomb's limit, relative to it, that counts as round-off of a point that holds [-]
+SLIP_LIMIT_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class JointOperator(JointKinematics):
-    """Opening and slip along the joints as linear functions of coordinates, and their forces.
+class JointOperator:
+    """Map coordinates to openings and slips along the joints, and to joint forces.
 
     Attributes:
-        slid: how far each point has slid for good, that part of the slip which friction did not
-            hold (p,) [m]; None where nothing has.
-        broken: where bonds are broken for good, 1, else 0 (p,); None where none is.
+        law: normal law, with the joint points (p).
+        opening: rows of G for the opening, positive open (p, n).
+        slip: rows of G for the slip of the higher block, positive toward the extrados (p, n).
+        gap_offset: opening and slip at q = 0, due to moved supports and construction (2, p) [m];
+            None for zero.
+        irreversible_slip: part of the slip that friction has not held (p,) [m]; None for zero.
+        broken: 1 where a bond is broken, else 0 (p,); None for none.
     """
 
-    slid: Array | None = None
+    law: Law
+    opening: sparse.csr_matrix
+    slip: sparse.csr_matrix
+    gap_offset: Array | None = None
+    irreversible_slip: Array | None = None
     broken: Array | None = None
 
     @property
-    def memory(self) -> Array:
-        """How far each point has slid for good (p,) [m]; then where bonds are broken (2 p,)."""
-        slid = self._slid
-        return slid if self.bonds is None else np.concatenate([slid, self.bonds.broken])
+    def points(self) -> JointPoints:
+        """Joint points, at which openings and slips are evaluated."""
+        return self.law.points
 
     @property
-    def _slid(self) -> Array:
-        return np.zeros(len(self.points.arm)) if self.slid is None else self.slid
+    def slides(self) -> bool:
+        """Whether any point can slide."""
+        return bool(self.points.slides.any())
 
-    def remembering(self, memory: Array) -> "JointOperator":
-        """Return the same joints with another memory.
+    @cached_property
+    def transposed(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Matrices from normal and shear forces at the points to generalised forces (n, p)."""
+        return self.opening.T.tocsr(), self.slip.T.tocsr()
+
+    @cached_property
+    def summation_matrices(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Matrices from point forces to their sum and moment in each joint (n_joints, p)."""
+        points = self.points
+        shape = (points.joint_count, len(points.offset))
+        entries = (points.joint, np.arange(len(points.offset)))
+        force = sparse.csr_matrix((np.ones(shape[1]), entries), shape)
+        return force, sparse.csr_matrix((points.offset, entries), shape)
+
+    def openings(self, q: Array) -> Array:
+        """Return the openings at the points, positive where open (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        gaps = self.opening @ q
+        return gaps if self.gap_offset is None else gaps + self.gap_offset[0]
+
+    def slips(self, q: Array) -> Array:
+        """Return the slips of the higher block at the points, toward the extrados (p,) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        slips = self.slip @ q
+        return slips if self.gap_offset is None else slips + self.gap_offset[1]
+
+    def generalised_force(self, normal: Array, shear: Array) -> Array:
+        """Return generalised forces from forces at the points (n,).
+
+        Args:
+            normal: normal forces, positive where they pull (p,) [N].
+            shear: shear forces (p,) [N].
+        """
+        return self.transposed[0] @ normal + self.transposed[1] @ shear
+
+    def sum_resultants(self, normal: Array, shear: Array) -> Array:
+        """Return N, V, M of every joint from forces at the points (n_joints, 3) [N, N, N m].
+
+        Args:
+            normal: normal forces, positive where they pull (p,) [N].
+            shear: shear forces (p,) [N].
+        """
+        force, moment = self.summation_matrices
+        return np.stack([-(force @ normal), force @ shear, -(moment @ normal)], axis=1)
+
+    def shear_resultants(self) -> sparse.csr_matrix:
+        """Return the matrix from coordinates to elastic shear resultants (n_joints, n) [N]."""
+        springs = sparse.diags(self.points.shear_spring)
+        return (self.summation_matrices[0] @ springs @ self.slip).tocsr()
+
+    def projected(self, basis: sparse.csr_matrix) -> Self:
+        """Return the joint operator in the coordinates of a basis, G B.
+
+        Args:
+            basis: B, its columns in the present coordinates (n, m).
+        """
+        return replace(self, opening=self.opening @ basis, slip=self.slip @ basis)
+
+    @property
+    def memory(self) -> Array:
+        """Irreversible slip of each point (p,) [m], then flags of broken bonds, if any (2 p,)."""
+        slip = self._slip_memory
+        return slip if self.bonds is None else np.concatenate([slip, self.bonds.broken])
+
+    @property
+    def _slip_memory(self) -> Array:
+        """Irreversible slip, zeros included (p,) [m]."""
+        if self.irreversible_slip is None:
+            return np.zeros(len(self.points.offset))
+        return self.irreversible_slip
+
+    def with_memory(self, memory: Array) -> "JointOperator":
+        """Return the joint operator with another memory.
 
         Args:
             memory: as `memory` (p,) or (2 p,).
         """
-        slid, broken = np.split(memory, [len(self.points.arm)])
+        slip, broken = np.split(memory, [len(self.points.offset)])
         return replace(
-            self, slid=slid if slid.any() else None, broken=broken if broken.any() else None
+            self,
+            irreversible_slip=slip if slip.any() else None,
+            broken=broken if broken.any() else None,
         )
 
     @cached_property
     def bonds(self) -> Bonds | None:
-        """Bonds of the points; None where none has tensile strength."""
+        """Bonds of the points; None without tensile strength at any point."""
         if self.points.tension is None:
             return None
-        return Bonds(self.law, np.zeros_like(self._slid) if self.broken is None else self.broken)
+        broken = np.zeros(len(self.points.offset)) if self.broken is None else self.broken
+        return Bonds(self.law, broken)
 
     @cached_property
-    def ridden(self) -> Array | None:
-        """How far teeth have raised each point (p,) [m]; None where they have not."""
-        return None if self.slid is None else ridden(self.points, self.slid)
+    def dilatancy_opening(self) -> Array | None:
+        """Opening of each point by dilatancy (p,) [m]; None for zero."""
+        if self.irreversible_slip is None:
+            return None
+        return dilatancy_opening(self.points, self.irreversible_slip)
 
-    def felt(self, q: Array, raised: Array | None = None) -> Array:
-        """Return the gaps that the normal law sees, less what teeth and bonds shift (p,) [m].
+    def effective_gaps(self, q: Array, dilatancy: Array | None = None) -> Array:
+        """Return the gaps of the normal law, less dilatancy and the stretch of bonds (p,) [m].
 
         Args:
             q: coordinates (n,).
-            raised: how far teeth raise each point (p,) [m]; by default as it is remembered.
+            dilatancy: opening by dilatancy (p,) [m]; by default that of the memory.
         """
-        gaps, raised = self.openings(q), self.ridden if raised is None else raised
-        gaps = gaps if raised is None else gaps - raised
+        gaps = self.openings(q)
+        dilatancy = self.dilatancy_opening if dilatancy is None else dilatancy
+        gaps = gaps if dilatancy is None else gaps - dilatancy
         return gaps if self.bonds is None else gaps - self.bonds.stretch
 
-    def elastic(self, q: Array) -> Array:
-        """Return the shear forces at the points if nothing slid any further (p,) [N].
+    def trial_shear(self, q: Array) -> Array:
+        """Return the shear forces at the points without further slip (p,) [N].
 
         Args:
             q: coordinates (n,).
         """
         slips = self.slips(q)
-        return self.points.shear * (slips if self.slid is None else slips - self.slid)
+        elastic = slips if self.irreversible_slip is None else slips - self.irreversible_slip
+        return self.points.shear_spring * elastic
 
-    def limits(self, normal: Array, closed: Array) -> Array:
-        """Return Coulomb's limit of the shear at the points; 0 where one never slides (p,) [N].
+    def coulomb_limit(self, normal: Array, closed: Array) -> Array:
+        """Return Coulomb's limit of the shear force at the points, μ |N| + c A (p,) [N].
 
         Args:
             normal: forces of the normal law, without the pull of bonds (p,) [N].
-            closed: area on which each point is closed (p,) [m²].
+            closed: closed area of each point (p,) [m²].
+
+        Returns:
+            The limit, 0 where a point never slides.
         """
         slides, points = self.points.slides, self.points
-        found: Array = self._cohesion * closed
-        found[slides] -= points.friction[slides] * normal[slides]
-        return np.where(slides, found, 0.0)
+        limit = self._shifted_cohesion * closed
+        limit[slides] -= points.friction[slides] * normal[slides]
+        return np.where(slides, limit, 0.0)
 
     @property
-    def _cohesion(self) -> Array:
+    def _shifted_cohesion(self) -> Array:
+        """Cohesion beside the effective gaps (p,) [Pa]."""
         return self.points.cohesion if self.bonds is None else self.bonds.cohesion
 
-    def pulled(self, normal: Array) -> Array:
+    def add_bond_pull(self, normal: Array) -> Array:
         """Return normal forces with the pull of bonds (p,) [N].
 
         Args:
@@ -123,160 +216,26 @@ class JointOperator(JointKinematics):
         """
         return normal if self.bonds is None else normal + self.bonds.pull
 
-    def tractions(self, q: Array) -> tuple[Array, Array]:
+    def point_forces(self, q: Array) -> tuple[Array, Array]:
         """Return normal and shear forces at the points, each (p,) [N].
 
         Args:
             q: coordinates (n,).
         """
-        opening, shear = self.felt(q), self.elastic(q)
-        normal = self.law.forces(opening)
-        if not self.slides:
-            return self.pulled(normal), shear
-        limit = self.limits(normal, self.law.closed(opening))
-        return self.pulled(normal), np.where(self.points.slides, held(shear, limit), shear)
+        gaps, shear = self.effective_gaps(q), self.trial_shear(q)
+        normal = self.law.forces(gaps)
+        if self.slides:
+            limit = self.coulomb_limit(normal, self.law.closed_area(gaps))
+            shear = np.where(self.points.slides, clip_to_friction(shear, limit), shear)
+        return self.add_bond_pull(normal), shear
 
     def force(self, q: Array) -> Array:
-        """Return the generalised forces that the joints exert, as internal forces (n,).
+        """Return the generalised forces of the joints, as internal forces (n,).
 
         Args:
             q: coordinates (n,).
         """
-        return self.pushed(*self.tractions(q))
-
-    def energy(self, q: Array) -> float:
-        """Return the energy stored in the joints if nothing slid any further [J].
-
-        Args:
-            q: coordinates (n,).
-        """
-        opening, shear = self.felt(q), self.elastic(q)
-        stored = opening @ self.law.forces(opening) + shear @ (shear / self.points.shear)
-        return 0.5 * float(stored) + self.tearing(opening)
-
-    def across(self, gaps: Array) -> float:
-        """Return the energy stored across the joints [J].
-
-        Args:
-            gaps: less what teeth raise (p,) [m].
-        """
-        felt = gaps if self.bonds is None else gaps - self.bonds.stretch
-        return 0.5 * float(felt @ self.law.forces(felt)) + self.tearing(felt)
-
-    def tearing(self, felt: Array) -> float:
-        """Return what bonds add to the energy stored across the joints [J].
-
-        Args:
-            felt: gaps that the normal law sees (p,) [m].
-        """
-        return 0.0 if self.bonds is None else float(self.bonds.stored(felt).sum())
-
-    def remembered(self, q: Array) -> Array:
-        """Return what the joints remember once they are at rest at q, as `memory`.
-
-        Of bonds that are torn those break first where each joint gapes most: what they held goes to
-        the others, which may bear it.
-
-        Args:
-            q: coordinates (n,).
-        """
-        excess = self.elastic(q) - self.tractions(q)[1]
-        if self.bonds is None:
-            return self.slid_by(excess)
-        felt = self.felt(q)
-        limit = self.limits(self.law.forces(felt), self.law.closed(felt))
-        return self.further(self.bonds.worst(felt), excess, limit)
-
-    def slid_by(self, excess: Array) -> Array:
-        """Return how far each point has slid for good at the end of a step (p,) [m].
-
-        Args:
-            excess: shear that friction did not hold on the way (p,) [N].
-        """
-        slid: Array = self._slid + np.where(self.points.slides, excess / self.points.shear, 0.0)
-        return slid
-
-    def further(self, torn: Status, excess: Array, limit: Array) -> Array:
-        """Return what joints with bonds remember at the end of a step, as `memory` (2 p,).
-
-        Args:
-            torn: which bonds are pulled apart (p,).
-            excess: shear that friction did not hold on the way (p,) [N].
-            limit: of the shear (p,) [N].
-        """
-        assert self.bonds is not None
-        over = np.where(self.points.slides, excess, 0.0)
-        return np.concatenate([self.slid_by(excess), self.bonds.after(torn, over, limit)])
-
-    def status(self, q: Array) -> Status:
-        """Return which points are closed (p,).
-
-        Args:
-            q: coordinates (n,).
-        """
-        return is_closed(self.felt(q))
-
-    def stiffness(self, q: Array) -> Array:
-        """Return the numbers on which the tangent depends, as `tangents` takes them (m,) [N/m].
-
-        Args:
-            q: coordinates (n,).
-        """
-        opening, points = self.felt(q), self.points
-        across = self.law.stiffness(opening)
-        if not self.slides:
-            return np.concatenate([across, points.shear])
-        normal, shear = self.law.forces(opening), self.elastic(q)
-        closed = self.law.closed(opening)
-        limit = (1.0 + TOUCHING) * self.limits(normal, closed)
-        over = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
-        sign = np.where(over, np.sign(shear), 0.0)
-        left = np.where(limit > 0.0, SLIDING, 0.0)  # nothing where it is open
-        along = np.where(over, left, 1.0) * points.shear
-        coupled = self.limit_rates(across, self.law.closed_rate(opening), sign)
-        return np.concatenate([across, along, coupled])
-
-    def limit_rates(self, across: Array, closed: Array, rate: Array) -> Array:
-        """Return the derivative of shear by opening through Coulomb's limit, of each of `entries`.
-
-        Args:
-            across: derivative of normal forces, for each of `entries` (m,) [N/m].
-            closed: derivative of closed areas (m,) [m].
-            rate: of the shear by its limit (p,) [-].
-        """
-        row = self.law.entries[0]
-        friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
-        coupled: Array = rate[row] * (self._cohesion[row] * closed - friction * across)
-        return coupled
-
-    def answered(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
-        """Return the forces at the points that answer small gaps, each (p,) [N].
-
-        Args:
-            stiffness: as by `stiffness` or `glued` (m,) [N/m].
-            gaps: opening and slip at the points (2, p) [m].
-        """
-        first, second = self.law.entries
-        across, along, coupled = np.split(stiffness, [len(first), len(first) + len(gaps[0])])
-        normal, shear = np.zeros_like(gaps[0]), along * gaps[1]
-        np.add.at(normal, first, across * gaps[0][second])
-        if self.slides:
-            np.add.at(shear, first, coupled * gaps[0][second])
-        return normal, shear
-
-    def bonded(self, gaps: Array) -> tuple[Array, Array]:
-        """Return the forces at the points if joints held tension and nothing slid, each (p,) [N].
-
-        Args:
-            gaps: opening and slip at the points (2, p) [m].
-        """
-        return self.answered(self.glued(), gaps)
-
-    def glued(self) -> Array:
-        """Return what `stiffness` is where all is closed and nothing slides (m,) [N/m]."""
-        across = self.law.stiffness(np.full(len(self.points.arm), -1.0))
-        parts = [across, self.points.shear]
-        return np.concatenate([*parts, np.zeros_like(across)] if self.slides else parts)
+        return self.generalised_force(*self.point_forces(q))
 
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint (n_joints, 3) [N, N, N m].
@@ -286,27 +245,196 @@ class JointOperator(JointKinematics):
         Args:
             q: coordinates (n,).
         """
-        return self.summed(*self.tractions(q))
+        return self.sum_resultants(*self.point_forces(q))
 
-    def spanned(self, whole: Sequence[bool]) -> "JointOperator":
-        """Return one facet instead of several on each joint whose faces stay plane.
+    def energy(self, q: Array) -> float:
+        """Return the energy stored in the joints without further slip [J].
+
+        Args:
+            q: coordinates (n,).
+        """
+        gaps, shear = self.effective_gaps(q), self.trial_shear(q)
+        stored = gaps @ self.law.forces(gaps) + shear @ (shear / self.points.shear_spring)
+        return 0.5 * float(stored) + self._bond_energy(gaps)
+
+    def normal_energy(self, gaps: Array) -> float:
+        """Return the energy stored across the joints [J].
+
+        Args:
+            gaps: gaps less dilatancy (p,) [m].
+        """
+        gaps = gaps if self.bonds is None else gaps - self.bonds.stretch
+        return 0.5 * float(gaps @ self.law.forces(gaps)) + self._bond_energy(gaps)
+
+    def _bond_energy(self, gaps: Array) -> float:
+        """Return the energy of the bonds' pull, from effective gaps [J]."""
+        return 0.0 if self.bonds is None else float(self.bonds.stored_energy(gaps).sum())
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the memory once the joints are at rest at q, as `memory`.
+
+        Of bonds beyond their strength, those at the largest gap of each joint break first: their
+        force goes to the others, which may carry it.
+
+        Args:
+            q: coordinates (n,).
+        """
+        excess = self.trial_shear(q) - self.point_forces(q)[1]
+        if self.bonds is None:
+            return self.updated_slip(excess)
+        gaps = self.effective_gaps(q)
+        limit = self.coulomb_limit(self.law.forces(gaps), self.law.closed_area(gaps))
+        return self.updated_bond_memory(self.bonds.most_exceeded(gaps), excess, limit)
+
+    def updated_slip(self, excess: Array) -> Array:
+        """Return the irreversible slip of each point at the end of a step (p,) [m].
+
+        Args:
+            excess: shear force beyond the limit during the step (p,) [N].
+        """
+        slip = np.where(self.points.slides, excess / self.points.shear_spring, 0.0)
+        return self._slip_memory + slip
+
+    def updated_bond_memory(self, exceeded: Flags, excess: Array, limit: Array) -> Array:
+        """Return the memory of joints with bonds at the end of a step, as `memory` (2 p,).
+
+        Args:
+            exceeded: whether each bond is beyond its strength (p,).
+            excess: shear force beyond the limit during the step (p,) [N].
+            limit: Coulomb's limit (p,) [N].
+        """
+        assert self.bonds is not None
+        sliding = np.where(self.points.slides, excess, 0.0)
+        broken = self.bonds.broken_after(exceeded, sliding, limit)
+        return np.concatenate([self.updated_slip(excess), broken])
+
+    def closed_points(self, q: Array) -> Flags:
+        """Return which points are closed (p,).
+
+        Args:
+            q: coordinates (n,).
+        """
+        return is_closed(self.effective_gaps(q))
+
+    def stiffness(self, q: Array) -> Array:
+        """Return the point stiffnesses on which the tangent depends, for `tangent_map` (m,) [N/m].
+
+        They are the derivatives of normal forces by gaps for each coupled pair of points, of shear
+        forces by slips for each point, and, if any point slides, of shear forces by gaps for each
+        coupled pair.
+
+        Args:
+            q: coordinates (n,).
+        """
+        gaps, points = self.effective_gaps(q), self.points
+        across = self.law.stiffness(gaps)
+        if not self.slides:
+            return np.concatenate([across, points.shear_spring])
+        normal, shear = self.law.forces(gaps), self.trial_shear(q)
+        closed = self.law.closed_area(gaps)
+        limit = (1.0 + SLIP_LIMIT_TOLERANCE) * self.coulomb_limit(normal, closed)
+        slides = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
+        sign = np.where(slides, np.sign(shear), 0.0)
+        # A sliding point retains a small part of its elastic stiffness: a body that slides at all
+        # its joints would be free, though it holds as soon as it moves back. Open points have none.
+        residual = np.where(limit > 0.0, 1e-9, 0.0)
+        along = np.where(slides, residual, 1.0) * points.shear_spring
+        coupled = self.friction_coupling(across, self.law.closed_area_rate(gaps), sign)
+        return np.concatenate([across, along, coupled])
+
+    def friction_coupling(self, across: Array, closed: Array, rate: Array) -> Array:
+        """Return the derivative of shear by gaps through Coulomb's limit, for coupled pairs.
+
+        Args:
+            across: derivative of normal forces (m,) [N/m].
+            closed: derivative of closed areas (m,) [m].
+            rate: derivative of the shear by its limit (p,) [-].
+
+        Returns:
+            Derivatives (m,) [N/m].
+        """
+        row = self.law.coupled_pairs[0]
+        friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
+        return rate[row] * (self._shifted_cohesion[row] * closed - friction * across)
+
+    def linear_forces(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
+        """Return normal and shear forces at the points from point stiffnesses, each (p,) [N].
+
+        Args:
+            stiffness: as by `stiffness` or `closed_stiffness` (m,) [N/m].
+            gaps: opening and slip at the points (2, p) [m].
+        """
+        first, second = self.law.coupled_pairs
+        across, along, coupled = np.split(stiffness, [len(first), len(first) + len(gaps[0])])
+        normal, shear = np.zeros_like(gaps[0]), along * gaps[1]
+        np.add.at(normal, first, across * gaps[0][second])
+        if self.slides:
+            np.add.at(shear, first, coupled * gaps[0][second])
+        return normal, shear
+
+    def closed_forces(self, gaps: Array) -> tuple[Array, Array]:
+        """Return normal and shear forces with all joints closed and no slip, each (p,) [N].
+
+        Args:
+            gaps: opening and slip at the points (2, p) [m].
+        """
+        return self.linear_forces(self.closed_stiffness(), gaps)
+
+    def closed_stiffness(self) -> Array:
+        """Return the point stiffnesses with all joints closed and no slip (m,) [N/m]."""
+        across = self.law.stiffness(np.full(len(self.points.offset), -1.0))
+        parts = [across, self.points.shear_spring]
+        return np.concatenate([*parts, np.zeros_like(across)] if self.slides else parts)
+
+    def tangent_map(self, pattern: Pattern) -> sparse.csr_matrix:
+        """Return the matrix from point stiffnesses to the entries of the tangent (nnz, m).
+
+        Args:
+            pattern: sparsity pattern of the tangent.
+        """
+        first, second = self.law.coupled_pairs
+        maps = [
+            pattern.outer_product_map(self.opening[first], self.opening[second]),
+            pattern.outer_product_map(self.slip, self.slip),
+        ]
+        if self.slides:
+            maps.append(pattern.outer_product_map(self.slip[first], self.opening[second]))
+        return sparse.hstack(maps, "csr")
+
+    def coupling_pattern(self) -> sparse.csr_matrix:
+        """Return a matrix with an entry wherever the tangent may have one (n, n)."""
+        # products of ones: no entries cancel
+        first, second = self.law.coupled_pairs
+        opening, slip = _ones(self.opening), _ones(self.slip)
+        pattern = opening[first].T @ opening[second] + slip.T @ slip
+        if self.slides:
+            pattern = pattern + slip[first].T @ opening[second]
+        return pattern.tocsr()
+
+    def with_plane_joints(self, plane: Sequence[bool]) -> "JointOperator":
+        """Return a joint operator with one facet instead of several on joints with plane faces.
 
         Only for `Facets`: the first and the last point of the joint become the facet's ends.
 
         Args:
-            whole: whether they stay plane, for each joint (n_joints,).
+            plane: whether the faces of each joint stay plane (n_joints,).
         """
         points = self.points
-        first = np.searchsorted(points.joint, np.arange(points.count))
+        first = np.searchsorted(points.joint, np.arange(points.joint_count))
         last = np.append(first[1:], len(points.joint)) - 1
         rows, weight = [], points.weight.copy()
-        for joint, plane in enumerate(whole):
-            own = np.arange(first[joint], last[joint] + 1)
-            if plane:
-                weight[[own[0], own[-1]]] = points.weight[own].sum() / 2.0
-                own = own[[0, -1]]
-            rows.append(own)
-        kept = np.concatenate(rows)
-        offset = None if self.offset is None else self.offset[:, kept]
-        chosen = Facets(points.chosen(kept, weight[kept]))
-        return JointOperator(chosen, self.opening[kept], self.slip[kept], offset)
+        for joint, is_plane in enumerate(plane):
+            of_joint = np.arange(first[joint], last[joint] + 1)
+            if is_plane:
+                weight[of_joint[[0, -1]]] = points.weight[of_joint].sum() / 2.0
+                of_joint = of_joint[[0, -1]]
+            rows.append(of_joint)
+        selected = np.concatenate(rows)
+        offset = None if self.gap_offset is None else self.gap_offset[:, selected]
+        law = Facets(points.selected(selected, weight[selected]))
+        return JointOperator(law, self.opening[selected], self.slip[selected], offset)
+
+
+def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Return a matrix of ones wherever another stores an entry, zero or not."""
+    return sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), matrix.shape)

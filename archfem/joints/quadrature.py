@@ -1,33 +1,40 @@
-"""Rules that integrate the traction along a joint."""
+"""Quadrature of the tractions along a joint: rules on facets, and the points on all joints."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from archfem.arguments import among, whole
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem._validation import check_integer, is_one_of
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
 
-legendre: Any = np.polynomial.legendre
-"""Its functions have no types."""
+legendre: Any = np.polynomial.legendre  # without type annotations
 
-RULES = ("lobatto", "nodal", "gauss", "exact")
+Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
 class Quadrature:
-    """A rule on each facet of a joint.
+    """Define a quadrature rule on each facet of a joint.
 
     Near a hinge the outermost point is the lever arm, so a rule with points at the ends of the
-    joint (Lobatto, nodal) can reach |e| = 0.5 and a Gauss rule cannot.
+    joint (Lobatto, trapezoidal, nodal) can reach |e| = 0.5 and a Gauss rule cannot.
 
     Attributes:
-        rule: "lobatto" or "gauss"; "nodal": springs at the nodes, weighted by the trapezoidal
-            rule (degree 1) or Simpson's (degree 2), as in Demirel and Aldemir (2021); "exact":
-            the traction integrated in closed form, for facets along which the opening is linear.
-        points: points on a facet; None takes 3, for "nodal" those of the element, for "exact"
-            the two ends, which neighbouring facets then do not share.
+        rule: "lobatto" or "gauss"; "trapezoidal": n equidistant points, the ends with half the
+            weight of the others, 1 / (n - 1); "nodal": springs at the nodes of the element,
+            weighted by the trapezoidal rule (degree 1) or Simpson's (degree 2), as in Demirel and
+            Aldemir (2021); "exact": the traction integrated in closed form, for facets along which
+            the opening is linear.
+        points: number of points on a facet; None takes 3, for "trapezoidal" 2, for "nodal" those
+            of the element, for "exact" the two ends, which neighbouring facets then do not share.
+
+    Raises:
+        InvalidInput: the rule is unknown, or does not exist for this number of points.
 
     Example:
         >>> af.joints.Quadrature("lobatto").on_facet(1)[0].tolist()
@@ -38,68 +45,149 @@ class Quadrature:
     points: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown rules and impossible numbers of points."""
-        if not among(self.rule, RULES):
-            raise InvalidInput(f"quadrature {self.rule!r} is not known: use one of {RULES}")
-        if self.rule in ("nodal", "exact") and self.points is not None:
+        """Check the rule and its number of points."""
+        rules = ("lobatto", "trapezoidal", "nodal", "gauss", "exact")
+        if not is_one_of(self.rule, rules):
+            raise InvalidInput(f"quadrature {self.rule!r} is not known: use one of {rules}")
+        if self.points is None:
+            return
+        if self.rule in ("nodal", "exact"):
             raise InvalidInput(
                 f"{self.rule} quadrature has points of its own, not {self.points}: leave points out"
             )
-        least = 1 if self.rule == "gauss" else 2
-        if self.points is not None and not least <= whole(self.points, "quadrature points") <= 64:
+        minimum, maximum = (1 if self.rule == "gauss" else 2), 64
+        if not minimum <= check_integer(self.points, "quadrature points") <= maximum:
             raise InvalidInput(
-                f"{self.points} {self.rule} points on a facet: give between {least} and 64"
+                f"{self.points} {self.rule} points on a facet: give between {minimum} and {maximum}"
             )
 
     def count(self, degree: int) -> int:
         """Return the number of points on one facet.
 
         Args:
-            degree: of the element, which only the nodal rule asks for.
+            degree: polynomial degree of the element, used by the nodal rule only.
         """
         if self.rule == "exact":
             return 2
         if self.rule == "nodal":
             return degree + 1
-        return self.points or 3
+        return self.points or (2 if self.rule == "trapezoidal" else 3)
 
     def on_facet(self, degree: int) -> tuple[Array, Array]:
-        """Return points (p,) and weights (p,) on the interval from 0 to 1, in ascending order.
+        """Return points and weights on the interval from 0 to 1.
 
         Args:
-            degree: of the element, which only the nodal rule asks for.
+            degree: polynomial degree of the element, used by the nodal rule only.
+
+        Returns:
+            Points in ascending order (p,) and weights (p,), both [-].
         """
         n = self.count(degree)
+        if self.rule == "trapezoidal":
+            weights = np.full(n, 1.0 / (n - 1))
+            weights[[0, -1]] *= 0.5
+            return np.linspace(0.0, 1.0, n), weights
         points, weights = legendre.leggauss(n) if self.rule == "gauss" else _lobatto(n)
         return 0.5 * (1.0 + points), 0.5 * weights
 
     def on_joint(self, breaks: Array, degree: int = 1) -> tuple[Array, Array]:
-        """Points and weights on a joint made of several facets.
+        """Return points and weights on a joint made of several facets.
 
-        Points that two neighbouring facets share are given once, with both weights.
+        A point shared by two neighbouring facets occurs once, with the sum of both weights.
 
         Args:
             breaks: ends of the facets along the joint (f + 1,), ascending [m].
-            degree: degree of the element, which only the nodal rule asks for.
+            degree: polynomial degree of the element, used by the nodal rule only.
 
         Returns:
             Points (p,) and weights (p,), both in the unit of `breaks`.
         """
-        unit, share = self.on_facet(degree)
+        unit, weight = self.on_facet(degree)
         lengths = np.diff(breaks)[:, None]
-        stride = len(unit) - (self.rule in ("lobatto", "nodal"))  # these share their end points
+        shares_ends = self.rule in ("lobatto", "trapezoidal", "nodal")
+        stride = len(unit) - shares_ends
         number = stride * np.arange(len(lengths))[:, None] + np.arange(len(unit))
         points = np.empty(number[-1, -1] + 1)
         weights = np.zeros_like(points)
         points[number] = breaks[:-1, None] + lengths * unit
-        np.add.at(weights, number, lengths * share)
+        np.add.at(weights, number, lengths * weight)
         return points, weights
 
 
 def _lobatto(n: int) -> tuple[Array, Array]:
-    """Gauss-Lobatto points and weights on [-1, 1]: the ends and the roots of P'_{n-1}."""
+    """Return Gauss-Lobatto points and weights on [-1, 1]: the ends and the roots of P'_{n-1}."""
     polynomial = np.zeros(n)
     polynomial[-1] = 1.0
     inner = legendre.legroots(legendre.legder(polynomial)) if n > 2 else np.array([])
     points = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
     return points, 2.0 / (n * (n - 1) * legendre.legval(points, polynomial) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class JointPoints:
+    """Quadrature points on the joints of a structure."""
+
+    joint: Numbers  # number of each point's joint (p,)
+    offset: Array  # distance from the joint's mid-depth toward the extrados (p,) [m]
+    weight: Array  # joint area of each point, width included (p,) [m²]
+    normal_stiffness: Array  # k_n (p,) [Pa/m]
+    shear_stiffness: Array  # k_s (p,) [Pa/m]
+    friction: Array  # coefficient μ, infinite where a point never slides (p,) [-]
+    cohesion: Array  # c (p,) [Pa]
+    joint_count: int
+    dilatancy: Array | None = None  # tan ψ (p,) [-]; None without dilatancy at any point
+    tension: Array | None = None  # tensile strength f_t (p,) [Pa]; None without bonds
+
+    @classmethod
+    def on(cls, structure: Structure, rules: list[tuple[Array, Array]]) -> "JointPoints":
+        """Return points with the contact parameters of their joints, from rules for each joint."""
+        sizes = [len(offsets) for offsets, _ in rules]
+        joint = np.repeat(np.arange(len(rules)), sizes)
+        contacts = [joint.contact for joint in structure.joints]
+        return cls(
+            joint,
+            np.concatenate([offsets for offsets, _ in rules]),
+            np.concatenate([lengths for _, lengths in rules]) * structure.width,
+            np.array([contact.normal_stiffness for contact in contacts])[joint],
+            np.array([contact.shear_stiffness for contact in contacts])[joint],
+            np.array([contact.coefficient for contact in contacts])[joint],
+            np.array([contact.cohesion for contact in contacts])[joint],
+            len(rules),
+            _spread_if_any([contact.dilatancy for contact in contacts], joint),
+            _spread_if_any([contact.tension for contact in contacts], joint),
+        )
+
+    def selected(self, rows: Numbers, weight: Array) -> "JointPoints":
+        """Return some of the points with other weights."""
+        return JointPoints(
+            self.joint[rows],
+            self.offset[rows],
+            weight,
+            self.normal_stiffness[rows],
+            self.shear_stiffness[rows],
+            self.friction[rows],
+            self.cohesion[rows],
+            self.joint_count,
+            None if self.dilatancy is None else self.dilatancy[rows],
+            None if self.tension is None else self.tension[rows],
+        )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether no point has dilatancy or a bond."""
+        return self.dilatancy is None and self.tension is None
+
+    @cached_property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether each point can slide (p,)."""
+        return np.isfinite(self.friction)
+
+    @cached_property
+    def shear_spring(self) -> Array:
+        """Elastic shear stiffness of each point (p,) [N/m]."""
+        return self.weight * self.shear_stiffness
+
+
+def _spread_if_any(values: list[float], joint: Numbers) -> Array | None:
+    """Return values of the joints at their points (p,); None where all are zero."""
+    return np.array(values)[joint] if any(values) else None

@@ -1,21 +1,88 @@
-"""Joint resultants and what follows from them: eccentricity, mobilised friction, thrust line.
+"""Joint resultants N, V, M, eccentricity, opening, rotation, slip, thrust line, and their tables.
 
 Signs: N > 0 is compression; M and eccentricity are positive toward the extrados; V is positive
 where the higher block is pushed toward the extrados by its slip.
+
+Faces of elastic blocks do not stay plane. Their opening and rotation are those of the plane nearest
+to the openings at the joint points, by least squares with the points' areas, and slip is the mean.
+For rigid blocks both are exact.
 """
+
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
 
-from archfem.arguments import instance
-from archfem.arrays import Array
+from archfem._files import atomic_write
+from archfem._typing import Array
+from archfem._validation import check_type
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import BONDED, Criteria, borne, flags, ratio_at_sliding
-from archfem.joints.faces import MEASURES, measures
-from archfem.masonry.naming import number_of
-from archfem.masonry.structure import Structure
+from archfem.joints.criteria import (
+    TENSION_COORDINATE,
+    Criteria,
+    failure_flags,
+    sliding_ratio,
+    tension_margin,
+)
+from archfem.joints.operator import JointOperator
+from archfem.masonry.structure import Structure, find_number
 
-UNITS = {
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Unit and meaning of the relative displacements of faces
+FACE_MEASURES = {
+    "opening": ("m", "largest gap between the faces, at the end that is more open; 0 where closed"),
+    "rotation": ("rad", "turn of the higher face, positive where it opens the intrados"),
+    "slip": ("m", "mean slip of the higher block, positive toward the extrados"),
+}
+
+
+def face_matrix(operator: JointOperator) -> tuple[sparse.csr_matrix, Array]:
+    """Return the matrix from coordinates to gap, rotation and slip of all joints, and its offset.
+
+    With g and s opening and slip at the points of a joint, r their offsets and w their areas,
+
+        min Σ w (g - g_0 + θ r)²  over g_0 and θ,      s_0 = Σ w s / Σ w,
+
+    so that θ > 0 opens the intrados, as the moment of a positive eccentricity does.
+    """
+    points = operator.points
+    mean, slope = _fit_matrices(points.joint, points.weight, points.offset, points.joint_count)
+    middle = mean - sparse.diags(mean @ points.offset) @ slope
+    fit = sparse.block_diag([sparse.vstack([middle, -slope]), mean], "csr")
+    matrix = fit @ sparse.vstack([operator.opening, operator.slip], "csr")
+    gaps = operator.gap_offset
+    gaps = np.zeros((2, len(points.offset))) if gaps is None else gaps
+    return matrix, np.asarray(fit @ gaps.ravel())
+
+
+def _fit_matrices(
+    joint: NDArray[np.intp], weight: Array, offset: Array, joint_count: int
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """Return matrices (n_joints, p) to the weighted mean over each joint and the slope along it."""
+    entries, shape = (joint, np.arange(len(joint))), (joint_count, len(joint))
+    total = np.bincount(joint, weight, joint_count)
+    mean = sparse.csr_matrix((weight / total[joint], entries), shape)
+    centred = offset - (mean @ offset)[joint]
+    inertia = np.bincount(joint, weight * centred**2, joint_count)[joint]
+    # zero slope of a joint with one point
+    slope = np.divide(weight * centred, inertia, np.zeros_like(centred), where=inertia > 0)
+    return mean, sparse.csr_matrix((slope, entries), shape)
+
+
+def face_measures(faces: Array, depth: Array) -> dict[str, Array]:
+    """Return what `FACE_MEASURES` names, from gaps at mid-depth, rotations and slips."""
+    gap, rotation, slip = np.moveaxis(faces, -2, 0)
+    opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
+    return {"opening": opening, "rotation": rotation, "slip": slip}
+
+
+# Unit and meaning of the resultants
+RESULTANT_UNITS = {
     "N": ("N", "normal force, compression positive"),
     "V": ("N", "shear force"),
     "M": ("N m", "moment about mid-depth, positive toward the extrados"),
@@ -24,18 +91,11 @@ UNITS = {
 }
 
 
-def ratios(resultants: Array, depth: Array) -> tuple[Array, Array]:
-    """Return eccentricity and mobilised friction of joints; undefined (NaN) where they are open.
-
-    Args:
-        resultants: N, V, M for the whole width (…, n_joints, 3) [N, N, N m].
-        depth: of the joints (n_joints,) [m].
-
-    Returns:
-        M / (N h) and |V| / N (…, n_joints) [-].
-    """
+def eccentricity_and_friction(resultants: Array, depth: Array) -> tuple[Array, Array]:
+    """Return eccentricity and mobilised friction of joints; undefined (NaN) where they are open."""
     normal, shear, moment = np.moveaxis(resultants, -1, 0)
-    pressed = np.where(normal * depth > 0.0, normal, np.nan)  # the least of numbers, halved, is 0
+    # the product: half the smallest positive number is zero
+    pressed = np.where(normal * depth > 0.0, normal, np.nan)
     return moment / (pressed * depth), np.abs(shear) / pressed
 
 
@@ -51,46 +111,45 @@ def joint_dataset(
     """Return labelled resultants, with eccentricity, mobilised friction and flags of failure.
 
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
-    without compression is open, unless a bond holds it: its eccentricity and friction are
-    undefined (NaN). Opening,
-    rotation and slip follow from displacements alone: `opening` is the largest gap between the
-    faces, at the end that is more open (0 where they touch all over), `rotation` the turn of the
-    higher face relative to the lower one, positive where it opens the intrados, `slip` the mean
-    displacement of the higher block along the joint, positive toward the extrados.
+    without compression is open, unless a bond carries tension: its eccentricity and friction are
+    undefined (NaN). Opening, rotation and slip follow from displacements alone: `opening` is the
+    largest gap between the faces, at the end that is more open (0 where they touch all over),
+    `rotation` the rotation of the higher face relative to the lower one, positive where it opens
+    the intrados, `slip` the mean displacement of the higher block along the joint, positive toward
+    the extrados.
 
     Args:
-        structure: whose joints they are.
+        structure: structure of the joints.
         resultants: N, V, M for the whole width, (n_joints, 3) or (steps, n_joints, 3)
             [N, N, N m].
         time: of the steps (steps,) [s], for the second shape.
-        criteria: by which joints fail; by default the usual ones.
+        criteria: failure criteria; by default `Criteria()`.
         faces: gaps at mid-depth, rotations and slips, as by `face_matrix`, (3, n_joints) or
-            (steps, 3, n_joints) [m, rad, m]; None where displacements are not known.
-        moved: whether the faces may have moved far: eccentricity is then from the middle of what
-            still lies over the other face, as a fraction of its length h - |slip|.
+            (steps, 3, n_joints) [m, rad, m]; None without displacements.
+        moved: whether displacements may be large: eccentricity is then from the middle of the
+            overlap of both faces, as a fraction of its length h - |slip|.
 
     Returns:
-        Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` where they
-        are known, and `flags` of failure, over joint, or over time and joint, with the joints'
-        names, parts, roles, depths, coefficients of friction and what cohesion holds, and whether
-        they are judged, as coordinates, and the criteria as attributes.
+        Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
+        is given, and `failure_flags`, over joint, or over time and joint; names, parts, roles,
+        depths, coefficients of friction and resistances by cohesion of the joints, and whether
+        they are assessed, as coordinates; the criteria as attributes.
     """
     dims = ("joint",) if time is None else ("time", "joint")
     depth, criteria = structure.depths, criteria or Criteria()
-    found = ratios(resultants, _overlap(depth, faces) if moved else depth)
-    values = zip(UNITS.items(), (*np.moveaxis(resultants, -1, 0), *found), strict=True)
-    variables = {
-        key: (dims, value, {"units": units, "long_name": words})
-        for (key, (units, words)), value in values
-    }
+    ratios = eccentricity_and_friction(resultants, _overlap(depth, faces) if moved else depth)
+    values = dict(zip(RESULTANT_UNITS, (*np.moveaxis(resultants, -1, 0), *ratios), strict=True))
     if faces is not None:
-        for key, value in measures(faces, depth).items():
-            units, words = MEASURES[key]
-            variables[key] = dims, value, {"units": units, "long_name": words}
+        values |= face_measures(faces, depth)
+    units = RESULTANT_UNITS | FACE_MEASURES
+    variables = {
+        key: (dims, value, {"units": units[key][0], "long_name": units[key][1]})
+        for key, value in values.items()
+    }
     laws = criteria.coefficients(structure.friction), criteria.cohesions(structure.cohesion)
-    limits = ratio_at_sliding(resultants[..., 0], found[0], *laws)
-    carried = borne(resultants[..., 0], structure.tension)
-    variables |= flags(dims, carried, found, limits, criteria.hinge)
+    limits = sliding_ratio(resultants[..., 0], ratios[0], *laws)
+    normal = tension_margin(resultants[..., 0], structure.tension)
+    variables |= failure_flags(dims, normal, ratios, limits, criteria.hinge)
     coordinates = {
         "joint": np.arange(len(structure.joints)),
         "name": ("joint", [joint.name for joint in structure.joints]),
@@ -102,27 +161,19 @@ def joint_dataset(
         "cohesion_limit": ("joint", structure.cohesion, {"units": "N"}),
     }
     if structure.tension.any():
-        coordinates[BONDED] = "joint", structure.tension, {"units": "Pa"}
+        coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return xr.Dataset(variables, coordinates, criteria.attributes)
 
 
 def _overlap(depth: Array, faces: Array | None) -> Array:
-    """Length over which the faces of joints lie on each other (…, n_joints) [m]."""
+    """Return the length over which the faces of joints overlap (…, n_joints) [m]."""
     return depth if faces is None else np.maximum(depth - np.abs(faces[..., 2, :]), 0.0)
 
 
 def check_instant(structure: Structure, joints: xr.Dataset) -> None:
-    """Refuse joints that are not of one instant of this structure.
-
-    Args:
-        structure: whose joints they should be.
-        joints: as made by `joint_dataset`.
-
-    Raises:
-        InvalidInput: they have several instants, or are of another structure.
-    """
+    """Refuse joints that are not of one instant of this structure."""
     if joints["N"].dims != ("joint",) or joints.sizes["joint"] != len(structure.joints):
         raise InvalidInput(
             f"joints have dimensions {dict(joints.sizes)}: give one instant of the "
@@ -130,32 +181,32 @@ def check_instant(structure: Structure, joints: xr.Dataset) -> None:
         )
 
 
-def one_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
-    """Return what is known of one joint, over time where the joints are.
+def select_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
+    """Return the variables of one joint, over time where the joints are.
 
     Args:
-        joints: as made by `joint_dataset`, all of them.
+        joints: of all joints, as made by `joint_dataset`.
         joint: name or number.
 
     Raises:
         InvalidInput: there is no such joint.
     """
     names = [str(name) for name in joints["name"].values]
-    return joints.isel(joint=number_of("joint", names, joint))
+    return joints.isel(joint=find_number("joint", names, joint))
 
 
 def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     """Return the points where the resultant crosses each joint, in space.
 
     Args:
-        structure: whose joints they are.
+        structure: structure of the joints.
         joints: as made by `joint_dataset`.
 
     Returns:
-        (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
+        Places (…, joint, axis) [m], axis "x", "y"; undefined (NaN) in an open joint.
 
     Raises:
-        InvalidInput: either is something else.
+        InvalidInput: an argument has another type.
 
     Example:
         >>> block = af.column(breadth=0.6, heights=[2.4])
@@ -163,12 +214,72 @@ def thrust_line(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
         >>> af.joints.thrust_line(block, pushed).values.round(6).tolist()
         [[0.3, 0.0]]
     """
-    instance(structure, Structure, "structure", "give that whose joints these are")
-    instance(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
+    check_type(structure, Structure, "structure", "give that whose joints these are")
+    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     middle, along = (
-        xr.DataArray(each, {"axis": ["x", "y"]}, ("joint", "axis"))
-        for each in (structure.middles, structure.tangents * structure.depths[:, None])
+        xr.DataArray(vectors, {"axis": ["x", "y"]}, ("joint", "axis"))
+        for vectors in (structure.middles, structure.tangents * structure.depths[:, None])
     )
     line = middle + joints["eccentricity"] * along
     line.attrs = {"units": "m", "long_name": "thrust line"}
     return line.transpose(..., "joint", "axis")
+
+
+def joint_table(joints: xr.Dataset) -> "pd.DataFrame":
+    """Return joint variables as a table with a row for each joint, at each instant if several.
+
+    Args:
+        joints: e.g. `run.joints`, `dead.joints` or `pushover.joints`.
+
+    Returns:
+        Columns `time` or other dimensions of the dataset, `joint` (its number), name, part and
+        role, and a column for each quantity, in its own unit.
+    """
+    others = [name for name in joints.dims if name != "joint"]
+    names = [name for name, values in joints.items() if set(values.dims) <= {*others, "joint"}]
+    numbered = joints[names]
+    if "joint" not in numbered.coords:
+        numbered = numbered.assign_coords(joint=range(joints.sizes["joint"]))
+    frame = numbered.to_dataframe(dim_order=[*others, "joint"]).reset_index()
+    first = [*others, "joint", *(key for key in ("name", "part", "role") if key in frame)]
+    return frame[[*first, *(key for key in frame if key not in first)]]
+
+
+def write_joint_table(joints: xr.Dataset, path: str | Path) -> Path:
+    """Write joint variables as a table.
+
+    Args:
+        joints: as for `joint_table`.
+        path: *.csv, *.parquet or *.xlsx; missing folders are created.
+
+    Returns:
+        The file.
+
+    Raises:
+        InvalidInput: the suffix is another one, the package that writes such files is not
+            installed, or there are more rows than a sheet has.
+    """
+    path, packages = Path(path), {".csv": "pandas", ".parquet": "pyarrow", ".xlsx": "openpyxl"}
+    if path.suffix not in packages:
+        raise InvalidInput(f"{path}: a table is written as {', '.join(packages)}")
+    table = joint_table(joints)
+    max_rows = 1_048_575  # of a sheet of Excel below its header
+    if path.suffix == ".xlsx" and len(table) > max_rows:
+        raise InvalidInput(
+            f"{len(table)} rows do not fit into a sheet of Excel, which has {max_rows}: write "
+            ".parquet or .csv, or fewer steps"
+        )
+    try:
+        with atomic_write(path) as draft:
+            if path.suffix == ".csv":
+                table.to_csv(draft, index=False)
+            elif path.suffix == ".parquet":
+                table.to_parquet(draft, index=False, engine="pyarrow")
+            else:
+                table.to_excel(draft, index=False, sheet_name="joints", engine="openpyxl")
+    except ImportError as error:
+        raise InvalidInput(
+            f"{path.suffix} is written with {packages[path.suffix]}, which is not installed: "
+            "pip install 'archfem[tables]', or write .csv"
+        ) from error
+    return path

@@ -1,4 +1,14 @@
-"""Limit analysis of rigid blocks: the load that turns a structure into a mechanism."""
+"""Limit analysis of rigid blocks: collapse factor and mechanism by the static theorem.
+
+The programme of `linear_programme` is set up by `backfill` and solved here; its dual is the
+mechanism. Warnings name strength that joints might not have: friction with the dilatancy of
+associated flow, dilatancy that is neglected, and cohesion of joints that are partly open.
+
+Faces of rigid blocks press on an elastic joint linearly, over c = 3 (h/2 - |e|) where the thrust is
+outside the middle third, at any stiffness. A gap transmits no shear, so cohesion acts on the
+closed part only, as in elastic joints. Limit analysis takes it over the whole joint; how much of
+it remains depends on where the thrust of the state is.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -8,26 +18,21 @@ from enum import StrEnum
 import numpy as np
 import xarray as xr
 
-from archfem.arrays import Array
-from archfem.joints.resultants import joint_dataset
-from archfem.limit.fill import Fill
-from archfem.limit.filled import Stones
-from archfem.limit.programme import Optimum, Programme
-from archfem.limit.sliding import WithoutDilatancy, without_dilatancy
-from archfem.limit.told import tell_of_cohesion, tell_of_dilatancy, tell_of_sliding
-from archfem.limit.weight import balanced, self_weight
-from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
+from archfem._display import ResultDisplay
+from archfem._typing import Array
+from archfem._validation import check_type
+from archfem.joints.resultants import check_instant, joint_dataset
+from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weight_programme
+from archfem.limit.linear_programme import Optimum, Programme
+from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
+from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
 from archfem.masonry.structure import Structure
-from archfem.shown import Shown
 
 logger = logging.getLogger("archfem")
 
-MOVING = 1e-6
-"""Least movement in a joint, relative to that of the fastest corner, that counts as movement."""
-
 
 class Outcome(StrEnum):
-    """How a limit analysis ends."""
+    """Outcome of a limit analysis."""
 
     COLLAPSES = "collapses"
     UNBOUNDED = "unbounded"
@@ -38,11 +43,11 @@ class Outcome(StrEnum):
 
     @property
     def sentence(self) -> str:
-        """What it means."""
-        return _SENTENCES[self]
+        """Meaning of the outcome, as a sentence."""
+        return _OUTCOME_SENTENCES[self]
 
 
-_SENTENCES = {
+_OUTCOME_SENTENCES = {
     Outcome.COLLAPSES: "the load turns it into a mechanism",
     Outcome.UNBOUNDED: "this load never overturns it",
     Outcome.INFEASIBLE: "it does not stand under its own weight",
@@ -53,27 +58,27 @@ _SENTENCES = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Collapse(Shown, picture="collapse.draw_found"):
-    """What limit analysis found.
+class Collapse(ResultDisplay):
+    """Result of a limit analysis: factor, joint forces and mechanism.
 
     Attributes:
         factor: multiple of the live load at collapse [-]; infinite where it never collapses,
-            undefined (NaN) where it does not stand. For a settlement, work that the weights do on
-            it [N m]: for a translation by 1 m, the thrust on the support along it, in N.
-        outcome: how the analysis ended; `outcome.sentence` says what that means.
+            undefined (NaN) where it does not stand. For a settlement, work of the weights on it
+            [N m]: for a translation by 1 m, the thrust on the support along it, in N.
+        outcome: how the analysis ended; `outcome.sentence` gives its meaning.
         hinges: joints that turn, with the face where the blocks stay in contact.
         sliding: numbers of the joints that slide.
-        joints: N, V, M and what follows, as made by `joint_dataset`, at the factor found; of one
+        joints: N, V, M and derived quantities, as made by `joint_dataset`, at the factor; of one
             state under self-weight where the factor is infinite, NaN where there is none.
-        motion: velocities of all blocks' centroids and rotations (n_blocks, 3), scaled so that
-            the fastest corner has 1 m/s, or those that follow a settlement. Zero where nothing
-            moves. Where it does not stand: how it falls under its own weight.
-        solutions: with sliding without dilatancy, what is known of all its solutions.
-        soil: where there is a fill, its pressure on each piece of a stone's face, between the least
-            and the most that it can be [Pa], with the number of the block, the piece's ends and the
-            sense of the pressure along x; else None.
-        live: the actions that grew, or the settlement that was followed.
-        structure: that was asked about; None where it is not known.
+        motion: velocities of all blocks' centroids and rotations (n_blocks, 3) [m/s, m/s, rad/s],
+            scaled so that the fastest corner has 1 m/s, or those that follow a settlement. Zero
+            where nothing moves. Where it does not stand: the motion of its fall under its weight.
+        solutions: bounds on all solutions where sliding is without dilatancy; else None.
+        soil: pressure of the fill on each piece of a stone's face, with its least and largest
+            possible values [Pa], the number of the block, the piece's ends and the sense of the
+            pressure along x; None without a fill.
+        live: the growing actions, or the settlement.
+        structure: the analysed structure; None where the result was built by hand.
     """
 
     factor: float
@@ -82,7 +87,7 @@ class Collapse(Shown, picture="collapse.draw_found"):
     sliding: tuple[int, ...]
     joints: xr.Dataset
     motion: Array
-    solutions: WithoutDilatancy | None = None
+    solutions: NonassociatedBounds | None = None
     soil: xr.Dataset | None = None
     live: tuple[BodyForce | PointLoad | Settlement, ...] = ()
     structure: Structure | None = None
@@ -97,19 +102,19 @@ class Collapse(Shown, picture="collapse.draw_found"):
         """Names of the joints that slide, in the order of `sliding`."""
         return tuple(str(self.joints["name"].values[joint]) for joint in self.sliding)
 
-    def _words(self) -> str:
-        """What it is, in a line or two."""
+    def _summary(self) -> str:
+        """Describe the result in one or two lines."""
         return f"Collapse: {self}"
 
     def __str__(self) -> str:
-        """Outcome, factor and failing joints, by number and name, in one line."""
+        """Describe outcome, factor and failing joints, by number and name, in one line."""
         turning = zip(self.hinges, self.hinge_names, strict=True)
         hinges = ", ".join(f"{j} ({name}) {side}" for (j, side), name in turning) or "none"
         slipping = zip(self.sliding, self.sliding_names, strict=True)
         sliding = ", ".join(f"{j} ({name})" for j, name in slipping) or "none"
-        words = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; "
-        known = "" if self.solutions is None else f"; {self.solutions}"
-        return f"{words}sliding {sliding}{known}"
+        text = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; "
+        solutions = "" if self.solutions is None else f"; {self.solutions}"
+        return f"{text}sliding {sliding}{solutions}"
 
 
 def collapse_factor(
@@ -133,12 +138,12 @@ def collapse_factor(
 
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
     not only on its closed part: the factor is an upper estimate where a joint with cohesion opens,
-    a warning says so, and `closed_cohesion` leaves it to what a given state has closed.
+    a warning says so, and `closed_cohesion` reduces it to the closed part of a given state.
     Joints with tensile strength are refused, since bonds break and do not yield. The dilatancy of
     contacts plays no part: sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and
-    a warning says so where the latter leaves it out.
+    a warning says so where the latter neglects it.
 
-    A *settlement* s asks another question: of all states of equilibrium under self-weight, the
+    A *settlement* s poses another problem: of all states of equilibrium under self-weight, the
     movement of a support selects the one that resists it least, and the factor is the work of the
     weights on it,
 
@@ -149,7 +154,7 @@ def collapse_factor(
 
     Args:
         structure: supports are its fixed blocks.
-        live: one action, or several that grow together; a `Settlement` comes alone.
+        live: one action, or several that grow together; a `Settlement` stands alone.
         friction: "coulomb" holds |V| <= c A + μ N with sliding that dilates (associated), so that
             with sliding joints the factor is an upper estimate and a warning is logged;
             "nonassociated" searches states whose joints slide without dilating for the weakest;
@@ -161,7 +166,7 @@ def collapse_factor(
             are cut into pieces (`jointed_fill`), whose joints have that strength.
 
     Returns:
-        The factor, how it was found, and the mechanism.
+        The factor, the outcome and the mechanism.
 
     Raises:
         InvalidInput: an option is unknown, an action misses the structure, joints have tensile
@@ -170,60 +175,19 @@ def collapse_factor(
 
     Note:
         The motion is one of the possible ones where several have the same factor. Without
-        associated flow factors are not unique: `solutions` of the result tells between which they
-        were found and between which all lie, and the factor is the least found, or for a settlement
-        the greatest work. Where none is found it is the proven bound, and the outcome says so.
+        associated flow factors are not unique: `solutions` of the result gives the range of those
+        from the search and the bounds of all. The factor is the least of the search, or for a
+        settlement the greatest work. Where the search has none it is the proven bound, and the
+        outcome says so.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
         (1978) 1853-1871. Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224.
     """
-    asked = (live,) if isinstance(live, Settlement) else tuple(loads(live))
-    weighed = self_weight(structure, friction, strength, fill)
-    return replace(_found(structure, weighed, live, friction), live=asked, structure=structure)
-
-
-def _found(
-    structure: Structure,
-    weighed: tuple[Stones, Programme],
-    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
-    friction: str | None,
-) -> Collapse:
-    """Return what `collapse_factor` found, as yet without its live actions."""
-    stones, dead = weighed
-    fall = dead.unbalanced()
-    if not balanced(fall, dead):
-        nothing = _unknown(fall)
-        return _result(stones, dead, Outcome.INFEASIBLE, np.nan, nothing)
-    support = None
-    if isinstance(live, Settlement):
-        support = np.zeros((len(stones.skeleton.blocks), 3))
-        support[stones.skeleton.blocks.index(live.place(structure))] = live.motion
-        asked, scale = _settled(dead, support), dead.blocks.force
-        ends = Outcome.SETTLES, Outcome.LOCKS
-    else:
-        asked, scale = dead.growing(stones.load(loads(live))), -1.0
-        ends = Outcome.COLLAPSES, Outcome.UNBOUNDED
-    found = associated = asked.solve()
-    known = None
-    if friction == "nonassociated":
-        tell_of_dilatancy(structure)
-        found, known = without_dilatancy(asked, associated, scale)
-    if found is None:
-        rest = replace(fall, coordinates=np.zeros_like(fall.coordinates))
-        if known is None or associated is None:
-            return replace(_result(stones, dead, ends[1], np.inf, rest), solutions=known)
-        return _bracketed(stones, dead, rest, known, support is None)
-    result = _result(stones, asked, ends[0], scale * found.value, found, support=support)
-    result = replace(result, solutions=known)
-    if not isinstance(live, Settlement):
-        stones.warn_of_sliding_fill(loads(live), result.factor)
-        failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
-        if friction is not None:
-            tell_of_cohesion(structure, tuple(failing), result.joints, result.factor)
-    if friction == "coulomb":
-        tell_of_sliding(result.sliding, result.sliding_names, result.factor)
-    return result
+    actions = (live,) if isinstance(live, Settlement) else tuple(list_loads(live))
+    stones, dead = self_weight_programme(structure, friction, strength, fill)
+    result = _solve_collapse(structure, stones, dead, live, friction)
+    return replace(result, live=actions, structure=structure)
 
 
 def stands(
@@ -233,13 +197,13 @@ def stands(
     strength: float | None = None,
     fill: Fill | None = None,
 ) -> bool:
-    """Tell whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
+    """Check whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
 
     The programme finds the least forces that would have to be added to the blocks' weights,
 
         min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N,
 
-    and the structure stands where that is nothing.
+    and the structure stands where they vanish.
 
     Args:
         structure: supports are its fixed blocks.
@@ -263,63 +227,204 @@ def stands(
         >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
         False
     """
-    _, dead = self_weight(structure, friction, strength, fill)
-    return balanced(dead.unbalanced(), dead)
+    _, dead = self_weight_programme(structure, friction, strength, fill)
+    return is_balanced(dead.minimise_residual(), dead)
 
 
-def _settled(dead: Programme, support: Array) -> Programme:
-    """Ask for the least work on a motion of the supports."""
-    gaps = dead.blocks.gaps(support)
-    return replace(dead, cost=np.concatenate([gaps[0], gaps[1], -gaps[2]]))
+def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
+    """Restrict the cohesion of joints to the part that is closed in a state.
+
+    Limit analysis of the result is that of joints which lose cohesion where they open, in this
+    state: give the last one of a pushover, and compare with the limit to which that tends.
+
+    Args:
+        structure: its joints have cohesion.
+        joints: N, V, M of a state of it, e.g. `push.joints.isel(step=-1)`.
+
+    Returns:
+        The same blocks; each joint has its cohesion times the closed part of its depth.
+
+    Raises:
+        InvalidInput: `joints` has several instants, or those of another structure.
+
+    Example:
+        >>> stone = af.Contact(1.48e9, 0.30e9, friction=0.3, cohesion=6e3)
+        >>> block = af.column(breadth=1.0, heights=[1.0], contact=stone)
+        >>> push = af.pushover(af.build(block, fidelity="rigid"), af.BodyForce(1.0))
+        >>> less = af.limit.closed_cohesion(block, push.joints.isel(step=-1))
+        >>> each = (push, *(af.collapse_factor(b, live=af.BodyForce(1.0)) for b in (less, block)))
+        >>> [round(found.factor, 4) for found in each]
+        [0.5172, 0.5172, 0.6]
+    """
+    check_type(structure, Structure, "structure", "give that whose joints these are")
+    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
+    check_instant(structure, joints)
+    fractions = closed_fractions(structure, joints["N"].values, joints["M"].values)
+    reduced = (
+        replace(
+            joint, contact=replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
+        )
+        for joint, part in zip(structure.joints, fractions, strict=True)
+    )
+    return replace(structure, joints=tuple(reduced))
 
 
-def _unknown(found: Optimum) -> Optimum:
-    """The same, of which forces are not known."""
-    sizes = found.forces.shape, found.unknowns.shape
-    forces, unknowns = (np.full(size, np.nan) for size in sizes)
-    return replace(found, forces=forces, unknowns=unknowns)
+def closed_fractions(structure: Structure, normal: Array, moment: Array) -> Array:
+    """Return the closed part of each joint, by a linear pressure; 0 without any (n_joints,)."""
+    pressed = normal > 0.0
+    eccentricity = np.abs(moment) / np.where(pressed, normal, 1.0) / structure.depths
+    return np.where(pressed, np.clip(3.0 * (0.5 - eccentricity), 0.0, 1.0), 0.0)
 
 
-def _bracketed(
-    stones: Stones, dead: Programme, rest: Optimum, known: WithoutDilatancy, least: bool
+def _solve_collapse(
+    structure: Structure,
+    stones: BlocksWithFill,
+    dead: Programme,
+    live: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
+    friction: str | None,
 ) -> Collapse:
-    """Return the safe end of the bracket, where no solution without dilatancy was found."""
-    logger.warning("no state without dilatancy was found; the factor is only a bound: %s", known)
-    bound = known.bracket[0 if least else 1]
-    state = _unknown(rest)
-    return replace(_result(stones, dead, Outcome.BRACKETED, bound, state), solutions=known)
+    """Return the result of `collapse_factor`, without its live actions."""
+    fall = dead.minimise_residual()
+    if not is_balanced(fall, dead):
+        return _read_result(stones, dead, Outcome.INFEASIBLE, np.nan, _without_forces(fall))
+    support = None
+    if isinstance(live, Settlement):
+        support = np.zeros((len(stones.rigid_regions.blocks), 3))
+        support[stones.rigid_regions.blocks.index(live.place(structure))] = live.motion
+        programme, scale = _settlement_programme(dead, support), dead.blocks.force_unit
+        bounded, unbounded = Outcome.SETTLES, Outcome.LOCKS
+    else:
+        programme, scale = dead.with_load_factor(stones.load(list_loads(live))), -1.0
+        bounded, unbounded = Outcome.COLLAPSES, Outcome.UNBOUNDED
+    optimum = associated = programme.solve()
+    solutions = None
+    if friction == "nonassociated":
+        warn_dilatancy(structure)
+        optimum, solutions = search_nonassociated(programme, associated, scale)
+    if optimum is None:
+        at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
+        if solutions is not None and associated is not None:
+            return _read_bound(stones, dead, at_rest, solutions, support is None)
+        result = _read_result(stones, dead, unbounded, np.inf, at_rest)
+        return replace(result, solutions=solutions)
+    result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
+    result = replace(result, solutions=solutions)
+    if not isinstance(live, Settlement):
+        stones.warn_of_sliding_fill(list_loads(live), result.factor)
+        failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
+        if friction is not None:
+            warn_cohesion(structure, tuple(failing), result.joints, result.factor)
+    if friction == "coulomb":
+        warn_sliding(result.sliding, result.sliding_names, result.factor)
+    return result
 
 
-def _result(
-    stones: Stones,
-    asked: Programme,
+def _settlement_programme(dead: Programme, support: Array) -> Programme:
+    """Return the programme of least work on a motion of the supports."""
+    intrados, extrados, slip = dead.blocks.gaps(support)
+    return replace(dead, force_cost=np.concatenate([intrados, extrados, -slip]))
+
+
+def _without_forces(optimum: Optimum) -> Optimum:
+    """Return the same mechanism with undefined forces (NaN)."""
+    sizes = optimum.forces.shape, optimum.unknowns.shape
+    forces, unknowns = (np.full(size, np.nan) for size in sizes)
+    return replace(optimum, forces=forces, unknowns=unknowns)
+
+
+def _read_bound(
+    stones: BlocksWithFill,
+    dead: Programme,
+    at_rest: Optimum,
+    solutions: NonassociatedBounds,
+    lower: bool,
+) -> Collapse:
+    """Return the safe end of the bracket, where the search without dilatancy has no state."""
+    logger.warning(
+        "no state without dilatancy was found; the factor is only a bound: %s", solutions
+    )
+    bound = solutions.bracket[0 if lower else 1]
+    result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
+    return replace(result, solutions=solutions)
+
+
+def _read_result(
+    stones: BlocksWithFill,
+    programme: Programme,
     outcome: Outcome,
     factor: float,
-    found: Optimum,
+    optimum: Optimum,
     support: Array | None = None,
 ) -> Collapse:
-    """Return the optimum read as joint resultants and as a motion of the whole's blocks.
-
-    A motion that follows a moving support keeps its size, any other is scaled.
-    """
-    structure, skeleton = asked.blocks.structure, stones.skeleton
-    motion = asked.blocks.motion(found.coordinates)
+    """Return joint resultants and the motion of all blocks of the structure from an optimum."""
+    blocks, regions = programme.blocks, stones.rigid_regions
+    motion = blocks.motion(optimum.multipliers)
+    # A motion that follows a moving support has its own size; any other one is scaled.
     if support is not None:
         motion = motion + support
     elif motion.any():
-        motion = motion / asked.blocks.reach(motion)
-    least = MOVING * asked.blocks.reach(motion)
-    intrados, extrados, slip = asked.blocks.gaps(motion)
-    slid = np.where(abs(slip) > 0.0, structure.friction, 0.0) * abs(slip)
-    apart = np.minimum(intrados, extrados) - slid > least
+        motion = motion / blocks.largest_displacement(motion)
+    least = 1e-6 * blocks.largest_displacement(motion)  # above the round-off of the programme
+    intrados, extrados, slip = blocks.gaps(motion)
+    dilation = np.where(abs(slip) > 0.0, blocks.structure.friction, 0.0) * abs(slip)
+    apart = np.minimum(intrados, extrados) - dilation > least
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
-        (skeleton.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")
+        (regions.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")
         for j in np.flatnonzero(turning)
     )
-    slides = tuple(skeleton.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
+    slides = tuple(regions.joints[j] for j in np.flatnonzero((abs(slip) > least) & ~apart))
     resultants = np.full((len(stones.whole.joints), 3), np.nan)
-    resultants[list(skeleton.joints)] = asked.blocks.resultants(found.forces)
+    resultants[list(regions.joints)] = blocks.resultants(optimum.forces)
     joints = joint_dataset(stones.whole, resultants)
-    moved, soil = skeleton.in_whole(motion), stones.soil(found.unknowns)
+    moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
     return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
+
+
+def warn_dilatancy(structure: Structure) -> None:
+    """Warn of contact dilatancy that sliding without dilatancy neglects."""
+    steepest = max(joint.contact.dilatancy for joint in structure.joints)
+    if steepest > 0.0:
+        logger.warning(
+            "joints dilate by up to %.3g, which friction='nonassociated' neglects: the factor is "
+            "that of joints which slide flat, 'coulomb' gives that of joints which dilate by μ",
+            steepest,
+        )
+
+
+def warn_sliding(sliding: Sequence[int], names: Sequence[str], factor: float) -> None:
+    """Warn of joints that slide and, by associated flow, dilate."""
+    if sliding:
+        logger.warning(
+            "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
+            "upper estimate; friction='nonassociated' does without it",
+            list(sliding),
+            ", ".join(names),
+            factor,
+        )
+
+
+def warn_cohesion(
+    structure: Structure,
+    failing: Sequence[int],
+    joints: xr.Dataset,
+    factor: float,
+    tolerance: float = 1e-6,
+) -> None:
+    """Warn of failing joints whose shear exceeds the strength of their closed part."""
+    normal, shear, moment = (joints[key].values for key in "NVM")
+    strength = structure.cohesion * closed_fractions(structure, normal, moment)
+    slides = np.isfinite(structure.friction)
+    strength[slides] += structure.friction[slides] * normal[slides]
+    limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion
+    beyond = slides & (np.abs(shear) > limit)
+    overstrained = [number for number in sorted(failing) if beyond[number]]
+    if overstrained:
+        logger.warning(
+            "%d joints such as '%s' fail partly open, held by cohesion on all their area: the "
+            "factor %.4g is an upper estimate; af.limit.closed_cohesion restricts it to the closed "
+            "part in a state, such as the end of a pushover",
+            len(overstrained),
+            structure.joints[overstrained[0]].name,
+            factor,
+        )

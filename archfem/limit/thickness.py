@@ -1,24 +1,17 @@
-"""The least thickness at which a family of structures stands."""
+"""Least thickness at which a family of structures stands, by bisection."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-from archfem.annotated import as_annotated
-from archfem.arguments import instance
+from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
+from archfem.limit.backfill import Fill
 from archfem.limit.collapse import stands
-from archfem.limit.fill import Fill
 from archfem.masonry.structure import Structure
 
-THINNEST = 1e-4
-"""Thickness at which the search for one that stands begins, relative to the structure's size."""
 
-LIMIT = 1e-9
-"""Relative width of the bracket of the thickness beyond which nothing can be built."""
-
-
-@as_annotated
+@validate_arguments
 def minimum_thickness(
     build: Callable[[float], Structure],
     *,
@@ -32,7 +25,7 @@ def minimum_thickness(
     The search doubles a very small thickness until one stands, and then halves the bracket.
 
     Args:
-        build: makes the structure of a given thickness [m].
+        build: function from a thickness [m] to the structure.
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
         fill: as for `collapse_factor`.
@@ -56,51 +49,51 @@ def minimum_thickness(
     if not 1e-9 <= tolerance < 1.0:
         raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-9 and 1")
 
-    def holds(thickness: float) -> bool:
+    def is_stable(thickness: float) -> bool:
         return stands(build(thickness), friction=friction, strength=strength, fill=fill)
 
-    low, high = _bracket(build, holds)
+    low, high = _find_bracket(build, is_stable)
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if holds(middle) else (middle, high)
+        low, high = (low, middle) if is_stable(middle) else (middle, high)
     return high
 
 
-def _bracket(
-    build: Callable[[float], Structure], holds: Callable[[float], bool]
+def _find_bracket(
+    build: Callable[[float], Structure], is_stable: Callable[[float], bool]
 ) -> tuple[float, float]:
-    """A thickness at which a family does not stand, and twice that, at which it does [m]."""
-    thin = THINNEST * _size(build)
-    if holds(thin):
+    """Return an unstable thickness and a stable one, at most twice as large [m]."""
+    thin = 1e-4 * _family_size(build)  # thinner than anything built: the search starts here
+    if is_stable(thin):
         raise InvalidInput(
             f"it stands at any thickness, even {thin:.3g} m: there is no least one to look for"
         )
     while True:
         try:
-            thick = holds(2.0 * thin)
+            if is_stable(2.0 * thin):
+                return thin, 2.0 * thin
         except InvalidStructure as error:
-            return thin, _thickest(build, holds, thin, error)
-        if thick:
-            return thin, 2.0 * thin
+            return thin, _largest_thickness(build, is_stable, thin, error)
         thin *= 2.0
 
 
-def _thickest(
+def _largest_thickness(
     build: Callable[[float], Structure],
-    holds: Callable[[float], bool],
+    is_stable: Callable[[float], bool],
     low: float,
     refusal: InvalidStructure,
+    tolerance: float = 1e-9,
 ) -> float:
-    """The greatest thickness that can be built, where twice a low one cannot; it must stand [m]."""
+    """Return the largest thickness up to twice `low` that can be built; it must stand [m]."""
     high = 2.0 * low
-    while high - low > LIMIT * high:
+    while high - low > tolerance * high:
         middle = 0.5 * (low + high)
         try:
             build(middle)
             low = middle
         except InvalidStructure as error:
             high, refusal = middle, error
-    if holds(low):
+    if is_stable(low):
         return low
     raise InvalidInput(
         f"no thickness makes it stand: {low:.6g} m does not, and no greater one can be built "
@@ -108,14 +101,14 @@ def _thickest(
     ) from refusal
 
 
-def _size(build: Callable[[float], Structure]) -> float:
-    """Size of the first member of a family that can be built, from the thickest down [m]."""
+def _family_size(build: Callable[[float], Structure]) -> float:
+    """Return the size of the thickest member that can be built, from 100 m down [m]."""
     for thickness in 10.0 ** np.arange(2, -7, -1):
         try:
             built = build(float(thickness))
         except InvalidStructure as error:
             refusal = error
             continue
-        instance(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
+        check_type(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
         return built.size
     raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")

@@ -1,23 +1,18 @@
-"""What stands and what acts on it: blocks, joints, materials, parts and their roles.
+"""Structures of blocks, joints and materials, and the loads on them.
 
-    block         `Block`: a plane body, its outline, area and centroid
-    structure     `Joint`, `Structure`: what touches, and what both form
-    materials     what blocks are made of and how they touch
-    roles         which parts are rings, piers or neither
-    actions       what acts besides self-weight: body forces, point loads, settlements
-    assembly      from blocks to a structure: joints wherever they touch
-    direction     which way a ring or a pier runs
-    fill          soft bodies cut into pieces with joints of their own
-    geometry      areas, centroids and sides of outlines in the plane
-    naming        things found by name or by number
-    overlaps      what outlines must not do
-    rigid_motion  how points of a block move with it
-    stages        in which a structure was built
-    softness      how soft a block is beside its joints
-    shapes        structures from a few lengths: rings, columns, bridges
-    survey        structures from drawings: GeoJSON and DXF outlines
+    assembly         joints from touching blocks
+    backfill         backfill cut into pieces with joints
+    block            Block, plane geometry, overlap checks
+    construction     construction stages
+    loads            BodyForce, PointLoad, Settlement
+    materials        Material, Contact, presets
+    parts            roles and axes of rings and piers
+    shapes           parametric structures: arches, columns, arcades and bridges from a few lengths
+    stiffness_ratio  block stiffness relative to its joints
+    structure        Joint, Structure, rigid motion, look-up by name
+    survey           structures from surveyed outlines in GeoJSON, DXF or gmsh files
 
-It imports from the ground only. Start reading at `structure`, then at `shapes`.
+Imports the support modules only. Start reading at `structure`, then at `shapes`.
 """
 
 import lazy_loader

@@ -1,25 +1,93 @@
-"""`Block`: a plane body of stone or soil, its outline, area and centroid."""
+"""Blocks: plane bodies with polygonal or annular outlines, their area and centroid."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from math import hypot
 
 import numpy as np
 
-from archfem.annotated import check_fields
-from archfem.arguments import unmasked
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem._validation import check_fields, check_unmasked
 from archfem.errors import InvalidStructure
-from archfem.masonry.geometry import (
-    area_of_polygon,
-    area_of_sector,
-    heights_of_arc,
-    heights_of_edges,
-    side_of_line,
-)
 from archfem.masonry.materials import Material
 
+
+def measure_polygon(points: Array) -> tuple[float, Array, float]:
+    """Compute area, centroid and polar moment of a polygon by triangles at its first vertex."""
+    a, b = points[1:-1] - points[0], points[2:] - points[0]
+    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = 0.5 * float(np.sum(twice))
+    if area <= 0.0:
+        return area, points[0], 0.0
+    arm = (twice @ (a + b)) / (6.0 * area)
+    about_first = float(np.sum(twice * np.sum(a * a + a * b + b * b, axis=1))) / 12.0
+    return area, points[0] + arm, about_first - area * float(arm @ arm)
+
+
+def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
+    """Compute area, centroid and polar moment of an annular sector."""
+    arm = points - centre
+    radii = np.sort(np.linalg.norm(arm[[0, 2]], axis=1))
+    bisector = arm.sum(axis=0) / np.linalg.norm(arm.sum(axis=0))
+    angle = abs(np.arctan2(arm[0, 0] * arm[1, 1] - arm[0, 1] * arm[1, 0], arm[0] @ arm[1]))
+    area = 0.5 * float(radii[1] ** 2 - radii[0] ** 2) * angle
+    reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
+    about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
+    return area, centre + reach * bisector, about_centre - area * reach**2
+
+
+def intersect_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[float]:
+    """Return the heights where a vertical line intersects straight edges of an outline."""
+    start, step = points, np.roll(points, -1, axis=0) - points
+    low, high = np.sort(np.stack([start[:, 0], start[:, 0] + step[:, 0]]), axis=0)
+    met = (low <= x) & (x <= high) & (high > low)
+    met[list(arcs)] = False
+    share = (x - start[met, 0]) / step[met, 0]
+    return (start[met, 1] + share * step[met, 1]).tolist()
+
+
+def intersect_arc(ends: Array, centre: Array, x: float) -> list[float]:
+    """Return the heights where a vertical line intersects an arc below half a circle."""
+    start, end = ends - centre
+    square = float(start @ start)
+    sense = np.sign(start[0] * end[1] - start[1] * end[0])
+    rise = np.sqrt(max(square - (x - centre[0]) ** 2, 0.0))
+    near = 1e-12 * square
+    heights = []
+    for y in (rise, -rise):
+        after = sense * (start[0] * y - start[1] * (x - centre[0]))
+        before = sense * ((x - centre[0]) * end[1] - y * end[0])
+        if min(after, before) >= -near and (x - centre[0]) ** 2 <= square + near:
+            heights.append(float(centre[1] + y))
+    return heights
+
+
+def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[int] = ()) -> int:
+    """Return on which side of a line an outline lies whose straight edges cover it (1 is left)."""
+    # An anticlockwise outline has its interior on the left: an edge in the direction of the line
+    # belongs to an outline on its left, an opposite one to an outline on its right.
+    (x, y), (x_end, y_end) = line.tolist()  # for few numbers, floats are faster than arrays
+    length = hypot(x_end - x, y_end - y)
+    t_x, t_y = (x_end - x) / length, (y_end - y) / length
+    moved = [(p_x - x, p_y - y) for p_x, p_y in points.tolist()]
+    along = [d_x * t_x + d_y * t_y for d_x, d_y in moved]
+    near_line = [abs(d_y * t_x - d_x * t_y) <= near for d_x, d_y in moved]
+    covered, side = 0.0, 0
+    for edge, (start, end) in enumerate(pairwise([*along, along[0]])):
+        low, high = min(start, end), max(start, end)
+        straight = edge not in arcs and near_line[edge] and near_line[edge + 1 - len(along)]
+        if not straight or high - low <= near:
+            continue
+        covered += max(min(high, length) - max(low, 0.0), 0.0)
+        if side == 0 and low < length - near and high > near:
+            side = 1 if end > start else -1
+    return side if abs(covered - length) <= 4.0 * near else 0
+
+
+# Coordinates x and y [m]
 Point = tuple[float, float]
-"""A place in the plane: x and y [m]."""
 
 
 @dataclass(frozen=True)
@@ -28,20 +96,20 @@ class Block:
 
     Attributes:
         outline: vertices in anticlockwise order [m].
-        material: what it is made of.
-        name: how a person finds it.
-        fixed: an abutment or foundation, which does not move of itself.
+        material: of the block.
+        name: in tables and messages.
+        fixed: whether it is an abutment or foundation, which moves by settlement only.
         corners: numbers of the four vertices between which a structured mesh is spanned, or None
             for an unstructured one. Cells *along* lie on the first and third of the four sides so
             made, cells *through the thickness* on the second and fourth.
         part: the part of the structure it belongs to, e.g. "arch" or "north pier".
         centre: where given, the first and third sides of the four-sided outline are arcs about
             this point, and the other two are radial: an annular sector.
-        role: of its part: "ring" or "pier", which are judged, or "other", which follows what
-            carries it. Where nothing of a part tells it, the structure fills it in by the words of
-            the part's name, and warns where they leave it open; without a name a part is a ring.
-        grain: whether it is one of many pieces that stand for a body which deforms and gives way
-            between them, as `jointed_fill` makes them.
+        role: of its part: "ring" or "pier", which are assessed, or "other", which follows its
+            support. By default the structure derives it from words of the part's name, with a
+            warning where these are ambiguous; a part without a name is a ring.
+        grain: whether it is one of many pieces that model a deformable body with joints, as
+            `jointed_fill` creates them.
     """
 
     outline: tuple[Point, ...]
@@ -55,8 +123,8 @@ class Block:
     grain: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse outlines that do not bound an area anticlockwise."""
-        unmasked(self.outline, f"outline of block '{self.name}'")
+        """Check that the outline bounds an area anticlockwise."""
+        check_unmasked(self.outline, f"outline of block '{self.name}'")
         check_fields(self)
         if len(self.outline) < 3 or not np.all(np.isfinite(self.outline)):
             raise InvalidStructure(
@@ -84,8 +152,7 @@ class Block:
         turn = np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end)
         angles = turn * np.linspace(0.0, 1.0, pieces + 1)[:, None]
         across = np.array([-start[1], start[0]])
-        points: Array = np.array(self.centre) + np.cos(angles) * start + np.sin(angles) * across
-        return points
+        return np.array(self.centre) + np.cos(angles) * start + np.sin(angles) * across
 
     def drawn(self, pieces: int = 16) -> Array:
         """Return the outline with each arc replaced by chords (n, 2) [m].
@@ -101,7 +168,7 @@ class Block:
 
     @cached_property
     def _drawn(self) -> dict[int, Array]:
-        """Outlines of so many chords an arc, as far as they were asked for."""
+        """Cached outlines by number of chords of an arc."""
         return {}
 
     def top(self, x: float) -> float | None:
@@ -114,9 +181,9 @@ class Block:
             The height, or None where the vertical misses the block.
         """
         arcs = () if self.centre is None else (0, 2)
-        met = heights_of_edges(self.points, x, arcs)
+        met = intersect_edges(self.points, x, arcs)
         for side in arcs:
-            met += heights_of_arc(self.points[side : side + 2], np.array(self.centre), x)
+            met += intersect_arc(self.points[side : side + 2], np.array(self.centre), x)
         return max(met, default=None)
 
     def side_of(self, line: Array, near: float) -> int:
@@ -129,14 +196,16 @@ class Block:
         Returns:
             1 for left, -1 for right, 0 where its edges do not cover the line.
         """
-        return side_of_line(self.points, line, near, arcs=() if self.centre is None else (0, 2))
+        return find_side_of_line(
+            self.points, line, near, arcs=() if self.centre is None else (0, 2)
+        )
 
     @cached_property
     def _measures(self) -> tuple[float, Array, float]:
         """Area, centroid, polar second moment of area about the centroid."""
         if self.centre is None:
-            return area_of_polygon(self.points)
-        return area_of_sector(self.points, np.array(self.centre))
+            return measure_polygon(self.points)
+        return measure_sector(self.points, np.array(self.centre))
 
     @property
     def area(self) -> float:
@@ -152,3 +221,53 @@ class Block:
     def polar_moment(self) -> float:
         """Polar second moment of area about the centroid [m⁴]."""
         return self._measures[2]
+
+
+# Depth of an overlap by round-off, relative to the size of all outlines
+OVERLAP_TOLERANCE = 1e-6
+
+
+def check_simple(outline: Array, name: str) -> None:
+    """Refuse an outline that crosses or touches itself."""
+    import shapely
+
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid:
+        raise InvalidStructure(
+            f"the outline of '{name}' crosses or touches itself "
+            f"({shapely.is_valid_reason(polygon)}): correct it there"
+        )
+
+
+def check_overlaps(
+    outlines: Sequence[Array],
+    names: Sequence[str],
+    slight: float = 0.0,
+    fixed: Sequence[bool] | None = None,
+) -> None:
+    """Refuse outlines that are the same or overlap."""
+    import shapely
+
+    near = OVERLAP_TOLERANCE * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    polygons = np.array([shapely.Polygon(points) for points in outlines])
+    a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+    still = np.zeros(len(polygons), dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
+    counted = (a < b) & ~(still[a] & still[b])
+    a, b = a[counted], b[counted]
+    common = shapely.intersection(polygons[a], polygons[b])
+    length = shapely.length(common)
+    depth = 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)
+    if not np.any(depth > near):
+        return
+    worst = int(np.argmax(depth > near))
+    first, second, both = a[worst], b[worst], common[worst]
+    if both.area > (1.0 - 1e-6) * max(polygons[first].area, polygons[second].area):
+        raise InvalidStructure(
+            f"'{names[first]}' and '{names[second]}' are the same: leave one out"
+        )
+    remedy = ", or raise snap above that" if depth[worst] < slight else ""
+    raise InvalidStructure(
+        f"'{names[first]}' and '{names[second]}' overlap by {1e4 * both.area:.3g} cm², about "
+        f"{1e3 * depth[worst]:.3g} mm deep at ({both.centroid.x:.3f}, {both.centroid.y:.3f}): "
+        f"correct their outlines{remedy}"
+    )

@@ -1,20 +1,15 @@
-"""What blocks are made of and how they touch, with the values of Demirel and Aldemir (2021)."""
+"""Block materials and joint contacts, with presets of Demirel and Aldemir (2021)."""
 
 from dataclasses import dataclass
 from math import inf
 
-from archfem.arguments import among, real
+from archfem._validation import check_number, is_one_of
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
-DENSITIES = (1000.0, 4000.0)
-"""Densities of soils and stones [kg/m³]; nothing that is built with has such a weight in N/m³."""
-
-WEAKEST = 1e3
-"""Compressive strength below which a number is a slip [Pa]."""
-
 
 def _require(holds: bool, what: str, remedy: str) -> None:
+    """Raise an error where a condition does not hold."""
     if not holds:
         raise InvalidInput(f"{what}: {remedy}")
 
@@ -27,8 +22,8 @@ class Material:
         young: Young's modulus [Pa].
         poisson: Poisson's ratio [-].
         unit_weight: weight per volume [N/m³].
-        strength: compressive strength [Pa], or None where it is not known.
-        name: what it is called in tables and files.
+        strength: compressive strength [Pa], or None where unknown.
+        name: in tables and files.
     """
 
     young: float
@@ -38,12 +33,12 @@ class Material:
     name: str = "material"
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a material, or can only be a wrong unit."""
+        """Check that the values are possible, which detects wrong units."""
         of = f"of '{self.name}'"
         for key in ("young", "poisson", "unit_weight"):
-            real(getattr(self, key), f"{key} {of}")
+            check_number(getattr(self, key), f"{key} {of}")
         if self.strength is not None:
-            real(self.strength, f"strength {of}")
+            check_number(self.strength, f"strength {of}")
         _require(
             1e3 <= self.young <= 1e13,
             f"young {self.young:.3g} Pa {of} is not between 1 kPa and 10 TPa",
@@ -60,41 +55,42 @@ class Material:
             "give a weight, not a density, in N/m³, e.g. 20 * kN",
         )
         _require(
-            not DENSITIES[0] <= self.unit_weight <= DENSITIES[1],
+            # no building material weighs 1 to 4 kN/m³, but soils and stones have such densities
+            not 1000.0 <= self.unit_weight <= 4000.0,
             f"unit_weight {self.unit_weight:.4g} N/m³ {of} is the number of a density in kg/m³",
             f"give a weight in N/m³: {self.unit_weight:.4g} kg/m³ have {self.unit_weight * G:.4g}",
         )
         _require(
-            self.strength is None or self.strength >= WEAKEST,
-            f"strength {self.strength} Pa {of} is below {WEAKEST:g} Pa, which nothing is built of",
-            "leave it out where it is not known",
+            self.strength is None or self.strength >= 1e3,
+            f"strength {self.strength} Pa {of} is below 1000 Pa, which no building material has",
+            "leave it out where it is unknown",
         )
 
 
 @dataclass(frozen=True)
 class Contact:
-    """How two faces touch along a joint: dry, or bonded by mortar until its bond breaks.
+    """Contact of two faces along a joint: dry, or bonded by mortar until the bond breaks.
 
-    Saw teeth: a point that has slid by s along a rough face rides up by tan ψ |s|, and comes down
-    where it slides back (Patton, Proc. 1st Congr. ISRM 1 (1966) 509-513). μ is the whole
-    resistance, in either sense, what the teeth add included: friction takes (μ - tan ψ) N |s| of
-    energy on the way up and (μ + tan ψ) N |s| on the way down.
+    Dilatancy by saw teeth: after a slip s a point of a rough face is raised by tan ψ |s|, and
+    lowered again as it slides back (Patton, Proc. 1st Congr. ISRM 1 (1966) 509-513). μ is the
+    total resistance in either direction, with the effect of the teeth. Friction dissipates
+    (μ - tan ψ) N |s| on the way up and (μ + tan ψ) N |s| on the way down.
 
-    A bond is brittle, point by point: it is linear elastic in tension up to f_t, and shear is held
-    up to μ |t_n| + c in compression, c - μ t_n in tension. Where either is exceeded it is broken
-    for good, and tensile strength and cohesion are both lost: the point goes on as a dry one of
-    friction μ (Itasca, 3DEC: Mohr-Coulomb joint model, whose residual values are zero). It is
-    looked at where each step of a load, or of time, ends.
+    A bond is brittle at each point. It is linear elastic in tension up to f_t; its shear limit is
+    μ |t_n| + c in compression and c - μ t_n in tension. Where either is exceeded, tensile strength
+    and cohesion are lost irreversibly, and the point is dry with friction μ (Itasca, 3DEC:
+    Mohr-Coulomb joint model with zero residual values). Breaking is checked at the end of each
+    load step or time step.
 
     Attributes:
         normal_stiffness: compression per closing of the joint, k_n [Pa/m].
         shear_stiffness: shear traction per elastic slip, k_s [Pa/m].
-        friction: Coulomb's coefficient μ: the joint slides where |t_s| reaches μ |t_n| + c, along
-            itself, and remembers how far. None, kept as infinity, never slides: its shear is
-            elastic whether the joint is open or closed, as in Demirel and Aldemir (2021).
-        name: what it is called in tables and files.
-        cohesion: c, over the closed part of the joint; without tension it stays as the joint
-            slides, with tension it is that of the bond, and lost with it [Pa].
+        friction: Coulomb's coefficient μ: the joint slides where |t_s| reaches μ |t_n| + c, and
+            its slip is irreversible. None, stored as infinity, never slides: its shear is elastic
+            in open and closed joints, as in Demirel and Aldemir (2021).
+        name: in tables and files.
+        cohesion: c, over the closed part of the joint; without tension it persists as the joint
+            slides, with tension it belongs to the bond, and is lost with it [Pa].
         dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].
         tension: tensile strength f_t of the bond, up to c / μ, the apex of Coulomb's limit; 0 has
             no bond [Pa].
@@ -113,13 +109,13 @@ class Contact:
     tension: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a contact, or can only be a wrong unit."""
-        if among(self.friction, (None, inf)):
+        """Check that the values are possible, which detects wrong units."""
+        if is_one_of(self.friction, (None, inf)):
             object.__setattr__(self, "friction", inf)
         else:
-            real(self.friction, f"friction of '{self.name}'")
+            check_number(self.friction, f"friction of '{self.name}'")
         for key in ("normal_stiffness", "shear_stiffness", "cohesion", "dilatancy", "tension"):
-            real(getattr(self, key), f"{key} of '{self.name}'")
+            check_number(getattr(self, key), f"{key} of '{self.name}'")
         for key in ("normal_stiffness", "shear_stiffness"):
             value = getattr(self, key)
             _require(
@@ -140,12 +136,12 @@ class Contact:
         self._check_teeth_and_bond()
 
     def _check_teeth_and_bond(self) -> None:
-        """Refuse saw teeth steeper than friction, and a bond beyond the apex of its own limit."""
-        most = self.coefficient if self.slides else 0.0
+        """Check that dilatancy is below friction, and tension below the apex of Coulomb's limit."""
+        steepest = self.coefficient if self.slides else 0.0
         _require(
-            0.0 <= self.dilatancy <= most,
-            f"dilatancy {self.dilatancy:.3g} of '{self.name}' is not between 0 and {most:.3g}",
-            "give tan ψ, not the angle, up to the coefficient of friction, which has it in; a "
+            0.0 <= self.dilatancy <= steepest,
+            f"dilatancy {self.dilatancy:.3g} of '{self.name}' is not between 0 and {steepest:.3g}",
+            "give tan ψ, not the angle, up to the coefficient of friction, which includes it; a "
             "joint that never slides does not dilate",
         )
         apex = self.cohesion / self.coefficient if 0.0 < self.coefficient < inf else 1e9
@@ -163,7 +159,7 @@ class Contact:
 
     @property
     def slides(self) -> bool:
-        """Whether the joint can slide at all."""
+        """Whether the joint can slide."""
         return self.coefficient < inf
 
 
@@ -172,8 +168,8 @@ BACKFILL = Material(6.25 * MPa, 0.2, 18.0 * kN, None, "backfill")
 STONE_TO_STONE = Contact(1.48e9, 0.30e9, 0.60, "stone to stone")
 SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
 
+# Named presets, Table 2 of Demirel and Aldemir (2021)
 MATERIALS = {material.name: material for material in (STONE, BACKFILL)}
-"""Named presets, Table 2 of Demirel and Aldemir (2021)."""
 
+# Named presets, Table 2 of Demirel and Aldemir (2021); the table gives no μ for soil
 CONTACTS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}
-"""Named presets, Table 2 of Demirel and Aldemir (2021); the table gives no μ for soil."""

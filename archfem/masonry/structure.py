@@ -1,26 +1,100 @@
-"""What stands and what touches: the joints between blocks, and the structure that both form."""
+"""Structures: blocks in contact along straight dry joints, and their rigid-body motions.
 
+A rigid motion of a block has three coordinates: two translations of its centroid and a rotation.
+"""
+
+import difflib
 import hashlib
+import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
 
-from archfem.annotated import check_fields
-from archfem.arguments import real
-from archfem.arrays import Array
-from archfem.errors import InvalidStructure
-from archfem.masonry.block import Block, Point
+from archfem._display import ResultDisplay
+from archfem._typing import Array
+from archfem._validation import check_fields, check_number
+from archfem.errors import InvalidInput, InvalidStructure
+from archfem.masonry.block import Block, Point, check_overlaps, check_simple
 from archfem.masonry.materials import Contact
-from archfem.masonry.naming import number_of
-from archfem.masonry.overlaps import check_apart, check_simple
-from archfem.masonry.roles import judged_parts, with_roles
-from archfem.shown import Shown
+from archfem.masonry.parts import assign_roles, select_assessed_parts
 from archfem.units import G
 
-TOUCHING = 1e-6
-"""Largest distance of two points that count as one, relative to the size of the structure."""
+# Longer lists of names in messages lose their middle.
+MAX_LISTED_NAMES = 8
+
+
+def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
+    """Return the number of a block or joint, given by name or by number."""
+    if isinstance(requested, str):
+        if requested in names:
+            return list(names).index(requested)
+        near = suggest_name(requested, names, 0.0)
+        others = difflib.get_close_matches(requested, list(names), 4, 0.7)[1:]
+        also = f" Or one of {others}" if others else ""
+        raise InvalidInput(f"there is no {kind} '{requested}': {near}{also}")
+    if not isinstance(requested, Integral) or not 0 <= requested < len(names):
+        raise InvalidInput(
+            f"there is no {kind} {requested}: give a number from 0 to {len(names) - 1}, or a name "
+            f"such as '{names[0]}'"
+        )
+    return int(requested)
+
+
+def suggest_name(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
+    """Suggest the name most similar to a misspelt one; empty where none is similar."""
+    near = difflib.get_close_matches(word, list(known), 1, likeness)
+    return f"did you mean '{near[0]}'?" if near else ""
+
+
+def join_names(names: Sequence[str], comma: str = ", ") -> str:
+    """Join names to a list, shortened in the middle where it is long."""
+    return (
+        comma.join(names)
+        if len(names) <= MAX_LISTED_NAMES
+        else _shorten_list(names, comma.join, comma)
+    )
+
+
+def join_joint_names(names: Sequence[str]) -> str:
+    """Join names of joints, as in "north pier, base; main arch, joints 0, 5 and 11"."""
+    return (
+        _group_by_stem(names)
+        if len(names) <= MAX_LISTED_NAMES
+        else _shorten_list(names, _group_by_stem, "; ")
+    )
+
+
+def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
+    """Join both ends of a list and state its length."""
+    half = MAX_LISTED_NAMES // 2
+    return f"{put(names[:half])}{comma}…{comma}{put(names[-half:])} ({len(names)} in all)"
+
+
+def _group_by_stem(names: Sequence[str]) -> str:
+    """Join names of joints and write a common stem once."""
+    groups: list[tuple[str, list[str]]] = []
+    for name in names:
+        stem, _, number = name.rpartition(" ")
+        if not (stem.endswith("joint") and re.fullmatch(r"\d+", number)):
+            groups.append((name, []))
+        elif groups and groups[-1][1] and groups[-1][0] == stem:
+            groups[-1][1].append(number)
+        else:
+            groups.append((stem, [number]))
+    return "; ".join(
+        f"{stem}s {', '.join(numbers[:-1])} and {numbers[-1]}"
+        if len(numbers) > 1
+        else " ".join([stem, *numbers])
+        for stem, numbers in groups
+    )
+
+
+# Distance of two coincident points, relative to the size of the structure
+CONTACT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -32,10 +106,10 @@ class Joint:
         intrados: its end on the inner face [m].
         extrados: its end on the outer face [m]; eccentricity is positive toward it.
         contact: stiffness and friction.
-        name: how a person finds it.
+        name: in tables and messages.
         part: the part of the structure it belongs to; mechanisms are counted by part.
-        role: of that part: "ring" or "pier", which are judged, or "other". Where nothing of the
-            part tells it, the structure fills it in, as for a block.
+        role: of that part: "ring" or "pier", which are assessed, or "other". By default the
+            structure derives it, as for a block.
     """
 
     blocks: tuple[int, int]
@@ -47,7 +121,7 @@ class Joint:
     role: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is no joint."""
+        """Check the types of the fields."""
         check_fields(self)
 
     @property
@@ -68,8 +142,7 @@ class Joint:
     @cached_property
     def middle(self) -> Array:
         """Mid-point, from which eccentricity is measured (2,) [m]."""
-        middle: Array = self.ends.mean(axis=0)
-        return middle
+        return self.ends.mean(axis=0)
 
     @cached_property
     def depth(self) -> float:
@@ -79,21 +152,20 @@ class Joint:
     @cached_property
     def tangent(self) -> Array:
         """Unit vector from intrados to extrados (2,)."""
-        tangent: Array = (self.ends[1] - self.ends[0]) / self.depth
-        return tangent
+        return (self.ends[1] - self.ends[0]) / self.depth
 
 
 @dataclass(frozen=True, repr=False)
-class Structure(Shown, picture="structure.draw_structure"):
+class Structure(ResultDisplay):
     """Blocks in contact along dry joints.
 
     Attributes:
-        blocks: the bodies; fixed ones are abutments. Their roles, and those of the joints, are
-            filled in where they are not told.
-        joints: where they touch.
+        blocks: the bodies; fixed ones are abutments. Missing roles of blocks and joints are
+            derived from their parts.
+        joints: the contacts between them.
         width: out-of-plane width w [m].
         gravity: acceleration of gravity, along -y [m/s²].
-        name: what it is called in titles and files.
+        name: in titles and files.
     """
 
     blocks: tuple[Block, ...]
@@ -103,15 +175,15 @@ class Structure(Shown, picture="structure.draw_structure"):
     name: str = "structure"
 
     def __post_init__(self) -> None:
-        """Fill in roles, and refuse what does not hang together, or overlaps."""
+        """Assign roles; check the values, supports and outlines."""
         check_fields(self)
-        object.__setattr__(self, "blocks", with_roles(self.blocks, self.joints))
-        object.__setattr__(self, "joints", with_roles(self.joints, self.blocks))
-        if not 1e-3 <= real(self.width, "width [m]") < 1e4:
+        object.__setattr__(self, "blocks", assign_roles(self.blocks, self.joints))
+        object.__setattr__(self, "joints", assign_roles(self.joints, self.blocks))
+        if not 1e-3 <= check_number(self.width, "width [m]") < 1e4:
             raise InvalidStructure(
                 f"width {self.width:.3g} m is not between 1 mm and 10 km: give metres"
             )
-        if not 0.1 <= real(self.gravity, "gravity [m/s²]") < 1e3:
+        if not 0.1 <= check_number(self.gravity, "gravity [m/s²]") < 1e3:
             raise InvalidStructure(f"gravity {self.gravity:.3g} m/s² is not between 0.1 and 1000")
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             names = [thing.name for thing in things]
@@ -132,11 +204,11 @@ class Structure(Shown, picture="structure.draw_structure"):
 
     @cached_property
     def fingerprint(self) -> str:
-        """What tells its geometry from any other, to a billionth of its size."""
+        """Digest of the geometry, rounded to a billionth of its size."""
         points = [*(block.points for block in self.blocks), *(joint.ends for joint in self.joints)]
-        places = np.round(np.concatenate(points) / self.size, 9) + 0.0  # of -0.0 too 0.0
-        told = f"{self.size:.9g} {self.width:.9g} {[len(each) for each in points]}"
-        return hashlib.sha256(told.encode() + places.tobytes()).hexdigest()[:16]
+        places = np.round(np.concatenate(points) / self.size, 9) + 0.0  # -0.0 becomes 0.0
+        sizes = f"{self.size:.9g} {self.width:.9g} {[len(each) for each in points]}"
+        return hashlib.sha256(sizes.encode() + places.tobytes()).hexdigest()[:16]
 
     @cached_property
     def normals(self) -> Array:
@@ -170,7 +242,7 @@ class Structure(Shown, picture="structure.draw_structure"):
 
     @cached_property
     def cohesion(self) -> Array:
-        """Shear that cohesion holds in joints closed all over, c A (n_joints,) [N]."""
+        """Shear resistance by cohesion of fully closed joints, c A (n_joints,) [N]."""
         return self.width * self.depths * [joint.contact.cohesion for joint in self.joints]
 
     @cached_property
@@ -184,13 +256,13 @@ class Structure(Shown, picture="structure.draw_structure"):
         return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)
 
     def _normal(self, joint: Joint) -> Array:
-        """Outward normal of the lower block's edge, which must also be one of the higher's."""
+        """Outward normal of the lower block along an edge that both blocks share."""
         if not 0 <= joint.lower < joint.higher < len(self.blocks):
             raise InvalidStructure(
                 f"joint '{joint.name}' is between blocks {joint.blocks}: "
                 f"give two different numbers from 0 to {len(self.blocks) - 1}"
             )
-        near = TOUCHING * self.size
+        near = CONTACT_TOLERANCE * self.size
         if joint.depth <= near:
             raise InvalidStructure(
                 f"joint '{joint.name}' is {joint.depth:.3g} m long: its two ends are one point"
@@ -206,7 +278,7 @@ class Structure(Shown, picture="structure.draw_structure"):
         return float(sides[0]) * np.array([joint.tangent[1], -joint.tangent[0]])
 
     def _check_support(self) -> None:
-        """Every block must be joined, through others, to one that is fixed."""
+        """Check that every block is connected, through others, to a fixed one."""
         held = {number for number, block in enumerate(self.blocks) if block.fixed}
         pairs = [set(joint.blocks) for joint in self.joints]
         while reached := {b for pair in pairs if pair & held for b in pair} - held:
@@ -218,12 +290,12 @@ class Structure(Shown, picture="structure.draw_structure"):
             )
 
     def _check_outlines(self) -> None:
-        """Bodies neither cross themselves nor reach into one another."""
+        """Check that outlines neither cross themselves nor overlap."""
         outlines = [block.drawn() for block in self.blocks]
         names = [block.name for block in self.blocks]
         for outline, name in zip(outlines, names, strict=True):
             check_simple(outline, name)
-        check_apart(outlines, names, fixed=[block.fixed for block in self.blocks])
+        check_overlaps(outlines, names, fixed=[block.fixed for block in self.blocks])
 
     @cached_property
     def free(self) -> tuple[int, ...]:
@@ -232,8 +304,8 @@ class Structure(Shown, picture="structure.draw_structure"):
 
     @cached_property
     def judged(self) -> NDArray[np.bool_]:
-        """Whether each joint is judged, as `judged_parts` says of its part (n_joints,)."""
-        parts = judged_parts({joint.part: joint.role for joint in self.joints})
+        """Whether each joint belongs to an assessed part, a ring or pier (n_joints,)."""
+        parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
     @cached_property
@@ -242,8 +314,8 @@ class Structure(Shown, picture="structure.draw_structure"):
         free = (self.blocks[number] for number in self.free)
         return self.width * sum(block.area * block.material.unit_weight for block in free)
 
-    def _words(self) -> str:
-        """What it is, in a line or two."""
+    def _summary(self) -> str:
+        """Describe the structure in one line."""
         free, count = len(self.free), len(self.blocks)
         return (
             f"Structure '{self.name}': {free} blocks that move, {count - free} fixed, "
@@ -268,7 +340,7 @@ class Structure(Shown, picture="structure.draw_structure"):
         Raises:
             InvalidInput: there is no such joint; the nearest name is suggested.
         """
-        return number_of("joint", [each.name for each in self.joints], joint)
+        return find_number("joint", [each.name for each in self.joints], joint)
 
     def block_number(self, block: int | str) -> int:
         """Return the number of a block.
@@ -279,4 +351,19 @@ class Structure(Shown, picture="structure.draw_structure"):
         Raises:
             InvalidInput: there is no such block; the nearest name is suggested.
         """
-        return number_of("block", [each.name for each in self.blocks], block)
+        return find_number("block", [each.name for each in self.blocks], block)
+
+
+def rigid_motion_matrix(points: Array, centroid: Array) -> Array:
+    """Return the displacements of points for unit rigid motions of their block (p, 2, 3)."""
+    # small motion (u, v, θ), θ anticlockwise: (u - θ (y - y_c), v + θ (x - x_c))
+    arm = points - centroid
+    motion = np.zeros((len(points), 2, 3))
+    motion[:, 0, 0] = motion[:, 1, 1] = 1.0
+    motion[:, 0, 2], motion[:, 1, 2] = -arm[:, 1], arm[:, 0]
+    return motion
+
+
+def first_coordinates(structure: Structure) -> dict[int, int]:
+    """Return the first of the three coordinates of each free block."""
+    return {block: 3 * k for k, block in enumerate(structure.free)}

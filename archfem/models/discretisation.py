@@ -1,53 +1,48 @@
-"""What a structure is modelled by: a rung of the ladder, a mesh, and a rule on its joints."""
+"""Discretisation of a structure: fidelity, mesh, and quadrature on the joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from archfem.arguments import among, real, row, said, whole
+from archfem._validation import check_integer, check_number, check_sequence, is_one_of, short_repr
 from archfem.errors import InvalidInput
 from archfem.joints.quadrature import Quadrature
 
-RUNGS = ("rigid", "faces", "condensed", "full")
-"""What a block may be, the cheapest first."""
+# Fidelities of a block, the one with the fewest coordinates first
+BLOCK_FIDELITIES = ("rigid", "faces", "condensed", "full")
 
-FIDELITIES = (*RUNGS, "monolithic")
-"""What a whole structure may be: the ladder, and the slow reference."""
-
-DISPLACEMENTS = ("small", "large")
-"""What displacements may be."""
-
-SHAPES = ("quadrilateral", "triangle")
-"""Of cells."""
-
-MOST = 1000
-"""Cells across a block, either way, beyond which nobody means it."""
+# Fidelities of a model: those of blocks, and the reference model
+MODEL_FIDELITIES = (*BLOCK_FIDELITIES, "monolithic")
 
 
 @dataclass(frozen=True)
 class Discretisation:
-    """A rung of the ladder, a mesh and a rule on the joints, checked when made.
+    """Define fidelity, mesh and quadrature of a model.
 
-    Numbers of cells are least ones: a side gets more where a neighbour needs them, where it bends
-    or is touched at more points, or where cells of a polygon would be longer than twice its
-    thickness.
+    Numbers of cells are minima: a side has more where a neighbour needs them, where it bends or
+    touches at more points, or where cells of a polygon would be longer than twice its thickness.
 
     Attributes:
-        fidelity: one of `FIDELITIES`, or one of `RUNGS` by block name or part, with "rest" for
-            all others.
-        cells: through the thickness (facets on a joint) and along each block (a sector's faces get
-            as many chords).
-        cell: "quadrilateral" or "triangle".
-        coarse: largest cell inside blocks without corners, such as backfill [m]; where it is not
-            given, half of the block's mean thickness 2 A / P, A its area and P its perimeter.
-        degree: of the elements, 1 or 2.
-        quadrature: rule on each joint facet, "exact", "lobatto", "nodal" or "gauss"; None takes the
-            exact one, and Lobatto's where there is none: of degree 2, and for "monolithic".
-        points: on each facet, 3 where not given.
-        displacements: "small", or "large" where blocks may turn and slide as far as they like, on
-            all rungs but "monolithic"; those of a fill with nodes stay small.
-        file: a mesh of one's own, as `read_mesh` takes it, in place of `cells`, `cell` and
-            `coarse`; not on the rung "rigid", which has no mesh.
+        fidelity: "rigid", "faces", "condensed", "full" or "monolithic"; or one of the first four
+            by block name or part, with "rest" for all others.
+        cells: numbers through the thickness (facets on a joint) and along each block (chords of
+            the faces of a sector).
+        cell: shape of the cells, "quadrilateral" or "triangle".
+        coarse: largest cell inside blocks without corners, such as backfill [m]; None for half of
+            the block's mean thickness 2 A / P, A its area and P its perimeter.
+        degree: polynomial degree of the elements, 1 or 2.
+        quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" or "gauss";
+            None for "exact", or "lobatto" with degree 2 or "monolithic", which have no exact rule.
+        points: number on each facet, by default 3, with "trapezoidal" 2; with "trapezoidal" and
+            fidelity "rigid" on each whole joint: three are the rule of 3DEC, weights 1/4, 1/2,
+            1/4, five the springs of Demirel and Aldemir (2021).
+        displacements: "small", or "large" where blocks may rotate and slide as far as they like,
+            with every fidelity but "monolithic"; those of a fill with nodes stay small.
+        file: mesh file for `read_mesh`, in place of `cells`, `cell` and `coarse`; not with
+            "rigid", which has no mesh.
+
+    Raises:
+        InvalidInput: a value is unknown or impossible, or values exclude each other.
     """
 
     fidelity: str | Mapping[str, str] = "full"
@@ -61,44 +56,52 @@ class Discretisation:
     file: str | Path | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown words, impossible numbers, and what does not go together."""
+        """Check the values, and that they do not exclude each other."""
         _check_fidelity(self.fidelity)
-        object.__setattr__(self, "cells", _two(self.cells))
-        if not among(self.cell, SHAPES):
-            raise InvalidInput(f"cell {said(self.cell)} is not known: use one of {SHAPES}")
-        if self.coarse is not None and not real(self.coarse, "coarse [m]") > 0.0:
-            raise InvalidInput(f"coarse = {self.coarse!r} m: give a length above 0, e.g. 0.5")
-        if not among(self.displacements, DISPLACEMENTS):
-            given = said(self.displacements)
-            raise InvalidInput(f"displacements {given} are not known: use one of {DISPLACEMENTS}")
+        object.__setattr__(self, "cells", _check_cells(self.cells))
+        shapes, displacements = ("quadrilateral", "triangle"), ("small", "large")
+        if not is_one_of(self.cell, shapes):
+            raise InvalidInput(f"cell {short_repr(self.cell)} is not known: use one of {shapes}")
+        if self.coarse is not None and not check_number(self.coarse, "coarse [m]") > 0.0:
+            raise InvalidInput(
+                f"coarse = {self.coarse!r} m: give a largest cell size above 0, e.g. 0.5"
+            )
+        if not is_one_of(self.displacements, displacements):
+            given = short_repr(self.displacements)
+            raise InvalidInput(f"displacements {given} are not known: use one of {displacements}")
         if self.displacements == "large" and self.fidelity == "monolithic":
             raise InvalidInput(
-                "displacements are large, which the rung 'monolithic' does not know: use 'full', "
-                "which is the same model, or displacements = 'small'"
+                "large displacements do not exist with fidelity 'monolithic': use 'full', which is "
+                "the same model, or displacements = 'small'"
             )
         if self.file is not None and self.fidelity == "rigid":
-            raise InvalidInput(f"file = {str(self.file)!r}: the rung 'rigid' has no mesh to read")
-        if not among(self.degree, (1, 2)):
-            raise InvalidInput(f"degree {said(self.degree)}: elements are of degree 1 or 2")
+            raise InvalidInput(f"file = {str(self.file)!r}: fidelity 'rigid' has no mesh to read")
+        if not is_one_of(self.degree, (1, 2)):
+            raise InvalidInput(f"degree {short_repr(self.degree)}: elements are of degree 1 or 2")
+        if self.rule.rule == "trapezoidal" and self.fidelity == "monolithic" and self.points:
+            raise InvalidInput(
+                f"trapezoidal quadrature with {self.points} points is not written in UFL: leave "
+                "points out, or use a fidelity other than monolithic"
+            )
         if self.rule.rule == "exact" and (self.degree != 1 or self.fidelity == "monolithic"):
             raise InvalidInput(
                 "exact quadrature needs openings that are linear along a facet, and is not written "
-                "in UFL: use degree 1 and a rung other than monolithic"
+                "in UFL: use degree 1 and a fidelity other than monolithic"
             )
 
     @property
     def through(self) -> int:
-        """Cells through the thickness."""
+        """Number of cells through the thickness."""
         return self.cells[0]
 
     @property
     def along(self) -> int:
-        """Cells along each block."""
+        """Number of cells along each block."""
         return self.cells[1]
 
     @property
     def rule(self) -> Quadrature:
-        """The rule on each joint facet."""
+        """Quadrature rule on each joint facet."""
         if self.quadrature is not None:
             return Quadrature(self.quadrature, self.points)
         exact = self.degree == 1 and self.fidelity != "monolithic" and self.points is None
@@ -106,33 +109,32 @@ class Discretisation:
 
     @property
     def name(self) -> str:
-        """The fidelity in words."""
+        """Fidelity as text, of each block or part where they differ."""
         if isinstance(self.fidelity, str):
             return self.fidelity
-        return ", ".join(f"{block}: {rung}" for block, rung in self.fidelity.items())
+        return ", ".join(f"{block}: {fidelity}" for block, fidelity in self.fidelity.items())
 
 
 def _check_fidelity(fidelity: object) -> None:
-    """Refuse rungs that there are not."""
+    """Refuse unknown fidelities."""
     if isinstance(fidelity, Mapping):
-        unknown = sorted({str(rung) for rung in fidelity.values() if not among(rung, RUNGS)})
+        values = fidelity.values()
+        unknown = sorted({str(name) for name in values if not is_one_of(name, BLOCK_FIDELITIES)})
         if unknown:
-            raise InvalidInput(f"rungs {unknown} are not known: use some of {RUNGS}")
-    elif among(fidelity, ("modal",)):
+            raise InvalidInput(
+                f"fidelities {unknown} are not known: use some of {BLOCK_FIDELITIES}"
+            )
+    elif not is_one_of(fidelity, MODEL_FIDELITIES):
         raise InvalidInput(
-            "fidelity 'modal' is no longer known, for 'faces' is faster and errs less: use one of "
-            f"{FIDELITIES}"
-        )
-    elif not among(fidelity, FIDELITIES):
-        raise InvalidInput(
-            f"fidelity {said(fidelity)} is not known: use one of {FIDELITIES}, or 'auto' in `build`"
+            f"fidelity {short_repr(fidelity)} is not known: use one of {MODEL_FIDELITIES}, or "
+            "'auto' in `build`"
         )
 
 
-def _two(cells: object) -> tuple[int, int]:
-    """Two whole numbers."""
-    through, along = row(cells, "cells through the thickness and along each block", 2)
+def _check_cells(cells: object) -> tuple[int, int]:
+    """Return both numbers of cells, or refuse impossible ones."""
+    through, along = check_sequence(cells, "cells through the thickness and along each block", 2)
     for key, count in (("through", through), ("along", along)):
-        if whole(count, f"cells {key}") > MOST:
-            raise InvalidInput(f"cells {key} = {count!r}: give at most {MOST}")
+        if check_integer(count, f"cells {key}") > 1000:
+            raise InvalidInput(f"cells {key} = {count!r}: give at most 1000")
     return int(through), int(along)

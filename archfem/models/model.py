@@ -1,156 +1,263 @@
-"""The waist of the hourglass: what every model of a structure answers.
+"""The interface of all models of a structure: generalised coordinates, forces, mass and loads.
 
-Everything to its left (masonry, joints, meshes and forms) exists to produce a `Model`; everything
-to its right (statics, dynamics, pictures, cases) takes one by what is declared here, on whatever
-rung it stands.
+Masonry, joint laws and meshes serve to build a `Model`; statics, dynamics, pictures and cases use
+it through this interface alone, whatever its fidelity and whether displacements are small or large.
 """
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, Self, runtime_checkable
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.joints.operator import JointOperator
-from archfem.masonry.actions import Action, Settlement
+from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
-from archfem.models.cells import Cells
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Polygons that cover the free blocks, and their displacements and stresses.
+
+    Attributes:
+        places: points before anything moves (m, 2) [m].
+        block: number of the block of each point (m,).
+        polygons: point numbers of each polygon's corners, in order.
+        shape_functions: displacements of the points, x and y in turn, from coordinates (2 m, n).
+        stress: mean stress of each polygon, (σ_xx, σ_yy, σ_xy) in turn, from coordinates
+            (3 n_polygons, n) [Pa]; None where blocks are rigid.
+    """
+
+    places: Array
+    block: NDArray[np.intp]
+    polygons: tuple[NDArray[np.intp], ...]
+    shape_functions: sparse.csr_matrix
+    stress: sparse.csr_matrix | None = None
+
+    @cached_property
+    def owner(self) -> NDArray[np.intp]:
+        """Number of the block of each polygon (n_polygons,)."""
+        return self.block[[polygon[0] for polygon in self.polygons]]
+
+    def displacement(self, q: Array) -> Array:
+        """Return the displacements of all points (m, 2) [m].
+
+        Args:
+            q: coordinates (n,).
+        """
+        return (self.shape_functions @ q).reshape(-1, 2)
+
+    @cached_property
+    def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Edges of all polygons (e, 2) and their blocks (e,)."""
+        edges = np.concatenate([np.column_stack([p, np.roll(p, -1)]) for p in self.polygons])
+        return edges, np.repeat(self.owner, [len(polygon) for polygon in self.polygons])
+
+    @cached_property
+    def outline_edges(self) -> NDArray[np.intp]:
+        """Edges along the outlines of the blocks, in the sense of their polygon (e, 2)."""
+        # an edge on the outline belongs to one polygon, an inner one to two
+        edges, _ = self._edges
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        return edges[first[count == 1]]
+
+    def displacement_rows(self, block: int, point: Array) -> sparse.csr_matrix:
+        """Return the matrix from coordinates to the displacement of a point of a block's surface.
+
+        Displacements are linear between the ends of the nearest edge. A point beside the edge, as
+        where chords replace an arc, rotates with it, so that rigid motions are exact.
+
+        Args:
+            block: number of the block.
+            point: on its surface or near it (2,) [m].
+
+        Returns:
+            Rows of the displacements along x and y (2, n).
+        """
+        edge, fraction, beside = self.nearest_edge(block, point)
+        ends = [self.shape_functions[2 * node : 2 * node + 2] for node in edge]
+        on_edge = (1.0 - fraction) * ends[0] + fraction * ends[1]
+        # rotation of the edge: transverse displacement of its ends over its length
+        along = self.places[edge[1]] - self.places[edge[0]]
+        across = sparse.csr_matrix([[-along[1], along[0]]])
+        rotation = across @ (ends[1] - ends[0]) / (along @ along)
+        return (on_edge + sparse.csr_matrix([[-beside[1]], [beside[0]]]) @ rotation).tocsr()
+
+    def nearest_edge(self, block: int, point: Array) -> tuple[NDArray[np.intp], float, Array]:
+        """Return the edge of a block nearest to a point, and the point's position relative to it.
+
+        Args:
+            block: number of the block.
+            point: on its surface or near it (2,) [m].
+
+        Returns:
+            Point numbers of the edge's ends (2,); fraction of its length at which the nearest place
+            lies, 0 to 1; and the vector from that place to the point (2,) [m].
+        """
+        edges, owner = self._edges
+        edges = edges[owner == block]
+        start, step = self.places[edges[:, 0]], np.diff(self.places[edges], axis=1)[:, 0]
+        fraction = np.sum((point - start) * step, axis=1) / np.sum(step * step, axis=1)
+        fraction = np.clip(fraction, 0.0, 1.0)
+        distance = np.linalg.norm(start + fraction[:, None] * step - point, axis=1)
+        nearest = int(np.argmin(distance))
+        beside = point - start[nearest] - fraction[nearest] * step[nearest]
+        return edges[nearest], float(fraction[nearest]), beside
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What was predicted of a model when it was chosen.
+    """Predicted errors of a model chosen by `build(fidelity="auto")`, and its time step.
 
     Attributes:
-        error: in the largest |e| of the worst joint, of the model and of its steps [-].
-        in_time: what the steps have of it [-].
-        tolerance: that was asked for [-].
-        dt: time step with which the error is met [s]; None where steps choose their length.
-        pace: tolerance of |e| by which they do so [-]; None where there is a time step.
-        considered: settings that were tried, in that order, and the error predicted of each: of
-            steps alone, then of models with the steps taken.
-        of_small: error of taking displacements as small, which no finer model lessens [-];
-            infinite where blocks fall that small displacements let stand.
-        of_chance: what impacts leave to chance of the largest |e|, by how far it is from growing
-            evenly over motions 1 and 2 % weaker and stronger [-]; no error is predicted below it.
+        error: error of the largest |e| of the worst joint, of model and time step [-].
+        time_step_error: part of `error` due to the time step [-].
+        tolerance: requested tolerance of the largest |e| [-].
+        dt: time step with which the error is met [s]; None with adaptive steps.
+        step_tolerance: tolerance of |e| of adaptive steps [-]; None with a fixed time step.
+        candidates: names and predicted errors of the settings tried, in order: time steps first,
+            then models with the chosen step.
+        small_displacement_error: error of assuming small displacements, the same for every
+            fidelity [-]; infinite where blocks fall that stand under this assumption.
+        chaotic_spread: spread of the largest |e| due to impacts, the deviation from linear growth
+            over motions 1 and 2 % weaker and stronger [-]; a lower bound of every error.
     """
 
     error: float
-    in_time: float
+    time_step_error: float
     tolerance: float
     dt: float | None
-    pace: float | None
-    considered: tuple[tuple[str, float], ...]
-    of_small: float = 0.0
-    of_chance: float = 0.0
+    step_tolerance: float | None
+    candidates: tuple[tuple[str, float], ...]
+    small_displacement_error: float = 0.0
+    chaotic_spread: float = 0.0
 
     @property
-    def met(self) -> bool:
-        """Whether the error of model and steps is within the tolerance."""
+    def is_met(self) -> bool:
+        """Whether the error of model and time step is within the tolerance."""
         return self.error <= self.tolerance
 
     @property
     def text(self) -> str:
-        """The prediction in words, and all that was tried."""
-        steps = f"{1e3 * self.dt:g} ms" if self.dt else f"a length for {self.pace:.2g} in |e|"
-        tried = "; ".join(f"{name}: {error:.2g}" for name, error in self.considered)
+        """Summary of the prediction and of all settings tried."""
+        steps = (
+            f"{1e3 * self.dt:g} ms" if self.dt else f"tolerance {self.step_tolerance:.2g} in |e|"
+        )
+        tried = "; ".join(f"{name}: {error:.2g}" for name, error in self.candidates)
         return (
-            f"predicted to err by {self.error:.2g} in the largest |e|, of which {self.in_time:.2g} "
-            f"by steps of {steps}, and by {self.of_small:.2g} because displacements are taken as "
-            f"small; {self.tolerance:g} was asked for (tried: {tried}); impacts leave "
-            f"{self.of_chance:.2g} to chance"
+            f"predicted error {self.error:.2g} in the largest |e|, of which "
+            f"{self.time_step_error:.2g} by steps of {steps}, and "
+            f"{self.small_displacement_error:.2g} by the assumption of small displacements; "
+            f"tolerance {self.tolerance:g} (tried: {tried}); impacts spread it by "
+            f"{self.chaotic_spread:.2g}"
         )
 
 
-class Passage(Protocol):
-    """A step of a model, from a state that is known, along which displacements go straight.
+class ModelStep(Protocol):
+    """A time step of a model from a known state, with displacements linear in time.
 
-    Forces are means over the step, so that their work is the change of the stored energy, and what
-    friction and damping take. Damping by a lag β is felt as forces of u + β v.
+    Forces are means over the step. Their work is the change of the stored energy plus the loss by
+    friction and damping. Damping with the time lag β acts as forces at u + β v.
     """
 
     def force(self, q: Array) -> Array:
-        """Return the mean of the internal forces of blocks and joints (n,).
-
-        Args:
-            q: coordinates at the end (n,).
-        """
+        """Return the mean of the internal forces of blocks and joints (n,)."""
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Return the derivative of `force` (n, n).
-
-        Args:
-            q: coordinates at the end (n,).
-        """
+        """Return the derivative of `force` (n, n)."""
 
     def resultants(self, q: Array) -> Array:
-        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m].
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
 
-        Args:
-            q: coordinates at the end (n,).
+    def updated_memory(self, q: Array) -> Array:
+        """Return the joint memory at the end of the step, as `Model.memory`."""
+
+    def with_dilatancy(self, q: Array) -> "ModelStep":
+        """Return the step with the dilatancy opening due to the slip on the way to q."""
+
+    def dissipation(self, q: Array) -> float:
+        """Return the energy lost to friction, broken bonds and damping [J]; never negative."""
+
+
+class Observer(Protocol):
+    """Displacements of joint faces and blocks, read from coordinates at every step.
+
+    One row of readings holds gaps at mid-depth, rotations and slips of all joints, then the
+    displacements of the blocks' middles.
+    """
+
+    joint_count: int
+
+    def read(self, q: Array) -> Array:
+        """Return all readings (r,)."""
+
+    def read_many(self, states: Array) -> Array:
+        """Return the readings of many states (steps, r)."""
+
+    def joint_ends(self, q: Array) -> Array:
+        """Return the displacements of both ends of each joint (n_joints, 2, 2) [m].
+
+        An end is midway between the two blocks.
         """
 
-    def remembered(self, q: Array) -> Array:
-        """Return what the joints remember at the end, as `Model.memory`.
+    def faces(self, readings: Array) -> Array:
+        """Return gaps at mid-depth, rotations and slips of the joints (…, 3, n_joints)."""
+        of_joints = readings[..., : 3 * self.joint_count]
+        return of_joints.reshape(*readings.shape[:-1], 3, self.joint_count)
 
-        Args:
-            q: coordinates at the end (n,).
-        """
-
-    def raising(self, q: Array) -> "Passage":
-        """Return the same step with saw teeth where the slip on the way to q puts them.
-
-        Args:
-            q: coordinates at the end (n,).
-
-        Returns:
-            The very same object where they are there already, to rounding.
-        """
-
-    def lost(self, q: Array) -> float:
-        """Return the energy that friction, bonds and the lag of damping take [J]; never negative.
-
-        Args:
-            q: coordinates at the end (n,).
-        """
+    def middles(self, readings: Array) -> Array:
+        """Return displacements of the blocks' middles (…, n_blocks, 2) [m]; 0 of fixed blocks."""
+        return readings[..., 3 * self.joint_count :].reshape(*readings.shape[:-1], -1, 2)
 
 
 @runtime_checkable
 class Model(Protocol):
-    """A structure ready to be moved: generalised coordinates q and what they cost.
+    """A structure in generalised coordinates q: M q̈ + f(q) = p - M ι a, with joints inside f.
 
-    The matrices of one model share their sparsity pattern: `indices` and `indptr` are the same
-    arrays, so that sums are sums of `data`.
+    The matrices of one model share one sparsity pattern: `indices` and `indptr` are the same
+    arrays, so that matrices are added by their `data`. Methods named `with_…` return a changed
+    copy. Methods with a body here are those of small displacements.
 
     Attributes:
-        structure: what is modelled.
-        fidelity: name of the rung of the ladder it stands on.
+        structure: structure that is modelled.
+        fidelity: name of the model, such as "rigid" or "full".
+        large_displacements: whether blocks may rotate and slide far.
         size: number n of coordinates.
-        mass: kinetic energy is ½ q̇ᵀ M q̇ (n, n).
-        blocks: stiffness of the blocks without the joints (n, n).
-        body: force per unit acceleration of the ground, M r, along x and y (n, 2) [kg, where the
-            coordinate is a displacement].
-        cells: polygons that cover the blocks, and how they move with q.
-        supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
-        prediction: what was predicted when it was chosen; None where it was asked for by name.
-        doubts: why this rung may be wrong for the structure, a sentence each.
+        mass: mass matrix M; the kinetic energy is ½ q̇ᵀ M q̇ (n, n).
+        block_stiffness: stiffness matrix of the blocks without joints (n, n).
+        mass_influence: M ι, inertia forces per unit acceleration of the ground along x and y
+            (n, 2) [kg, where the coordinate is a displacement].
+        cells: polygons that cover the blocks, and their displacements.
+        operator: joint operator, from coordinates to joint forces; None where joint forces come
+            from weak forms or from large displacements.
+        support_motion: motions of the fixed blocks, zero for the others (n_blocks, 3)
+            [m, m, rad].
+        initial_gaps: opening and slip of the joint points at q = 0, due to construction in stages
+            (2, p) [m]; None where all blocks were placed at once.
+        prediction: predicted errors, if the model was chosen by them, or None.
+        warnings: reasons why this fidelity may be wrong for the structure, a sentence each.
     """
 
     structure: Structure
     fidelity: str
+    large_displacements: bool
     size: int
     mass: sparse.csr_matrix
-    blocks: sparse.csr_matrix
-    body: Array
+    block_stiffness: sparse.csr_matrix
+    mass_influence: Array
     cells: Cells
-    supports: Array
+    operator: JointOperator | None
+    support_motion: Array
+    initial_gaps: Array | None
     prediction: Prediction | None
-    doubts: tuple[str, ...]
-
-    @property
-    def operator(self) -> JointOperator | None:
-        """From coordinates to the forces of the joints; None where weak forms give them."""
+    warnings: tuple[str, ...]
 
     def force(self, q: Array) -> Array:
         """Return the internal forces of blocks and joints (n,).
@@ -160,29 +267,29 @@ class Model(Protocol):
         """
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
-        """Return the derivative of `force`; not symmetric where joints slide (n, n).
+        """Return the derivative of `force`; unsymmetric where joints slide (n, n).
 
         Args:
             q: coordinates (n,).
 
         Returns:
-            Where a model can tell that nothing has changed since it was last asked, the very same
-            object as then, which need not be factorised again.
+            The same object as in the last call if nothing has changed since, so that its
+            factorisation can be used again.
         """
 
-    def pulled(self, q: Array, motion: Array) -> Array:
-        """Return the change of `force` by a small motion of the supports, as `tangent` has it (n,).
+    def support_forces(self, q: Array, motion: Array) -> Array:
+        """Return the linearised change of `force` due to a small motion of the supports (n,).
 
         Args:
             q: coordinates (n,).
             motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         """
 
-    def closed(self) -> sparse.csr_matrix:
+    def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth (n, n)."""
 
     def energy(self, q: Array) -> float:
-        """Return the potential energy of blocks and joints if nothing slid any further [J].
+        """Return the potential energy of blocks and joints without further slip [J].
 
         Args:
             q: coordinates (n,).
@@ -195,39 +302,58 @@ class Model(Protocol):
             q: coordinates (n,).
         """
 
+    def observer(self) -> Observer:
+        """Return the observer of joint faces and block displacements."""
+
     @property
     def memory(self) -> Array:
-        """How far each joint point has slid for good (p,) [m].
+        """Irreversible slip of each joint point (p,) [m].
 
-        Where any joint has tensile strength, then which bonds are broken, 1, else 0 (2 p,).
+        Where any joint has tensile strength, flags of broken bonds follow, 1 if broken (2 p,).
         """
 
-    def remembering(self, memory: Array) -> Self:
-        """Return the same model, whose joints have slid so far.
-
-        Its `force` is that after a further change: elastic, but for what friction does not hold.
+    def with_memory(self, memory: Array) -> Self:
+        """Return the model with another joint memory, from which further slip is measured.
 
         Args:
             memory: as `memory`.
         """
 
-    def remembered(self, q: Array) -> Array:
-        """Return what the joints remember once the model is at q, as `memory`.
+    def updated_memory(self, q: Array) -> Array:
+        """Return the joint memory once the model is at q, as `memory`.
 
         Args:
             q: coordinates (n,).
         """
 
-    def passage(self, start: Array, late: float) -> Passage:
-        """Return a step from a state that the joints remember.
+    def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
+        """Return a time step from a state with the present joint memory.
 
         Args:
             start: coordinates at its start (n,).
-            late: lag of damping over the length of the step, β/Δt [-].
+            damping_lag: time lag of stiffness-proportional damping over the length of the step,
+                β/Δt [-].
+        """
+
+    def with_support_motion(self, motion: Array) -> Self:
+        """Return the model with supports displaced from where they were built.
+
+        Args:
+            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+        """
+
+    def with_initial_gaps(self, gaps: Array) -> Self:
+        """Return the model with gaps and slips of its joints at q = 0, due to construction.
+
+        Args:
+            gaps: opening and slip of the joint points (2, p) [m].
+
+        Raises:
+            InvalidInput: this fidelity cannot be built in stages.
         """
 
     def settled(self, settlement: Settlement) -> Self:
-        """Return the same model with a support that has moved, further than before.
+        """Return the model with the motion of a support added to `support_motion`.
 
         Args:
             settlement: the support and its motion.
@@ -235,41 +361,96 @@ class Model(Protocol):
         Raises:
             InvalidInput: the block is not a support.
         """
+        return self.with_support_motion(settlement.added(self.structure, self.support_motion))
 
-    def moved(self, supports: Array) -> Self:
-        """Return the same model with its supports moved so far from where they were built.
-
-        Args:
-            supports: motions of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
-        """
-
-    def predicted(self, prediction: Prediction) -> Self:
-        """Return the same model, with what was predicted of it.
+    def with_prediction(self, prediction: Prediction) -> Self:
+        """Return the model with predicted errors.
 
         Args:
-            prediction: to be kept as `prediction`.
+            prediction: stored as `prediction`.
         """
+        other = copy(self)
+        other.prediction = prediction
+        return other
 
-    def load(self, action: Action) -> Array:
+    def small_displacement_model(self) -> "Model":
+        """Return the model of small displacements in the same coordinates."""
+        return self
+
+    def with_joint_state(self, built: "Model") -> Self:
+        """Return the model with initial gaps and memory of its model of small displacements.
+
+        Args:
+            built: `small_displacement_model`, after construction.
+        """
+        model = self if built.initial_gaps is None else self.with_initial_gaps(built.initial_gaps)
+        return model.with_memory(built.memory)
+
+    def load(self, action: Action, q: Array | None = None) -> Array:
         """Return the generalised forces of an action (n,).
 
         Args:
             action: body force or point load.
+            q: coordinates (n,), on which point loads on rotating blocks depend; by default zero.
 
         Raises:
             InvalidInput: a point load misses the structure.
         """
+        if isinstance(action, BodyForce):
+            multiples = np.array([action.horizontal, action.vertical])
+            return (self.mass_influence @ multiples) * self.structure.gravity
+        block, point = action.place(self.structure)
+        return self.cells.displacement_rows(block, point).T @ np.array(action.force)
+
+    def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `load` by the coordinates (n, n).
+
+        Args:
+            action: body force or point load.
+            q: coordinates (n,).
+        """
+        return sparse.csr_matrix((self.size, self.size))
+
+    def work(self, action: Action, q: Array) -> float:
+        """Return the work of an action since before anything moved [J].
+
+        Args:
+            action: body force or point load.
+            q: coordinates (n,).
+        """
+        return float(self.load(action) @ q)
+
+    def face_mismatch(self, q: Array) -> tuple[float, str]:
+        """Return the largest slip past opposite facets, over their length, and its joint.
+
+        Zero where joints are integrated over whole faces.
+
+        Args:
+            q: coordinates (n,).
+        """
+        return 0.0, ""
+
+    def rigid_motions(self, q: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return displacement and velocity of each block as a rigid body.
+
+        Args:
+            q: coordinates (n,).
+            velocity: their rates (n,).
+
+        Returns:
+            Displacement of the centroid and rotation (n_blocks, 3) [m, m, rad]; their rates.
+
+        Raises:
+            InvalidInput: the displacements of the model are small.
+        """
+        raise InvalidInput(
+            f"the displacements of this model '{self.fidelity}' are small: build it for large "
+            "displacements, with displacements='large'"
+        )
 
 
 def check_model(model: object) -> None:
-    """Refuse what is no model, such as the structure of which one is to be built.
-
-    Args:
-        model: what was given for one.
-
-    Raises:
-        InvalidInput: it does not answer what a model answers.
-    """
+    """Refuse objects that are no model, such as a structure that has not been built."""
     if not isinstance(model, Model):
         raise InvalidInput(
             f"model is a {type(model).__name__}: build one, e.g. build(structure, fidelity='rigid')"

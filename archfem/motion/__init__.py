@@ -1,19 +1,17 @@
-"""The ground: records of eight formats, synthetic motions, spectra, matching, suites.
+"""Ground motions: records, synthetic motions, spectra, spectral matching and suites.
 
-    motion          `Motion`: a ground acceleration, read, cut, filtered, rotated and scaled
-    averages        mean accelerations between instants
-    signals         what is done to one sampled acceleration: integrals, filters, base line
-    measures        intensity measures: peaks, Arias, CAV, Housner, duration
-    oscillator      a damped oscillator under straight-line accelerations
-    spectra         response spectra, and scaling to them
-    design_spectra  spectra of codes and of the user
-    newer_codes     spectra of NTC 2018, ASCE 7-22 and EN 1998-1-1:2024
-    synthetic       artificial accelerograms from a seed
-    matching        a motion matched to a design spectrum by wavelets
-    suite           `Suite`: the motions of one study, matched and scaled alike
-    records         files of recorded motions: a module for each format, found by content
+    averages            ground motion averaged over time steps
+    design_spectra      design spectra of codes
+    intensity_measures  PGA, Arias, CAV, duration
+    matching            spectral matching by wavelets
+    motion              Motion: a ground acceleration
+    records             files of recorded ground motions, one module for each format
+    response_spectra    damped oscillator, response spectra
+    signal_processing   filters, integration, baseline, resampling
+    suite               Suite of motions
+    synthetic           artificial accelerograms
 
-It imports from the ground only, and nothing in it knows of stones. Start reading at `motion`.
+Imports the support modules only. Start reading at `motion`.
 """
 
 import lazy_loader

@@ -1,17 +1,18 @@
-"""Elastic design spectra of codes and of the user, in g."""
+"""Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from archfem.annotated import check_fields
-from archfem.arguments import real, said, unmasked
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem._validation import check_fields, check_number, check_unmasked, short_repr
 from archfem.errors import InvalidInput
-from archfem.motion.oscillator import check
+from archfem.motion.response_spectra import check_oscillators
+from archfem.units import STANDARD_GRAVITY
 
-LARGEST = 10.0  # spectral acceleration that no code gives [g]: more can only be a wrong unit
+# No code has a larger spectral acceleration [g]: the unit must be wrong.
+MAX_SPECTRAL_ACCELERATION = 10.0
 
 
 class DesignSpectrum(Protocol):
@@ -33,16 +34,16 @@ class DesignSpectrum(Protocol):
 
 
 # Site factors of TBEC-2018, tables 2.1 and 2.2: linear between the columns, constant outside.
-_SHORT = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50])
-_SHORT_FACTORS = {
+_SHORT_PERIOD_LEVELS = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50])
+_SHORT_PERIOD_FACTORS = {
     "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
     "ZB": (0.9, 0.9, 0.9, 0.9, 0.9, 0.9),
     "ZC": (1.3, 1.3, 1.2, 1.2, 1.2, 1.2),
     "ZD": (1.6, 1.4, 1.2, 1.1, 1.0, 1.0),
     "ZE": (2.4, 1.7, 1.3, 1.1, 0.9, 0.8),
 }
-_LONG = np.array([0.10, 0.20, 0.30, 0.40, 0.50, 0.60])
-_LONG_FACTORS = {
+_LONG_PERIOD_LEVELS = np.array([0.10, 0.20, 0.30, 0.40, 0.50, 0.60])
+_LONG_PERIOD_FACTORS = {
     "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
     "ZB": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
     "ZC": (1.5, 1.5, 1.5, 1.5, 1.5, 1.4),
@@ -81,25 +82,32 @@ class Tbec2018:
     site: str
 
     def __post_init__(self) -> None:
-        real(self.ss, "map value S_S [g]")
-        real(self.s1, "map value S_1 [g]")
-        if not (0.0 < self.ss <= LARGEST and 0.0 < self.s1 <= LARGEST):
+        check_number(self.ss, "map value S_S [g]")
+        check_number(self.s1, "map value S_1 [g]")
+        if not (
+            0.0 < self.ss <= MAX_SPECTRAL_ACCELERATION
+            and 0.0 < self.s1 <= MAX_SPECTRAL_ACCELERATION
+        ):
             raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
-        if self.site not in _SHORT_FACTORS:
+        if self.site not in _SHORT_PERIOD_FACTORS:
             raise InvalidInput(f"ground class {self.site!r} is unknown: use ZA, ZB, ZC, ZD or ZE")
 
     @property
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
-        return self.ss * float(np.interp(self.ss, _SHORT, _SHORT_FACTORS[self.site]))
+        return self.ss * float(
+            np.interp(self.ss, _SHORT_PERIOD_LEVELS, _SHORT_PERIOD_FACTORS[self.site])
+        )
 
     @property
     def sd1(self) -> float:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
-        return self.s1 * float(np.interp(self.s1, _LONG, _LONG_FACTORS[self.site]))
+        return self.s1 * float(
+            np.interp(self.s1, _LONG_PERIOD_LEVELS, _LONG_PERIOD_FACTORS[self.site])
+        )
 
     def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
@@ -111,7 +119,9 @@ class Tbec2018:
             InvalidInput: a period is negative or not finite.
         """
         start, end, long = 0.2 * self.sd1 / self.sds, self.sd1 / self.sds, 6.0
-        return self.sds * branches(checked_periods(periods, np.inf), (start, end, long), lowest=0.4)
+        return self.sds * spectrum_shape(
+            validate_periods(periods, np.inf), (start, end, long), lowest=0.4
+        )
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -122,13 +132,13 @@ class Tbec2018:
         Raises:
             InvalidInput: a period is negative, or beyond 3 s, where the code gives none.
         """
-        natural = checked_periods(periods, 3.0)
+        natural = validate_periods(periods, 3.0)
         start, end = self.sd1 / self.sds / 15.0, self.sd1 / self.sds / 3.0
-        return 0.8 * self.sds * branches(natural, (start, end, np.inf), lowest=0.4)
+        return 0.8 * self.sds * spectrum_shape(natural, (start, end, np.inf), lowest=0.4)
 
 
 # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
-_GROUND = {
+_GROUND_TYPES = {
     1: {
         "A": (1.0, 0.15, 0.4, 2.0),
         "B": (1.2, 0.15, 0.5, 2.0),
@@ -144,7 +154,10 @@ _GROUND = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_UPRIGHT, _UPRIGHT_PERIODS = {1: 0.90, 2: 0.45}, (0.05, 0.15, 1.0)  # a_vg / a_g; T_B, T_C, T_D [s]
+_VERTICAL_RATIOS, _VERTICAL_PERIODS = (
+    {1: 0.90, 2: 0.45},
+    (0.05, 0.15, 1.0),
+)  # a_vg / a_g; T_B, T_C, T_D [s]
 
 
 @dataclass(frozen=True)
@@ -178,16 +191,22 @@ class Eurocode8:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if not 0.0 < real(self.ag, "design ground acceleration [g]") <= LARGEST:
-            told = f"expected more than 0, up to {LARGEST:g}"
-            raise InvalidInput(f"design ground acceleration {self.ag!r} g: {told}")
+        if (
+            not 0.0
+            < check_number(self.ag, "design ground acceleration [g]")
+            <= MAX_SPECTRAL_ACCELERATION
+        ):
+            raise InvalidInput(
+                f"design ground acceleration {self.ag!r} g: expected more than 0, up to "
+                f"{MAX_SPECTRAL_ACCELERATION:g}"
+            )
         check_fields(self)
-        if self.type not in _GROUND or self.ground not in _GROUND[1]:
+        if self.type not in _GROUND_TYPES or self.ground not in _GROUND_TYPES[1]:
             raise InvalidInput(
                 f"Eurocode 8 type {self.type!r} on ground {self.ground!r}: expected type 1 or 2 on "
                 "ground A, B, C, D or E (S1 and S2 need a site study)"
             )
-        check(np.zeros(1), self.damping)
+        check_oscillators(np.zeros(1), self.damping)
 
     def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
@@ -198,10 +217,10 @@ class Eurocode8:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
-        soil, *corners = _GROUND[self.type][self.ground]
+        soil, *corners = _GROUND_TYPES[self.type][self.ground]
         top = 2.5 * self._reduction
-        natural = checked_periods(periods, 4.0)
-        return self.ag * soil * top * branches(natural, tuple(corners), lowest=1.0 / top)
+        natural = validate_periods(periods, 4.0)
+        return self.ag * soil * top * spectrum_shape(natural, tuple(corners), lowest=1.0 / top)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -213,11 +232,12 @@ class Eurocode8:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
         top = 3.0 * self._reduction
-        shape = branches(checked_periods(periods, 4.0), _UPRIGHT_PERIODS, lowest=1.0 / top)
-        return self.ag * _UPRIGHT[self.type] * top * shape
+        shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
+        return self.ag * _VERTICAL_RATIOS[self.type] * top * shape
 
     @property
     def _reduction(self) -> float:
+        """Damping correction factor η [-]."""
         return max(float(np.sqrt(10.0 / (5.0 + 100.0 * self.damping))), 0.55)
 
 
@@ -239,7 +259,7 @@ class TableSpectrum:
     vertical_values: Array | None = None
 
     def __post_init__(self) -> None:
-        unmasked(self.periods, "periods of a spectrum table")
+        check_unmasked(self.periods, "periods of a spectrum table")
         periods = np.asarray(self.periods, dtype=float)
         object.__setattr__(self, "periods", periods)
         grows = periods.ndim == 1 and len(periods) > 1 and bool(np.all(np.diff(periods) > 0.0))
@@ -248,14 +268,16 @@ class TableSpectrum:
         for name in ("values", "vertical_values"):
             if getattr(self, name) is None and name == "vertical_values":
                 continue
-            unmasked(getattr(self, name), f"{name} of a spectrum table")
+            check_unmasked(getattr(self, name), f"{name} of a spectrum table")
             row = np.asarray(getattr(self, name), dtype=float)
             if row.shape != periods.shape or not np.all((row > 0.0) & np.isfinite(row)):
                 raise InvalidInput(
                     f"{name} of a spectrum table: expected {len(periods)} positive values in g"
                 )
-            if row.max() > LARGEST:
-                raise InvalidInput(f"{name} reach {row.max():.3g} g, more than {LARGEST:g} g")
+            if row.max() > MAX_SPECTRAL_ACCELERATION:
+                raise InvalidInput(
+                    f"{name} reach {row.max():.3g} g, more than {MAX_SPECTRAL_ACCELERATION:g} g"
+                )
             object.__setattr__(self, name, row)
 
     def horizontal(self, periods: float | Array) -> Array:
@@ -267,7 +289,7 @@ class TableSpectrum:
         Raises:
             InvalidInput: a period is outside the table.
         """
-        return self._between(periods, self.values)
+        return self._interpolate(periods, self.values)
 
     def vertical(self, periods: float | Array) -> Array:
         """Return vertical spectral accelerations in the shape of the periods [g].
@@ -280,30 +302,23 @@ class TableSpectrum:
         """
         if self.vertical_values is None:
             raise InvalidInput("this spectrum table has no vertical: give vertical_values")
-        return self._between(periods, self.vertical_values)
+        return self._interpolate(periods, self.vertical_values)
 
-    def _between(self, periods: float | Array, row: Array) -> Array:
-        natural = checked_periods(periods, self.periods[-1])
+    def _interpolate(self, periods: float | Array, row: Array) -> Array:
+        """Interpolate a row of the table linearly."""
+        natural = validate_periods(periods, self.periods[-1])
         if np.any(natural < self.periods[0]):
             raise InvalidInput(f"period below the table's first, {self.periods[0]:g} s")
         return np.interp(natural, self.periods, row)
 
 
-def checked_periods(periods: float | Array, longest: float) -> Array:
-    """Return periods as an array, refused where a spectrum is not defined.
-
-    Args:
-        periods: of any shape [s].
-        longest: for which the spectrum is defined [s].
-
-    Raises:
-        InvalidInput: a period is negative, not finite, or beyond the longest.
-    """
+def validate_periods(periods: float | Array, longest: float) -> Array:
+    """Return periods as an array, refused where a spectrum is not defined."""
     try:
         natural = np.asarray(periods, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"periods {said(periods)} s are no numbers") from error
-    check(natural, 0.05)
+        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+    check_oscillators(natural, 0.05)
     if np.any(natural > longest):
         raise InvalidInput(
             f"period {natural.max():g} s: this spectrum is defined up to {longest:g} s"
@@ -311,14 +326,8 @@ def checked_periods(periods: float | Array, longest: float) -> Array:
     return natural
 
 
-def branches(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
-    """Return the usual shape: from lowest to 1, level, falling with 1/T and then with 1/T².
-
-    Args:
-        periods: of any shape [s].
-        corners: where it is level, begins to fall, and falls with 1/T² [s].
-        lowest: value at zero.
-    """
+def spectrum_shape(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
+    """Return the shape of code spectra: rise from `lowest` to 1, plateau, 1/T, then 1/T²."""
     rise, level, fall = corners
     safe = np.maximum(periods, rise)
     return np.where(
@@ -326,3 +335,261 @@ def branches(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Ar
         lowest + (1.0 - lowest) * periods / rise,
         np.minimum(1.0, level / safe) * np.minimum(1.0, fall / safe),
     )
+
+
+# NTC 2018, table 3.2.IV: S_S = a - b F_0 a_g/g within its bounds, and C_C = c (T_C*)^d.
+_SUBSOIL_FACTORS = {
+    "A": ((1.00, 0.00), (1.00, 1.00), (1.00, 0.00)),
+    "B": ((1.40, 0.40), (1.00, 1.20), (1.10, -0.20)),
+    "C": ((1.70, 0.60), (1.00, 1.50), (1.05, -0.33)),
+    "D": ((2.40, 1.50), (0.90, 1.80), (1.25, -0.50)),
+    "E": ((2.00, 1.10), (1.00, 1.60), (1.15, -0.40)),
+}
+
+
+@dataclass(frozen=True)
+class Ntc2018:
+    """Elastic spectra of the Italian technical standards for constructions of 2018.
+
+    Horizontal: a_g S η F_0 (T/T_B + (1 - T/T_B)/(η F_0)), a_g S η F_0 from T_B = T_C/3, times T_C/T
+    from T_C = C_C T_C* and T_C T_D/T² from T_D = 4 a_g/g + 1.6 s to 4 s, with S = S_S S_T.
+    Vertical: the same with the factor F_v = 1.35 F_0 √(a_g/g) in place of F_0, S_S = 1 and periods
+    of its own.
+    η = √(10/(5 + ξ)) >= 0.55 with the damping ξ in per cent.
+
+    Args:
+        ag: horizontal acceleration of the site on rock, of the limit state [g].
+        f0: largest amplification F_0 of the site [-].
+        tc_star: T_C* of the site, where its constant velocity begins [s].
+        site: category of subsoil A to E.
+        topography: factor S_T of the slope, 1 to 1.4 [-].
+        damping: ratio to the critical [-].
+
+    Raises:
+        InvalidInput: a value is not positive or out of range, or the category is unknown.
+
+    References:
+        D.M. 17 January 2018, sections 3.2.3.2.1 and 3.2.3.2.2, tables 3.2.IV to 3.2.VI.
+    """
+
+    ag: float
+    f0: float
+    tc_star: float
+    site: str
+    topography: float = 1.0
+    damping: float = 0.05
+
+    def __post_init__(self) -> None:
+        if self.site not in _SUBSOIL_FACTORS:
+            raise InvalidInput(f"subsoil {self.site!r} is unknown: use A, B, C, D or E")
+        if not (
+            _check_positive(self.ag, "a_g [g]") < 2.0
+            and 0.05 < check_number(self.tc_star, "T_C* [s]") < 2.0
+        ):
+            raise InvalidInput(
+                f"a_g {self.ag:g} g and T_C* {self.tc_star:g} s: expected a_g in g, below 2, and "
+                "T_C* in seconds, 0.05 to 2"
+            )
+        if not 2.2 <= check_number(self.f0, "F_0") < 5.0:
+            raise InvalidInput(f"F_0 {self.f0:g} is not from 2.2 to 5")
+        if not 1.0 <= check_number(self.topography, "topography S_T") <= 1.4:
+            raise InvalidInput(f"topography {self.topography:g} is not from 1 to 1.4")
+        check_oscillators(np.zeros(1), self.damping)
+
+    @property
+    def soil(self) -> float:
+        """Amplification by the subsoil S_S [-]."""
+        (level, slope), (least, most), _ = _SUBSOIL_FACTORS[self.site]
+        return min(max(level - slope * self.f0 * self.ag, least), most)
+
+    @property
+    def corners(self) -> tuple[float, float, float]:
+        """Periods T_B, T_C and T_D of the horizontal spectrum [s]."""
+        factor, power = _SUBSOIL_FACTORS[self.site][2]
+        falls = factor * self.tc_star**power * self.tc_star
+        return falls / 3.0, falls, 4.0 * self.ag + 1.6
+
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
+        """
+        top = self._reduction * self.f0
+        shape = spectrum_shape(validate_periods(periods, 4.0), self.corners, lowest=1.0 / top)
+        return self.ag * self.soil * self.topography * top * shape
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Return vertical spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
+        """
+        top = self._reduction * self.f0
+        shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
+        # table 3.2.VI has the periods of Eurocode 8, and S_S = 1
+        factor = 1.35 * float(self.ag) ** 1.5 * self.topography
+        return factor * top * shape
+
+    @property
+    def _reduction(self) -> float:
+        """Damping correction factor η [-]."""
+        return max(float(np.sqrt(10.0 / (5.0 + 100.0 * self.damping))), 0.55)
+
+
+@dataclass(frozen=True)
+class Asce2022:
+    """Two-period design spectrum of ASCE/SEI 7-22, 5 % damping.
+
+    (0.4 + 0.6 T/T_0) S_DS, S_DS from T_0 = 0.2 S_D1/S_DS, S_D1/T from T_S = S_D1/S_DS, S_D1 T_L/T²
+    from T_L. S_DS and S_D1 are two thirds of S_MS and S_M1; the code has no site
+    factors: its maps give both values for the site class. Where the maps have a multi-period
+    spectrum, the code requires it for time histories: give its points as a `TableSpectrum`. This
+    class has no vertical spectrum either.
+
+    Args:
+        sds: design spectral acceleration at short periods S_DS [g].
+        sd1: design spectral acceleration at 1 s S_D1 [g].
+        tl: long-period transition T_L [s].
+
+    Raises:
+        InvalidInput: a value is not positive, or T_L is not beyond T_S.
+
+    References:
+        ASCE/SEI 7-22 (2022), sections 11.4.4 and 11.4.5.2.
+    """
+
+    sds: float
+    sd1: float
+    tl: float
+
+    def __post_init__(self) -> None:
+        _check_positive(self.sds, "S_DS [g]")
+        _check_positive(self.sd1, "S_D1 [g]")
+        if not _check_positive(self.tl, "T_L [s]") > self.sd1 / self.sds:
+            raise InvalidInput(
+                f"T_L {self.tl:g} s is not beyond T_S = S_D1/S_DS = {self.sd1 / self.sds:.3g} s"
+            )
+
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative or not finite.
+        """
+        end = self.sd1 / self.sds
+        corners = (0.2 * end, end, self.tl)
+        return self.sds * spectrum_shape(validate_periods(periods, np.inf), corners, lowest=0.4)
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Refuse: the vertical spectrum has to be given by points.
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: always.
+        """
+        raise InvalidInput(_no_vertical_message("ASCE 7-22"))
+
+
+@dataclass(frozen=True)
+class Eurocode2024:
+    """Horizontal elastic spectrum of EN 1998-1-1:2024 with the recommended values, 5 % damping.
+
+    With S_α = F_T F_α S_α,RP and S_β = F_T F_β S_β,RP: S_α/F_A to T_A = 0.02 s, straight to S_α at
+    T_B = T_C/χ within 0.05 and 0.1 s, S_β/T from T_C = S_β/S_α, S_β T_D/T² from T_D = 2 s, or
+    1 + S_β,RP/(m/s²) s where that is more, to 4 s; F_A = 2.5 and χ = 4.
+
+    The site factors F_α and F_β depend on category, depth and stiffness of the ground and on the
+    accelerations themselves: they are to be taken from the standard; on rock (A) they are 1.
+    There is no vertical spectrum here: give one by points, as a `TableSpectrum`.
+
+    Args:
+        s_alpha: S_α,RP, the level on rock for the return period [g].
+        s_beta: S_β,RP, the spectral acceleration at 1 s on rock [g].
+        f_alpha: site factor of the level F_α [-].
+        f_beta: site factor at 1 s F_β [-].
+        topography: factor F_T [-].
+
+    Raises:
+        InvalidInput: a value is not positive, or T_C is not between T_B and T_D.
+
+    References:
+        EN 1998-1-1:2024, clause 5.2.2.2.
+    """
+
+    s_alpha: float
+    s_beta: float
+    f_alpha: float
+    f_beta: float
+    topography: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key in ("s_alpha", "s_beta", "f_alpha", "f_beta", "topography"):
+            _check_positive(getattr(self, key), f"Eurocode 8 (2024), {key}")
+        rise, falls, far = self.corners
+        if not rise < falls < far:
+            raise InvalidInput(
+                f"Eurocode 8 (2024): T_C = S_beta/S_alpha = {falls:.3g} s is not between T_B = "
+                f"{rise:.3g} s and T_D = {far:.3g} s: check s_alpha and s_beta, both in g"
+            )
+
+    @property
+    def corners(self) -> tuple[float, float, float]:
+        """Periods T_B, T_C and T_D [s]."""
+        falls = self.f_beta * self.s_beta / (self.f_alpha * self.s_alpha)
+        rise = min(max(falls / 4.0, 0.05), 0.1)
+        return rise, falls, max(2.0, 1.0 + self.s_beta * STANDARD_GRAVITY)
+
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: a period is negative, or beyond 4 s.
+        """
+        rise, falls, far = self.corners
+        cut = 0.02  # T_A [s]
+        natural = np.maximum(validate_periods(periods, 4.0), cut) - cut
+        shape = spectrum_shape(natural, (rise - cut, np.inf, np.inf), lowest=1.0 / 2.5)
+        beyond = np.maximum(natural + cut, falls)
+        level = self.topography * self.f_alpha * self.s_alpha
+        return level * shape * (falls / beyond) * np.minimum(1.0, far / beyond)
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Refuse: the vertical spectrum has to be given by points.
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: always.
+        """
+        raise InvalidInput(_no_vertical_message("Eurocode 8 (2024)"))
+
+
+def _no_vertical_message(code: str) -> str:
+    """Return the error of a spectrum without vertical component."""
+    return (
+        f"{code} is here without its vertical spectrum: give one by points, as a TableSpectrum "
+        "with vertical_values"
+    )
+
+
+def _check_positive(value: float, name: str) -> float:
+    """Return a number that must be positive."""
+    if not check_number(value, name) > 0.0:
+        raise InvalidInput(f"{name} = {value!r}: expected more than 0")
+    return value

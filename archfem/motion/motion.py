@@ -8,22 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from archfem.annotated import methods_as_annotated
-from archfem.arguments import instance, is_number, said
-from archfem.arrays import Array
+from archfem._display import ResultDisplay
+from archfem._typing import Array
+from archfem._validation import check_type, is_number, short_repr, validate_methods
 from archfem.errors import InvalidInput
-from archfem.motion import signals
-from archfem.motion.records.read import read_components
-from archfem.motion.synthetic import accelerogram
-from archfem.shown import Shown
+from archfem.motion import signal_processing
+from archfem.motion.records.reader import read_components
+from archfem.motion.synthetic import generate_accelerogram
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = "horizontal", "vertical", "transverse"
 
 
-@methods_as_annotated
+@validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion(Shown, picture="motions.draw_motion"):
+class Motion(ResultDisplay):
     """The acceleration of the ground in up to three directions, which begin together.
 
     Components keep their own lengths, zero before and after; what changes one returns a new motion.
@@ -47,14 +46,16 @@ class Motion(Shown, picture="motions.draw_motion"):
 
     def __post_init__(self) -> None:
         if not (is_number(self.dt) and self.dt >= 1e-6):
-            raise InvalidInput(f"dt {said(self.dt)} s is no positive number from 1e-6 on")
-        instance(self.name, str, "name of a motion", "give words")
+            raise InvalidInput(f"dt {short_repr(self.dt)} s is no positive number from 1e-6 on")
+        check_type(self.name, str, "name of a motion", "give words")
         for component in COMPONENTS:
             samples = getattr(self, component)
             if samples is not None or component == "horizontal":
-                object.__setattr__(self, component, signals.checked(samples, component))
+                object.__setattr__(
+                    self, component, signal_processing.validate_samples(samples, component)
+                )
 
-    def _words(self) -> str:
+    def _summary(self) -> str:
         """What it is, in a line or two."""
         return f"Motion '{self.name}': {self.duration:.4g} s, peak {self.pga:.3g} m/s²"
 
@@ -120,7 +121,9 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: fewer than 50 samples, or pga, ratio or seed out of range.
         """
-        level, upright = accelerogram(duration, dt, pga=pga, ratio=vertical_ratio, seed=seed)
+        level, upright = generate_accelerogram(
+            duration, dt, pga=pga, ratio=vertical_ratio, seed=seed
+        )
         return cls(level, dt, upright, name=f"synthetic {seed}")
 
     @property
@@ -151,8 +154,7 @@ class Motion(Shown, picture="motions.draw_motion"):
             raise InvalidInput(
                 f"motion {self.name!r} has no component {name!r}, only {', '.join(self.components)}"
             )
-        samples: Array = getattr(self, name)
-        return samples
+        return getattr(self, name)
 
     def times(self, component: str = "horizontal") -> Array:
         """Return the times of the samples of one component (n,) [s].
@@ -168,7 +170,7 @@ class Motion(Shown, picture="motions.draw_motion"):
         Args:
             component: horizontal, vertical or transverse.
         """
-        return signals.velocity(self.component(component), self.dt)
+        return signal_processing.integrate_velocity(self.component(component), self.dt)
 
     def displacement(self, component: str = "horizontal") -> Array:
         """Return the ground displacement (n,) [m], at rest at first.
@@ -176,7 +178,7 @@ class Motion(Shown, picture="motions.draw_motion"):
         Args:
             component: horizontal, vertical or transverse.
         """
-        return signals.displacement(self.component(component), self.dt)
+        return signal_processing.integrate_displacement(self.component(component), self.dt)
 
     def at(self, times: float | Array) -> Array:
         """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
@@ -185,9 +187,11 @@ class Motion(Shown, picture="motions.draw_motion"):
             times: of any shape (n in all) [s], `InvalidInput` where one is nan; straight between
                 samples, zero outside the record.
         """
-        moments, up = signals.counted(times, self.dt), self.vertical
+        moments, up = signal_processing.count_in_samples(times, self.dt), self.vertical
         rows = self.horizontal, np.zeros(1) if up is None else up
-        return np.column_stack([signals.between(row, moments) for row in rows])
+        return np.column_stack(
+            [signal_processing.interpolate_samples(row, moments) for row in rows]
+        )
 
     def scaled(self, factor: float) -> "Motion":
         """Return the motion with all components multiplied by a factor.
@@ -195,7 +199,7 @@ class Motion(Shown, picture="motions.draw_motion"):
         Args:
             factor: what to multiply by [-]; a negative one turns the motion round.
         """
-        return self._each(lambda samples: factor * samples)
+        return self._map_components(lambda samples: factor * samples)
 
     def reversed(self) -> "Motion":
         """Return the motion with its horizontals turned: as if the structure faced backwards."""
@@ -232,7 +236,9 @@ class Motion(Shown, picture="motions.draw_motion"):
                 f"cut from {start:g} to {stop:g} s: nothing of the {self.duration:g} s is left"
             )
         kept = slice(int(first), int(last) + 1)
-        return self._each(lambda samples: samples[kept] if len(samples[kept]) else np.zeros(1))
+        return self._map_components(
+            lambda samples: samples[kept] if len(samples[kept]) else np.zeros(1)
+        )
 
     def significant(self, low: float = 0.05, high: float = 0.95) -> "Motion":
         """Return the part of significant duration, after Trifunac and Brady (1975).
@@ -244,7 +250,9 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: not 0 <= low < high <= 1, or the horizontal is at rest.
         """
-        return self.cut(*signals.significant_window(self.horizontal, self.dt, low, high))
+        return self.cut(
+            *signal_processing.find_significant_window(self.horizontal, self.dt, low, high)
+        )
 
     def resampled(self, dt: float) -> "Motion":
         """Return the motion sampled anew by straight lines, with all its peaks and no filter.
@@ -255,7 +263,12 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: dt is not positive and finite.
         """
-        return replace(self._each(lambda samples: signals.resampled(samples, self.dt, dt)), dt=dt)
+        return replace(
+            self._map_components(
+                lambda samples: signal_processing.resample_peaks(samples, self.dt, dt)
+            ),
+            dt=dt,
+        )
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
         """Return the motion without drift, as `signals.baseline_corrected` does it.
@@ -266,7 +279,9 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: the degree is below 3, or not below the number of samples.
         """
-        return self._each(lambda samples: signals.baseline_corrected(samples, self.dt, degree))
+        return self._map_components(
+            lambda samples: signal_processing.correct_baseline(samples, self.dt, degree)
+        )
 
     def band_passed(self, low: float, high: float, *, order: int = 4) -> "Motion":
         """Return the motion with its frequencies in a band, as `signals.band_passed` does it.
@@ -279,7 +294,9 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: not 0 < low < high < half the sampling frequency, or the order below 1.
         """
-        return self._each(lambda row: signals.band_passed(row, self.dt, low, high, order=order))
+        return self._map_components(
+            lambda row: signal_processing.filter_band(row, self.dt, low, high, order=order)
+        )
 
     def rotated(self, angle: float) -> "Motion":
         """Return the motion along horizontal axes turned from the horizontal to the transverse.
@@ -290,7 +307,9 @@ class Motion(Shown, picture="motions.draw_motion"):
         Raises:
             InvalidInput: there is no transverse.
         """
-        level, across = signals.rotated(self.horizontal, self.component("transverse"), angle)
+        level, across = signal_processing.rotate_components(
+            self.horizontal, self.component("transverse"), angle
+        )
         return replace(self, horizontal=level, transverse=across)
 
     def with_vertical(self, other: "Motion | None") -> "Motion":
@@ -325,6 +344,6 @@ class Motion(Shown, picture="motions.draw_motion"):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
             raise InvalidInput(f"{steps}: bring one to the other's with resampled")
 
-    def _each(self, change: Callable[[Array], Array]) -> "Motion":
+    def _map_components(self, change: Callable[[Array], Array]) -> "Motion":
         rows: dict[str, Any] = {name: change(self.component(name)) for name in self.components}
         return replace(self, **rows)

@@ -1,17 +1,17 @@
-"""`Suite`: the motions of one study, matched and scaled alike."""
+"""Suites of ground motions with one scale and one reduction factor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from archfem.annotated import check_fields
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem._validation import check_fields
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.matching import Match, matched
 from archfem.motion.motion import Motion
-from archfem.motion.spectra import response_spectrum
+from archfem.motion.response_spectra import response_spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +19,11 @@ class Suite:
     """A named set of motions, each with its vertical, with one scale and reduction factor.
 
     Args:
-        name: what to call it.
+        name: of the suite.
         pairs: motions as read or matched, before scale and reduction.
         scale: factor on all of them [-].
-        reduction: factor R by which the code lets elastic demand be divided [-].
-        matches: what matching did to each pair; empty before.
+        reduction: reduction factor R of the elastic demand by the code [-].
+        matches: results of spectral matching for each pair; empty without it.
 
     Raises:
         InvalidInput: there is no motion, or a factor is not positive.
@@ -56,10 +56,10 @@ class Suite:
         scale: float = 1.0,
         reduction: float = 1.0,
     ) -> "Suite":
-        """Return a suite that gives each vertical to as many horizontals: of six and three, to two.
+        """Combine horizontals and verticals; of six and three, each vertical serves two.
 
         Args:
-            name: what to call it.
+            name: of the suite.
             horizontals: motions, one for each pair.
             verticals: motions whose vertical is taken, or the only component they have.
             scale: factor on all of them [-].
@@ -91,7 +91,7 @@ class Suite:
         duration: float = 20.0,
         reduction: float = 1.0,
     ) -> "Suite":
-        """Return artificial motions matched to a spectrum, made from a seed and no file.
+        """Generate artificial motions matched to a spectrum.
 
         Args:
             spectrum: target of horizontals and verticals.
@@ -104,7 +104,7 @@ class Suite:
         Raises:
             InvalidInput: the pairs cannot share the verticals evenly, or the duration is shorter
                 than twice the longest period matched.
-            DidNotConverge: a motion did not come near the spectrum.
+            DidNotConverge: a motion could not be matched within the tolerance.
         """
         made = [
             Motion.synthetic(seed=seed + index, duration=duration) for index in range(horizontals)
@@ -113,20 +113,20 @@ class Suite:
         return share.matched(spectrum)
 
     def matched(self, spectrum: DesignSpectrum) -> "Suite":
-        """Return the suite with every pair matched to a spectrum, as `matching.matched` does it.
+        """Return the suite with every pair matched to a spectrum, see `matched`.
 
         Args:
             spectrum: target of horizontals and verticals.
 
         Raises:
             InvalidInput: a pair is at rest or too short, or the spectrum lacks what it needs.
-            DidNotConverge: a pair did not come near the spectrum.
+            DidNotConverge: a pair could not be matched within the tolerance.
         """
         matches = tuple(matched(pair, spectrum) for pair in self.pairs)
         return replace(self, pairs=tuple(match.motion for match in matches), matches=matches)
 
     def reversed(self) -> "Suite":
-        """Return the suite with its horizontals turned: as if the structure faced backwards."""
+        """Return the suite with reversed horizontal components."""
         return replace(self, pairs=tuple(pair.reversed() for pair in self.pairs))
 
     @property

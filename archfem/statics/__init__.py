@@ -1,28 +1,19 @@
-"""A model at rest and about rest: dead load, pushover, modes, stress, free bodies.
+"""Static analyses: dead load, pushover, modes, stress and free bodies.
 
-    newton       one equilibrium solve
-    attempts     what it is asked, and what comes of it
-    snes         Newton's method by PETSc SNES
-    superlu      the same by SciPy, where PETSc is not installed
-    loading      loads that grow together
-    lasting      equilibria that joints which dilate or break do not upset
-    relaxation   a structure creeps to rest where Newton's method fails
-    search       the next equilibrium, from the last one
-    equilibrium  dead load and other loads that stay
-    plausible    whether friction can hold what a dead load asks of it
-    path         paths of equilibrium under a load that grows
-    support_path the same under the dead load, over a support that moves
-    pushover     a load grows until hardly anything resists
-    following    how it goes from step to step
-    ends         where that ends, and what is tried before it does
-    eigen        the lowest vibrations of sparse matrices, by SLEPc
-    dense_eigen  those of small ones by LAPACK, where SLEPc is not installed
-    modes        vibrations about a state
-    stress       principal stresses in the blocks
-    strength     use of the blocks' strength
-    freebody     one block cut free, and whether its forces balance
+    continuation       load and displacement control
+    dense_eigensolver  eigenvalues of small matrices by LAPACK
+    equilibrium        equilibrium under dead load, plausibility checks
+    free_body          free-body diagram of a block
+    modes              modes of vibration
+    newton             Newton's method with fall-back line searches
+    newton_iteration   Newton iterations on SciPy's sparse factors
+    pushover           Pushover, stopping rules
+    relaxation         pseudo-time relaxation, Tresca iteration, irreversible joints
+    slepc_eigensolver  eigenvalues of sparse matrices by SLEPc
+    snes               Newton iterations by PETSc SNES
+    stress             principal stresses and strength use
 
-It imports from `models` and what is left of it. Start reading at `equilibrium`.
+Imports `models` and the rooms before it. Start reading at `equilibrium`.
 """
 
 import lazy_loader

@@ -1,4 +1,14 @@
-"""Equilibrium under loads that stay: self-weight first of all."""
+"""Equilibrium under permanent loads: dead load, construction in stages, moved supports.
+
+The load, and then the motion of the supports, is applied in steps that are halved where the
+solver fails. Joints carry their memory, irreversible slip and broken bonds, from step to
+step.
+
+Warnings name results that a dry-stone structure cannot have. Joints that never slide carry any
+shear, and elastic joints that slide may come to rest far from their drawn position. A structure of
+rigid blocks that no thrust line within friction can hold must not be at rest: the safe theorem
+(Heyman, Int. J. Solids Struct. 2 (1966) 249-279) checks it by a linear programme without stiffness.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -7,37 +17,42 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from archfem.arguments import instance
-from archfem.arrays import Array
+from archfem._display import ResultDisplay
+from archfem._threads import single_threaded
+from archfem._typing import Array
+from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import judged
-from archfem.joints.resultants import joint_dataset, one_joint
-from archfem.masonry.actions import BodyForce
-from archfem.masonry.stages import Stage, placed
-from archfem.models.gauges import Gauges
-from archfem.models.jointed import Jointed
+from archfem.joints.criteria import assessed_joints
+from archfem.joints.resultants import joint_dataset, select_joint
+from archfem.limit.collapse import stands
+from archfem.masonry.construction import Stage, resolve_stages
+from archfem.masonry.loads import BodyForce
+from archfem.masonry.structure import join_joint_names
+from archfem.models.construction import PartialStructure
+from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Model, check_model
-from archfem.models.moving import Moving
-from archfem.models.turning_stages import on_site, taken_over
-from archfem.models.unfinished import Unfinished
-from archfem.shown import Shown
-from archfem.statics.newton import Newton, Solver
-from archfem.statics.search import BRINGING_ON, FOLLOWING, Ways, followed
-from archfem.threads import on_one_thread
+from archfem.statics.newton import EquilibriumSolver, Newton
+from archfem.statics.relaxation import (
+    LOAD_SEARCHES,
+    SUPPORT_SEARCHES,
+    SearchSequence,
+    linear_predictor,
+)
+from archfem.units import mm
 
-SMALLEST_STEP = 1.0 / 64.0
-"""Of a load or a settlement, to which steps are halved before giving up."""
+# Share of a load or a settlement to which steps are halved before the search fails
+MIN_LOAD_STEP = 1.0 / 64.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Equilibrium(Shown, picture="dead.draw_dead_load"):
+class Equilibrium(ResultDisplay):
     """A structure at rest.
 
     Attributes:
-        model: whose equilibrium it is, with what its joints remember of how it came about.
+        model: model in equilibrium, with the initial gaps and the memory of its joints.
         q: coordinates (n,).
-        iterations: of Newton's method, over all steps.
-        steps: in which the load, and then any motion of the supports, was brought on.
+        iterations: number of Newton iterations, over all steps.
+        steps: number of steps of the load, and then of any motion of the supports.
     """
 
     model: Model
@@ -45,11 +60,11 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
     iterations: int
     steps: int
 
-    def continued(self, model: Model) -> Model:
-        """Return a model with what the joints of this equilibrium know of how it came about.
+    def transfer_memory(self, model: Model) -> Model:
+        """Return a model with the initial gaps and the memory of the joints of this equilibrium.
 
         Args:
-            model: the same rung of the same structure.
+            model: of the same fidelity and the same structure.
 
         Raises:
             InvalidInput: it is another one.
@@ -64,30 +79,30 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
                 f"the state is of another structure, '{self.model.structure.name}', whose blocks "
                 f"are elsewhere than those of '{model.structure.name}': give the same model's"
             )
-        built = self.model.built if isinstance(self.model, Jointed | Moving) else None
-        if built is not None and isinstance(model, Jointed | Moving):
-            model = model.begun(built)
-        return model.remembering(self.model.memory)
+        if self.model.initial_gaps is not None:
+            model = model.with_initial_gaps(self.model.initial_gaps)
+        return model.with_memory(self.model.memory)
 
     @cached_property
     def joints(self) -> xr.Dataset:
         """N, V, M, eccentricity, friction, opening, rotation and slip over joint."""
-        gauges = Gauges.on(self.model)
-        faces = gauges.faces(gauges.read(self.q))
-        resultants, moved = self.model.resultants(self.q), isinstance(self.model, Moving)
-        return joint_dataset(self.model.structure, resultants, faces=faces, moved=moved)
+        observer, large = self.model.observer(), self.model.large_displacements
+        faces = observer.faces(observer.read(self.q))
+        resultants = self.model.resultants(self.q)
+        return joint_dataset(self.model.structure, resultants, faces=faces, moved=large)
 
-    def _words(self) -> str:
-        """What it is, in a line or two."""
-        own, model = judged(self.joints), self.model
+    def _summary(self) -> str:
+        """Describe the equilibrium in one or two lines."""
+        joints, model = assessed_joints(self.joints), self.model
         return (
             f"Equilibrium of '{model.structure.name}' ({model.fidelity}, {model.size} coordinates)"
-            f": |e| ≤ {float(abs(own['eccentricity']).max()):.3f}, "
-            f"V/N ≤ {float(own['friction'].max()):.3f}, N ≥ {float(own['N'].min()) / 1e3:.3g} kN"
+            f": |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
+            f"V/N ≤ {float(joints['friction'].max()):.3f}, "
+            f"N ≥ {float(joints['N'].min()) / 1e3:.3g} kN"
         )
 
     def joint(self, joint: str | int) -> xr.Dataset:
-        """Return what one joint carries.
+        """Return the resultants and the displacements of one joint.
 
         Args:
             joint: its name or number.
@@ -95,49 +110,49 @@ class Equilibrium(Shown, picture="dead.draw_dead_load"):
         Raises:
             InvalidInput: there is no such joint.
         """
-        return one_joint(self.joints, joint)
+        return select_joint(self.joints, joint)
 
 
 def self_weight(model: Model) -> Array:
-    """Return the generalised forces of gravity (n,).
+    """Return the generalised forces of gravity (n,) [N, N m].
 
     Args:
-        model: any rung of the ladder.
+        model: of any fidelity.
     """
     return model.load(BodyForce(0.0, -1.0))
 
 
-@on_one_thread
+@single_threaded
 def dead_load(
     model: Model, newton: Newton | None = None, *, stages: Sequence[Stage] | None = None
 ) -> Equilibrium:
     """Find the equilibrium under self-weight.
 
-    Joints open and slide as they must (nonlinear statics), those that dilate ride up, and bonds
-    that are overstrained break, until none does any more; where Newton's method fails the
-    structure creeps to rest, or steps of the load are halved. Displacements are small: the
+    Joints open and slide as they must (nonlinear statics); joints with dilatancy open as they
+    slide, and overstrained bonds break, until none does any more. Where Newton's method fails the
+    structure is relaxed to rest, or steps of the load are halved. Displacements are small: the
     structure keeps its shape.
 
-    Built in one go, the structure gets its weight as a whole. Built in stages, blocks come
-    without stress onto what has been displaced already, and centring holds some until it is
-    struck. Where displacements may be large, building is by small ones, and balance is then found
-    in the shape that it has given. Joints of the result's `model` know how they began; whatever
-    takes the result as its start goes on with them, and a run that goes on from a `last_state`
-    needs that model.
+    Built in one go, the structure gets its weight as a whole. Built in stages, blocks are placed
+    without stress onto the displaced structure, and centring holds some until it is struck. Where
+    displacements may be large, building is by small ones, and balance is then restored in the
+    displaced shape.
+
+    The returned `model` stores the joint state (initial gaps, slip, broken bonds). Pass the result
+    as `start=` to continue from it; to continue from `last_state(run)`, use this model.
 
     Args:
-        model: any rung of the ladder; in stages not "monolithic".
+        model: of any fidelity; in stages not "monolithic".
         newton: settings of the solves.
-        stages: in which the structure was built, e.g. `usual_stages(structure)`; by default in one
-            go.
+        stages: stages of construction, e.g. `usual_stages(structure)`; by default in one go.
 
     Returns:
         The state, with its joints' resultants.
 
     Raises:
         InvalidInput: the model is none, or the stages do not build it.
-        DidNotConverge: the structure cannot carry its own weight, or hardly; `last` is the last
-            equilibrium found on the way, under part of the weight.
+        DidNotConverge: the structure cannot carry its own weight, or only just; `last` is the last
+            equilibrium, under part of the weight.
 
     Example:
         >>> model = af.build(af.column(breadth=0.6, heights=[1.2, 1.2]), fidelity="rigid")
@@ -147,24 +162,31 @@ def dead_load(
     check_model(model)
     if stages is None:
         return equilibrium_under(model, self_weight(model), newton)
-    if isinstance(model, Moving):
-        return _built_to_move(model, newton, stages)
-    if not isinstance(model, Jointed):
+    # blocks are placed by small displacements on supports that have not moved
+    small = model.small_displacement_model()
+    if not isinstance(small, LinearBlockModel):
         raise InvalidInput(
             f"a model '{model.fidelity}' cannot be built in stages: use 'full', which is the same"
         )
-    solver = _solver(model, newton)
-    built = _built(solver, model.moved(np.zeros_like(model.supports)), stages)
-    return _on_moved_supports(solver, built, self_weight(model), model.supports)
+    small = small.with_support_motion(np.zeros_like(model.support_motion))
+    solver = _create_solver(small, newton)
+    built = _build_in_stages(solver, small, stages)
+    if model.large_displacements:
+        # balance in the displaced shape; tangents have another sparsity pattern there
+        whole = model.with_support_motion(small.support_motion).with_joint_state(built.model)
+        solver, built = _create_solver(whole, newton), replace(built, model=whole)
+        built = _apply_remaining_weight(solver, built, whole, "what was built")
+    return _move_supports(solver, built, self_weight(model), model.support_motion)
 
 
 def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
-    """Find the equilibrium under a load that is brought on from rest.
+    """Find the equilibrium under a load that is applied from rest.
 
-    Supports that have moved do so after that, little by little: the joints follow.
+    Supports that have moved do so after the load, step by step, so that joints slide and open in
+    that order.
 
     Args:
-        model: any rung of the ladder.
+        model: of any fidelity.
         load: generalised forces (n,).
         newton: settings of the solves.
 
@@ -172,100 +194,134 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
         The state under the whole load, on supports that have moved all the way.
 
     Raises:
-        DidNotConverge: there is none; `last` is the last one on the way.
+        DidNotConverge: there is none; `last` is the last equilibrium.
     """
-    solver = _solver(model, newton)
-    before = model.moved(np.zeros_like(model.supports))
-    rest = Equilibrium(before, np.zeros(model.size), 0, 0)
-    carried = _grown(solver, rest, lambda part: (before, part * load), "load")
-    return _on_moved_supports(solver, carried, load, model.supports)
+    solver = _create_solver(model, newton)
+    fixed = model.with_support_motion(np.zeros_like(model.support_motion))
+    unloaded = Equilibrium(fixed, np.zeros(model.size), 0, 0)
+    loaded = _increment_load(solver, unloaded, lambda part: (fixed, part * load), "load")
+    return _move_supports(solver, loaded, load, model.support_motion)
 
 
-def _solver(model: Model, newton: Newton | None) -> Solver:
+def _create_solver(model: Model, newton: Newton | None) -> EquilibriumSolver:
     if newton is not None:
-        instance(newton, Newton, "newton", "give Newton(tolerance=…)")
-    return Solver(model.size, newton, sparing=True)
+        check_type(newton, Newton, "newton", "give Newton(tolerance=…)")
+    return EquilibriumSolver(model.size, newton, prefer_scipy=True)
 
 
-def _on_moved_supports(
-    solver: Solver, found: Equilibrium, load: Array, supports: Array
+def _move_supports(
+    solver: EquilibriumSolver, state: Equilibrium, load: Array, motion: Array
 ) -> Equilibrium:
-    """Move the supports of a structure at rest to where they are to be."""
-    if not supports.any():
-        return found
-    model = found.model
+    """Move the supports of a structure at rest to their final places."""
+    if not motion.any():
+        return state
+    model = state.model
 
     def at(part: float) -> tuple[Model, Array]:
-        return model.moved(part * supports), load
+        return model.with_support_motion(part * motion), load
 
-    return _grown(solver, found, at, "settlement", FOLLOWING)
+    return _increment_load(solver, state, at, "settlement", SUPPORT_SEARCHES)
 
 
-def _built(solver: Solver, whole: Jointed, stages: Sequence[Stage]) -> Equilibrium:
-    """Build a structure stage by stage."""
-    site = Unfinished(whole)
-    found = Equilibrium(site, np.zeros(whole.size), 0, 0)
-    for stage, blocks in zip(stages, placed(whole.structure, stages), strict=True):
+def _build_in_stages(
+    solver: EquilibriumSolver, whole: LinearBlockModel, stages: Sequence[Stage]
+) -> Equilibrium:
+    """Build a structure stage by stage, each in equilibrium before the next."""
+    partial = PartialStructure(whole)
+    state = Equilibrium(partial, np.zeros(whole.size), 0, 0)
+    for stage, blocks in zip(stages, resolve_stages(whole.structure, stages), strict=True):
         if stage.strike:
-            site = site.struck().remembering(found.model.memory)
-            found = _brought_on(solver, found, site, f"'{stage.name}'")
+            partial = partial.struck().with_memory(state.model.memory)
+            state = _apply_remaining_weight(solver, state, partial, f"'{stage.name}'")
         if blocks:
-            site = site.remembering(found.model.memory)
-            site = site.placed(blocks, found.q, centring=stage.centring)
-            found = _brought_on(solver, found, site, f"'{stage.name}'")
-    return replace(found, model=site.remembering(found.model.memory).finished())
+            partial = partial.with_memory(state.model.memory)
+            partial = partial.placed(blocks, state.q, centring=stage.centring)
+            state = _apply_remaining_weight(solver, state, partial, f"'{stage.name}'")
+    return replace(state, model=partial.with_memory(state.model.memory).finished())
 
 
-def _built_to_move(model: Moving, newton: Newton | None, stages: Sequence[Stage]) -> Equilibrium:
-    """Build blocks by small displacements, and find their balance where that has taken them."""
-    small = on_site(model)
-    built = _built(_solver(small, newton), small, stages)
-    assert isinstance(built.model, Jointed)
-    whole = taken_over(model.moved(small.supports), built.model)
-    solver = _solver(whole, newton)
-    found = _brought_on(solver, replace(built, model=whole), whole, "what was built")
-    return _on_moved_supports(solver, found, self_weight(model), model.supports)
+def _apply_remaining_weight(
+    solver: EquilibriumSolver, state: Equilibrium, model: Model, what: str
+) -> Equilibrium:
+    """Apply in steps the part of the weight that is not in balance yet."""
+    carried = model.force(state.q)
+    remaining = self_weight(model) - carried
+    return _increment_load(solver, state, lambda part: (model, carried + part * remaining), what)
 
 
-def _brought_on(solver: Solver, found: Equilibrium, site: Model, what: str) -> Equilibrium:
-    """Bring on, little by little, all weight that is not in balance yet."""
-    carried = site.force(found.q)
-    rest = self_weight(site) - carried
-    return _grown(solver, found, lambda part: (site, carried + part * rest), what)
-
-
-def _grown(
-    solver: Solver,
-    found: Equilibrium,
+def _increment_load(
+    solver: EquilibriumSolver,
+    state: Equilibrium,
     at: Callable[[float], tuple[Model, Array]],
     what: str,
-    ways: Ways = BRINGING_ON,
+    searches: SearchSequence = LOAD_SEARCHES,
 ) -> Equilibrium:
-    """Follow an equilibrium while something grows, which gives a model and a load for each part."""
-    find, halved, smallest = ways
+    """Follow an equilibrium while a load or a motion grows: `at` gives model and load of a part."""
+    find, find_halved, find_smallest = searches
     factor, step = 0.0, 1.0
     while factor < 1.0:
         target = min(1.0, factor + step)
         model, load = at(target)
-        model = model.remembering(found.model.memory)
+        model = model.with_memory(state.model.memory)
         try:
-            model, solved = find(solver, model, load, _start(found, model))
+            model, solution = find(solver, model, load, _initial_guess(state, model))
         except DidNotConverge as error:
+            # the step stays halved for the rest of the load
             step /= 2.0
-            find = halved if step > SMALLEST_STEP else smallest
-            if step >= SMALLEST_STEP:
+            find = find_halved if step > MIN_LOAD_STEP else find_smallest
+            if step >= MIN_LOAD_STEP:
                 continue
             raise DidNotConverge(
                 f"no equilibrium beyond {factor:.3f} of the {what} ({error}): the structure cannot "
                 "carry it; make it thicker, or check the outline, the supports and the load",
-                last=found,
+                last=state,
             ) from error
-        found = Equilibrium(model, solved.q, found.iterations + solved.iterations, found.steps + 1)
+        iterations = state.iterations + solution.iterations
+        state = Equilibrium(model, solution.q, iterations, state.steps + 1)
         factor = target
-    return found
+    return state
 
 
-def _start(found: Equilibrium, model: Model) -> Array:
-    """Where the search for the next equilibrium begins: the last one, on its supports (n,)."""
-    moved = model.supports - found.model.supports
-    return followed(found.model, found.q, moved) if moved.any() else found.q
+def _initial_guess(state: Equilibrium, model: Model) -> Array:
+    """Return the coordinates of the last equilibrium, displaced with its supports (n,)."""
+    motion = model.support_motion - state.model.support_motion
+    return linear_predictor(state.model, state.q, motion) if motion.any() else state.q
+
+
+def dead_load_warnings(dead: Equilibrium, friction: float | None = None) -> tuple[str, ...]:
+    """Return reasons why a structure cannot rest as its dead load says, a sentence each."""
+    structure, joints = dead.model.structure, assessed_joints(dead.joints)
+    ratio, names = joints["friction"], joints["name"].values
+    limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
+    warnings = []
+    if (steep := (ratio > limit).values).any():
+        warnings.append(
+            f"under dead load |V| / N is {float(ratio.max()):.3g} in "
+            f"{join_joint_names(names[steep])}, and joints slide from {limit:g} on: they hold only "
+            "because they never slide"
+        )
+    slip = abs(joints["slip"])
+    if (far := (slip > 1.0 * mm).values).any():
+        warnings.append(
+            f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
+            f"({join_joint_names(names[far])}): it does not stand as it was drawn"
+        )
+    smallest = min(joint.contact.coefficient for joint in structure.joints)
+    if smallest < 0.1:
+        warnings.append(
+            f"the least coefficient of friction is {smallest:g}: joints of stone have 0.6 to 0.75"
+        )
+    if not _stands_as_rigid_blocks(dead):
+        warnings.append(
+            "it was found at rest, but as rigid blocks nothing within friction holds it: "
+            "archfem.stands says that it falls"
+        )
+    return tuple(warnings)
+
+
+def _stands_as_rigid_blocks(dead: Equilibrium) -> bool:
+    """Return whether limit analysis finds it standing, or does not apply."""
+    try:
+        return stands(dead.model.structure)
+    except (InvalidInput, DidNotConverge):  # soft bodies, bonds: no comparison is possible
+        return True

@@ -1,9 +1,9 @@
-"""One equilibrium solve: through PETSc SNES, or where that is not installed or not worth it SciPy.
+"""Newton's method for one equilibrium, by PETSc SNES or by SciPy, with fall-back line searches.
 
-The joint law makes internal forces the gradient of a convex energy, so Newton's full step finds
-the equilibrium in a few iterations from any closed start. Where statuses cycle near collapse, a
-search along the step for the point where the energy's slope vanishes ("cp") settles them. Joints
-that slide have no such energy: there a step ends where the residual has fallen ("bt").
+The joint law makes internal forces the gradient of a convex energy, so full Newton steps converge
+in a few iterations from any closed start. Where statuses of joints cycle near collapse, a search
+along the step for the point where the energy's slope vanishes ("cp") settles them. Joints that
+slide have no such energy: there the step is shortened until the residual falls ("bt").
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,35 +14,29 @@ from importlib.util import find_spec
 import numpy as np
 from scipy import sparse
 
-from archfem.arguments import instance, real
-from archfem.arrays import Array
+from archfem._optional import require_package
+from archfem._typing import Array
+from archfem._validation import check_number, check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.packages import needed
-from archfem.statics.attempts import Engine, Equations, Residual, Tangent
-from archfem.statics.superlu import SuperLU
+from archfem.statics.newton_iteration import (
+    Equations,
+    NewtonEngine,
+    Residual,
+    ScipyNewton,
+    Tangent,
+)
 
-ROUGHLY = 1e-7
-"""Residual, relative to the load, above which round-off is no excuse."""
+# Residual, relative to the load, above which it cannot be round-off [-]
+MAX_ROUND_OFF_RESIDUAL = 1e-7
 
-SMALL = 300
-"""Coordinates up to which SciPy takes about as long as PETSc, 5 to 9 ms a dead load."""
+# Coordinates up to which SciPy takes about as long as PETSc, 5 to 9 ms a dead load
+MAX_SCIPY_UNKNOWNS = 300
 
-HOLLOW = 1e-3
-"""Rounding of forces, relative to the load, that must not be taken for equilibrium. Of stones that
-are displaced by a metre it is below 1e-5."""
+# Line searches in the order tried: along an energy, and down the residual where joints slide
+CONVEX_SEARCHES, SLIDING_SEARCHES = ("basic", "cp"), ("basic", "bt")
 
-SEARCHES = {"basic": 12, "cp": 60, "bt": 60}
-"""Line searches, and the iterations each may take; more than a dozen full steps are a cycle of
-statuses."""
-
-CONVEX, SLIDING = ("basic", "cp"), ("basic", "bt")
-"""Searches in the order tried: along an energy, and down the residual where joints slide."""
-
-SYMMETRIC = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
-"""Methods that take a matrix for symmetric, by the options of PETSc that choose them."""
-
-ASYMMETRY = 1e-9
-"""Difference of a matrix and its transpose, relative to its largest entry, that is round-off."""
+# Iterations of each line search; more than a dozen full steps are a cycle of joint statuses
+MAX_SEARCH_ITERATIONS = {"basic": 12, "cp": 60, "bt": 60}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,55 +46,40 @@ class Newton:
     Attributes:
         tolerance: largest residual, relative to the load [-].
         petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. Methods for
-            symmetric matrices are refused where joints slide, for tangents then are not.
+            symmetric matrices are refused where joints slide, since tangents then are not.
     """
 
     tolerance: float = 1e-10
     petsc: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse what no solve could reach, and options without names."""
-        if not 0.0 < real(self.tolerance, "tolerance of a solve [-]") < 1.0:
+        """Refuse tolerances that no solve could reach, and options without names."""
+        if not 0.0 < check_number(self.tolerance, "tolerance of a solve [-]") < 1.0:
             raise InvalidInput(f"tolerance {self.tolerance:g} of a solve is not between 0 and 1")
-        instance(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
+        check_type(self.petsc, Mapping, "petsc", 'give a dictionary, e.g. {"snes_monitor": ""}')
 
 
 @dataclass(frozen=True)
-class Solved:
-    """A converged solve.
+class Solution:
+    """A converged solve."""
 
-    Attributes:
-        q: coordinates (n,).
-        iterations: of Newton's method, those of a failed first attempt included.
-        residual: norm of what is left.
-    """
-
-    q: Array
-    iterations: int
-    residual: float
+    q: Array  # coordinates (n,)
+    iterations: int  # of Newton's method, including failed attempts
+    residual: float  # Euclidean norm
 
 
-class Solver:
-    """Solves residual(q) = 0 again and again with tangents of one sparsity pattern.
+class EquilibriumSolver:
+    """Solves residual(q) = 0 repeatedly, with tangents of one sparsity pattern."""
 
-    A tangent that is the same object as the last one is not factorised again.
-
-    Args:
-        size: number of coordinates.
-        settings: of the solves.
-        sparing: whether full steps of what is small are left to SciPy, unless there are options
-            for PETSc, which takes longer to load than a few solves take.
-
-    Raises:
-        NotInstalled: there are options for PETSc, which is not installed.
-    """
-
-    def __init__(self, size: int, settings: Newton | None = None, *, sparing: bool = False) -> None:
+    def __init__(
+        self, size: int, settings: Newton | None = None, *, prefer_scipy: bool = False
+    ) -> None:
         self.settings = settings or Newton()
         self._size = size
-        self._light = SuperLU() if sparing and size <= SMALL and not self.settings.petsc else None
+        is_small = size <= MAX_SCIPY_UNKNOWNS and not self.settings.petsc
+        self._scipy_engine = ScipyNewton() if prefer_scipy and is_small else None
         if self.settings.petsc:
-            _ = self._engine  # which may not be there
+            _ = self._engine  # raises at once where PETSc is missing
         self._scale = 1.0
         self._stiffest = 0.0
 
@@ -110,92 +89,76 @@ class Solver:
         tangent: Tangent,
         start: Array,
         scale: float,
-        searches: Iterable[str] = CONVEX,
-    ) -> Solved:
-        """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm.
-
-        Args:
-            residual: forces out of balance at q (n,).
-            tangent: derivative of the residual at q (n, n).
-            start: first guess (n,).
-            scale: size of the load, as by `magnitude`.
-            searches: line searches to try, one after the other.
-
-        Returns:
-            Coordinates, and what it took to find them.
-
-        Raises:
-            DidNotConverge: neither a full step nor a line search led there.
-        """
+        searches: Iterable[str] = CONVEX_SEARCHES,
+    ) -> Solution:
+        """Find q with ‖residual(q)‖ ≤ tolerance × scale, in the Euclidean norm."""
         self._scale = scale
-        equations = Equations(residual, self._checked(tangent), self._fits)
+        equations = Equations(residual, self._check_tangents(tangent), self._is_converged)
         iterations = 0
         for search in searches:
-            engine = self._light if self._light and search == "basic" else self._engine
-            found = engine.attempt(equations, start, search, SEARCHES[search])
-            iterations += found.iterations
-            if not found.failure:
-                return Solved(found.q, iterations, found.rest)
-        failure = found.failure
-        if found.rest <= self.settings.tolerance * scale:
-            failure = f"nothing but rounding holds it, displaced by {abs(found.q).max():.1e}"
+            light = self._scipy_engine if search == "basic" else None
+            engine = self._engine if light is None else light
+            attempt = engine.attempt(equations, start, search, MAX_SEARCH_ITERATIONS[search])
+            iterations += attempt.iterations
+            if not attempt.failure:
+                return Solution(attempt.q, iterations, attempt.residual)
+        failure = attempt.failure
+        if attempt.residual <= self.settings.tolerance * scale:
+            failure = f"nothing but rounding holds it, displaced by {abs(attempt.q).max():.1e}"
         raise DidNotConverge(
             f"no equilibrium after {iterations} iterations: {failure}, residual "
-            f"{found.rest:.2e} against a load of {scale:.2e}"
+            f"{attempt.residual:.2e} against a load of {scale:.2e}"
         )
 
     @cached_property
-    def _engine(self) -> Engine:
-        """What solves, loaded when it is first needed: PETSc takes a while, and begins MPI."""
+    def _engine(self) -> NewtonEngine:
+        """Engine for large systems, loaded when it is first needed: PETSc is slow to initialise."""
         if find_spec("petsc4py") is None and not self.settings.petsc:
-            return SuperLU()
-        with needed("PETSc"):
-            from archfem.statics.snes import Snes
-        return Snes(self._size, self.settings.petsc)
+            return ScipyNewton()
+        with require_package("PETSc"):
+            from archfem.statics.snes import PetscNewton
+        return PetscNewton(self._size, self.settings.petsc)
 
-    def _fits(self, rest: float, q: Array, tangent: sparse.csr_matrix) -> bool:
-        """Return whether a residual is within the tolerance, or nothing but round-off.
-
-        Large rigid motions of stiff blocks leave a residual of the order of the rounding of
-        tangent times displacement, below which no iteration can go. Where that is of the order of
-        the load, a block has gone so far that what is left of its stiffness by rounding holds it.
-        """
-        if 8.0 * np.finfo(float).eps * self._stiffest * abs(q).max() > HOLLOW * self._scale:
+    def _is_converged(self, residual: float, q: Array, tangent: sparse.csr_matrix) -> bool:
+        """Return whether a residual is within the tolerance, or nothing but round-off."""
+        # Large rigid motions of stiff blocks cause a residual of the order of the rounding of
+        # tangent times displacement, below which no iteration can go. Where that is of the order
+        # of the load, a block has moved so far that only rounding holds it: no equilibrium. For
+        # stones displaced by a metre the ratio is below 1e-5.
+        rounding_unit = 8.0 * np.finfo(float).eps
+        if rounding_unit * self._stiffest * abs(q).max() > 1e-3 * self._scale:
             return False
-        if rest <= self.settings.tolerance * self._scale:
+        if residual <= self.settings.tolerance * self._scale:
             return True
-        if rest > ROUGHLY * self._scale:
+        if residual > MAX_ROUND_OFF_RESIDUAL * self._scale:
             return False
-        rounding = np.linalg.norm(abs(tangent) @ abs(q))
-        return bool(rest <= 8.0 * np.finfo(float).eps * rounding)
+        return bool(residual <= rounding_unit * np.linalg.norm(abs(tangent) @ abs(q)))
 
-    def _checked(self, tangent: Tangent) -> Tangent:
-        """Note the stiffness of the first tangent; refuse methods for symmetric ones elsewhere."""
-        # the first is that of the start; later ones may be of iterates that went anywhere
-        chosen = self.settings.petsc
-        asked = {key: chosen[key] for key, each in SYMMETRIC.items() if chosen.get(key) in each}
-        noted = False
+    def _check_tangents(self, tangent: Tangent) -> Tangent:
+        """Wrap a tangent: record its first stiffness, refuse symmetric methods if unsymmetric."""
+        # Only the tangent at the start counts: later iterates may be anywhere.
+        symmetric = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
+        petsc = self.settings.petsc
+        chosen = {key: petsc[key] for key, names in symmetric.items() if petsc.get(key) in names}
+        is_first = True
 
-        def checked(q: Array) -> sparse.csr_matrix:
-            nonlocal noted
+        def check(q: Array) -> sparse.csr_matrix:
+            nonlocal is_first
             matrix = tangent(q)
-            if not noted:
+            if is_first:
                 self._stiffest = max(self._stiffest, float(abs(matrix.data).max(initial=0.0)))
-                noted = True
-            if asked and abs(matrix - matrix.T).max() > ASYMMETRY * abs(matrix).max():
+                is_first = False
+            # asymmetry of less than 1e-9 of the largest entry is round-off
+            if chosen and abs(matrix - matrix.T).max() > 1e-9 * abs(matrix).max():
                 raise InvalidInput(
-                    f"petsc = {asked} is for symmetric matrices, and where joints slide the "
+                    f"petsc = {chosen} is for symmetric matrices, and where joints slide the "
                     "tangent is not: leave it out, and each tangent is factorised by LU"
                 )
             return matrix
 
-        return checked
+        return check
 
 
-def magnitude(load: Array) -> float:
-    """Return the size of a load: the sum of absolute components, the same on any mesh.
-
-    Args:
-        load: generalised forces (n,).
-    """
+def load_magnitude(load: Array) -> float:
+    """Return the size of a load: the sum of absolute components, the same on any mesh."""
     return float(np.sum(np.abs(load)))

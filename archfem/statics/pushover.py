@@ -1,4 +1,9 @@
-"""Pushover: a load grows, or a support moves, until a structure hardly resists any more."""
+"""Pushover: a load grows, or a support moves, until the structure resists no more.
+
+`continuation` adds one equilibrium after the other; here are the length of the steps, relaxation
+where steps fail and joints slide, the rules that end a pushover, and the extrapolation of its
+limit.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,45 +11,76 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from archfem.arguments import instance
-from archfem.arrays import Array
-from archfem.errors import InvalidInput
-from archfem.joints.criteria import Criteria, flagged
-from archfem.joints.resultants import joint_dataset, one_joint
-from archfem.masonry.actions import BodyForce, PointLoad, Settlement, loads
+from archfem._display import ResultDisplay
+from archfem._threads import single_threaded
+from archfem._typing import Array
+from archfem._validation import check_type
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import Criteria, with_failure_flags
+from archfem.joints.resultants import joint_dataset, select_joint
+from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
 from archfem.models.model import Model, check_model
-from archfem.models.moving import Moving
-from archfem.shown import Shown
-from archfem.statics.ends import Path, Stop
+from archfem.statics.continuation import LoadPath, SupportPath
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.statics.following import GROWTH, follow
-from archfem.statics.path import LoadPath
-from archfem.statics.support_path import SupportPath
-from archfem.threads import on_one_thread
 
-CONTROLS = ("displacement", "arc length", "path", "force")
+Path = LoadPath | SupportPath
 
-FLAT, STEEP = 1e-6, 0.2
-"""Growth of the factor in the last step below which the limit has been reached, and the largest
-extrapolation beyond the last factor; both relative to it."""
+PUSHOVER_CONTROLS = ("displacement", "arc length", "path", "force")
+
+# Growth of steps from one to the next [-]
+STEP_GROWTH = 1.1
+
+# Steps over which a path whose joints slide must progress. Other paths also take many small steps,
+# as about a hinge that moves from joint to joint.
+STAGNATION_STEPS = 40
+
+# Relative load increments of relaxation: the first trial, and the smallest one, to which failed
+# trials are halved. The limit is then accurate to the latter [-].
+RELAXATION_LOAD_STEP, MIN_RELAXATION_LOAD_STEP = 0.05, 0.002
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """Rules that end a pushover, the first one that is met.
+
+    Attributes:
+        slope: tangent of the curve relative to its initial tangent [-].
+        displacement: displacement of the loaded point, relative to the structure's size [-].
+        hinges: number of hinged joints, or None not to count them.
+        steps: number of steps.
+    """
+
+    slope: float = 1e-6
+    displacement: float = 0.1
+    hinges: int | None = None
+    steps: int = 400
+
+    def __post_init__(self) -> None:
+        """Refuse rules that are met at once, or never."""
+        if not 0.0 <= self.slope < 1.0:
+            raise InvalidInput(f"slope {self.slope:.3g} is not between 0 and 1")
+        if not (self.displacement > 0.0 and self.steps >= 1):
+            raise InvalidInput(
+                f"displacement {self.displacement:.3g} and steps {self.steps} must be above 0"
+            )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pushover(Shown, picture="pushover.draw_pushover"):
-    """What a pushover found.
+class Pushover(ResultDisplay):
+    """Result of a pushover: curve, joints and limit.
 
     Attributes:
         curve: over step, the factor [-], the displacement of the load along itself since the dead
-            load [m], and Newton's iterations; step 0 is the dead load. For a settlement the
-            displacement is that of the support's fastest corner, and the factor the work of the
-            weights on a unit of the settlement, as `collapse_factor` has it [N m].
-        joints: N, V, M and what follows over step and joint.
+            load [m], and the number of Newton iterations; step 0 is the dead load. For a settlement
+            the displacement is that of the support's fastest corner, and the factor the work of the
+            weights on a unit of the settlement, as in `collapse_factor` [N m].
+        joints: N, V, M and derived quantities over step and joint.
         hinges: joints in the order in which they first hinge, with the face that stays in contact.
-        hinge_steps: the step at which each of them does.
-        outcome: the rule by which it ended, in words.
-        limit: factor that the curve tends to, by extrapolation [-]; undefined (NaN) where it is
-            still too steep to tell.
-        uncertainty: of `limit`: how far beyond the last factor it was extrapolated [-].
+        hinge_steps: step at which each of them first hinges.
+        outcome: rule that ended the pushover, as text.
+        limit: limit of the factor, by extrapolation of the curve [-]; undefined (NaN) where it is
+            still too steep.
+        uncertainty: distance of `limit` from the last factor [-].
     """
 
     curve: xr.Dataset
@@ -57,20 +93,21 @@ class Pushover(Shown, picture="pushover.draw_pushover"):
 
     @property
     def factor(self) -> float:
-        """Factor that was reached at last; under a load that is also the largest."""
+        """Factor of the last step; under a load also the largest."""
         return float(self.curve["factor"][-1])
 
-    def _words(self) -> str:
-        """What it is, in a line or two."""
-        steps, known = self.curve.sizes["step"] - 1, np.isfinite(self.limit)
-        beyond = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}" if known else ""
+    def _summary(self) -> str:
+        """Describe the pushover in one or two lines."""
+        steps, limit = self.curve.sizes["step"] - 1, ""
+        if np.isfinite(self.limit):
+            limit = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}"
         return (
-            f"Pushover: factor {self.factor:.4g} after {steps} steps{beyond}, "
+            f"Pushover: factor {self.factor:.4g} after {steps} steps{limit}, "
             f"{len(self.hinges)} hinges; {self.outcome}"
         )
 
     def joint(self, joint: str | int) -> xr.Dataset:
-        """Return what one joint carries over the steps.
+        """Return the resultants and the displacements of one joint over the steps.
 
         Args:
             joint: its name or number.
@@ -78,10 +115,10 @@ class Pushover(Shown, picture="pushover.draw_pushover"):
         Raises:
             InvalidInput: there is no such joint.
         """
-        return one_joint(self.joints, joint)
+        return select_joint(self.joints, joint)
 
 
-@on_one_thread
+@single_threaded
 def pushover(
     model: Model,
     load: BodyForce | PointLoad | Settlement | Sequence[BodyForce | PointLoad],
@@ -101,7 +138,8 @@ def pushover(
     force, b = 0 by displacement, and for arc length (a, b) is the direction of the last step, in
     units of the first, so that it turns from one to the other as the curve bends (Riks). Steps
     grow by a tenth each. Where Newton's method fails and joints slide, as those of fill in pieces
-    do, the load grows by itself, and the structure creeps to rest under it; else steps are halved.
+    do, the load grows by itself, and the structure is relaxed to rest under it; else steps are
+    halved.
 
     Displacements are small and the joint law is the gradient of a convex energy: the curve never
     falls nor snaps back, but rises to the limit of rigid blocks as an asymptote. The thrust at a
@@ -111,21 +149,21 @@ def pushover(
 
     Bonds break between steps, so that with them the curve does fall; follow it by displacement.
 
-    A *settlement* moves a support instead, under the dead load alone. What changes is the force
-    with which the structure holds it back, and it tends to that of the limit state which resists
-    the settlement least: spreading supports bring an arch to its least thrust.
+    A *settlement* moves a support instead, under the dead load alone. The force with which the
+    structure holds it back changes, and tends to that of the limit state which resists the
+    settlement least: spreading supports bring an arch to its least thrust.
 
     Args:
-        model: any rung of the ladder.
-        load: one action, or several that grow together; a `Settlement` comes alone.
-        control: "displacement", "arc length", "path" or "force"; "path" goes on across the last
-            step in all coordinates, and so follows what snaps back where displacements are large.
-        start: the dead load's equilibrium, found first if not given.
-        stop: when to end.
-        criteria: what makes a joint hinge; by default the usual ones.
+        model: of any fidelity.
+        load: one action, or several that grow together; a `Settlement` stands alone.
+        control: "displacement", "arc length", "path" or "force"; "path" continues normal to the
+            last step in all coordinates, and so follows snap-back where displacements are large.
+        start: the dead load's equilibrium, computed first if not given.
+        stop: rules that end the pushover.
+        criteria: conditions of a hinge; by default the usual ones.
 
     Returns:
-        The curve, the joints along it, and the limit that it tends to.
+        The curve, the joints along it, and its limit.
 
     Raises:
         InvalidInput: control is unknown, or not by displacement for a settlement; the load misses
@@ -136,32 +174,159 @@ def pushover(
         Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
     check_model(model)
-    if control not in CONTROLS:
-        raise InvalidInput(f"control {control!r} is not known: use one of {CONTROLS}")
+    if control not in PUSHOVER_CONTROLS:
+        raise InvalidInput(f"control {control!r} is not known: use one of {PUSHOVER_CONTROLS}")
     for value, kind in ((start, Equilibrium), (stop, Stop), (criteria, Criteria)):
         if value is not None:
-            instance(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
+            check_type(value, kind, kind.__name__.lower(), f"give a {kind.__name__}")
     begin = start or dead_load(model)
-    model = begin.continued(model)
+    model = begin.transfer_memory(model)
     path: Path
     if isinstance(load, Settlement):
         if control != "displacement":
             raise InvalidInput(f"a settlement is a displacement: control {control!r} has no force")
         path = SupportPath.of(model, load, begin)
     else:
-        actions = loads(load)
-        path = LoadPath.of(model, actions, begin)
+        path = LoadPath.of(model, list_loads(load), begin)
     criteria = criteria or Criteria()
-    return _read(path, criteria, follow(path, control, stop or Stop(), criteria))
+    return _label_result(path, criteria, follow(path, control, stop or Stop(), criteria))
 
 
-def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
-    """Label what was found."""
+def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
+    """Add states until a rule ends the path, and return it as text."""
+    # normals (displacement, factor) of the added equation; that of arc length turns with the curve
+    fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
+    min_distance, easy_iterations, easy_growth = 1e-3, 4, 1.4
+    distance, direction = 1.0, np.array([1.0, 1.0]) / np.sqrt(2.0)
+    relaxation = _StepRelaxation(path, criteria, stop.displacement * path.model.structure.size)
+    while True:
+        border = fixed.get(control, direction)
+        if control == "path" and isinstance(path, LoadPath):
+            is_added = path.advance_normal(distance)
+        else:
+            is_added = path.advance(border, distance) or relaxation.advance(border, distance)
+        if not is_added:
+            distance /= 2.0
+            if distance < min_distance:
+                reason = continue_by_relaxation(path, stop, criteria)
+                return reason or failure_message(path, control, criteria)
+            continue
+        step = _last_step(path)
+        direction = step / np.linalg.norm(step)
+        if reason := stop_reason(path, stop, criteria, step):
+            return reason
+        is_easy = control == "path" and path.iterations[-1] <= easy_iterations
+        distance *= easy_growth if is_easy else STEP_GROWTH
+
+
+def _last_step(path: Path) -> Array:
+    """Return displacement and factor of the last step, in units of the first (2,)."""
+    last = np.array([path.displacements[-2:], path.factors[-2:]])
+    return np.diff(last)[:, 0] / np.array(path.unit)
+
+
+def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str | None:
+    """Return the rule that is met after a step, as text, or None."""
+    slope, displacement = abs(float(step[1] / step[0])), float(path.displacements[-1])
+    if slope <= stop.slope:
+        return f"the slope fell to {slope:.2g} of the initial one"
+    if path.factors[-1] <= 0.0 and path.units == "1":
+        return "it bears no load any more"
+    if displacement >= stop.displacement * path.model.structure.size:
+        return f"the {path.moving} moved by {displacement:.3g} m"
+    if stop.hinges is not None:
+        joints = joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
+        count = int((joints["hinge"] != 0).sum())
+        if count >= stop.hinges:
+            return f"{count} joints hinge"
+    share = 0.01  # of all displacement, by which the path must progress
+    if (
+        len(path.states) > STAGNATION_STEPS
+        and _is_stagnating(path, share)
+        and sliding_joints(path, criteria)
+    ):
+        return (
+            f"it crawls: in {STAGNATION_STEPS} steps the {path.moving} moved by no more than "
+            f"{share:.0%} of {displacement:.3g} m, and the factor went no further than "
+            f"{path.factors[-1]:.5g}"
+        )
+    return f"{stop.steps} steps were taken" if len(path.states) > stop.steps else None
+
+
+def _is_stagnating(path: Path, share: float) -> bool:
+    """Return whether displacement and factor change too little, although each step has a state."""
+    before, after = path.displacements[[-STAGNATION_STEPS, -1]]
+    first, last = np.array(path.factors)[[-STAGNATION_STEPS, -1]]
+    change = abs(last - first) / max(abs(last), np.finfo(float).tiny)
+    return bool(after - before <= share * after and change <= MIN_RELAXATION_LOAD_STEP)
+
+
+def sliding_joints(path: Path, criteria: Criteria) -> list[str]:
+    """Return the names of the joints that slide in the last state."""
+    joints = joint_dataset(path.model.structure, path.joint_forces[-1], criteria=criteria)
+    return [str(name) for name in joints["name"].values[joints["slide"].values]]
+
+
+def continue_by_relaxation(path: Path, stop: Stop, criteria: Criteria) -> str | None:
+    """Load a structure whose joints slide further by relaxation; return the rule that ended it."""
+    if not (isinstance(path, LoadPath) and len(path.states) > 1 and sliding_joints(path, criteria)):
+        return None
+    farthest, share = stop.displacement * path.model.structure.size, RELAXATION_LOAD_STEP
+    while share > MIN_RELAXATION_LOAD_STEP:
+        if not path.advance_by_relaxation(share * path.factors[-1], farthest):
+            share /= 2.0
+        elif reason := stop_reason(path, stop, criteria, _last_step(path)):
+            return reason
+    return None
+
+
+def failure_message(path: Path, control: str, criteria: Criteria) -> str:
+    """Return a message that no equilibrium follows, and which joints slide in the last one."""
+    if len(path.states) == 1:
+        raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
+    slides = sliding_joints(path, criteria) if isinstance(path, LoadPath) else []
+    is_limit = control == "force" or (slides and control != "path")
+    message = "the load cannot grow beyond" if is_limit else "no equilibrium was found past"
+    message += f" a factor of {path.factors[-1]:.5g}"
+    if slides:
+        message += f", at which {len(slides)} joints slide, such as '{slides[0]}'"
+    if slides and any(block.grain for block in path.model.structure.blocks):
+        message += "; pieces of fill flow where little holds them: cohesion does, or a wall"
+    return message
+
+
+@dataclass
+class _StepRelaxation:
+    """Relaxation in place of failed steps; the more trials fail, the rarer they are."""
+
+    path: Path  # to which states are added
+    criteria: Criteria  # conditions of sliding
+    farthest: float  # displacement of the load beyond which the structure has collapsed [m]
+    wait: int = 0  # steps that must fail between two trials
+    failed: int = 0  # steps that have failed since the last trial
+
+    def advance(self, border: Array, distance: float) -> bool:
+        """Add a relaxed state under the load increment of the failed step, if joints slide."""
+        path, self.failed = self.path, self.failed + 1
+        if not isinstance(path, LoadPath) or len(path.states) < 2 or self.failed <= self.wait:
+            return False
+        step = _last_step(path)
+        if step[1] <= 0.0 or not sliding_joints(path, self.criteria):
+            return False
+        increment = float(distance * step[1] / (border @ step)) * path.unit[1]
+        increment = max(increment, MIN_RELAXATION_LOAD_STEP * path.factors[-1])
+        is_added = path.advance_by_relaxation(increment, self.farthest)
+        self.wait, self.failed = (0 if is_added else 2 * self.wait + 1), 0
+        return is_added
+
+
+def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
+    """Return the path as labelled datasets, with hinges and limit."""
     count, factors = len(path.states), np.array(path.factors)
     steps = np.arange(count, dtype=float)
     structure, faces = path.model.structure, path.faces
-    moved = isinstance(path.model, Moving)
-    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces, moved=moved)
+    large = path.model.large_displacements
+    joints = joint_dataset(structure, path.resultants, steps, criteria, faces=faces, moved=large)
     joints = joints.rename(time="step").assign_coords(step=np.arange(count))
     curve = xr.Dataset(
         {
@@ -171,23 +336,15 @@ def _read(path: Path, criteria: Criteria, outcome: str) -> Pushover:
         },
         {"step": np.arange(count)},
     )
-    limit, uncertainty = _extrapolated(path.displacements, factors)
+    limit, uncertainty = _extrapolate_limit(path.displacements, factors)
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 
 def hinge_order(
     joints: xr.Dataset, criteria: Criteria | None = None
 ) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
-    """Sort joints by the step at which they first hinge; in a step, those nearer the edge first.
-
-    Args:
-        joints: over step and joint, as of a `Pushover`.
-        criteria: by default those by which the joints were judged already.
-
-    Returns:
-        Joints with the face that stays in contact, and the steps.
-    """
-    joints = flagged(joints, criteria)
+    """Sort joints by the step at which they first hinge; in a step, those nearer the edge first."""
+    joints = with_failure_flags(joints, criteria)
     side = joints["hinge"].transpose("step", "joint").values
     first = np.argmax(side != 0, axis=0)
     e = np.abs(joints["eccentricity"].transpose("step", "joint").values)
@@ -197,27 +354,22 @@ def hinge_order(
     return hinges, tuple(int(first[j]) for j in order)
 
 
-def _shortness(displacements: Array) -> float:
-    """How much shorter the last step is than one that grows as usual, at least 1 [-]."""
-    last, step = float(displacements[-1]), float(displacements[-1] - displacements[-2])
-    return max(1.0, (1.0 - 1.0 / GROWTH) * last / step) if step > 0.0 else 1.0
-
-
-def _extrapolated(displacements: Array, factors: Array) -> tuple[float, float]:
-    """Return the limit of λ = λ_limit - C d^(-1/2), and how far from it the curve ends.
-
-    Taken over the last doubling of d, since points of a joint open one by one. While part of d is
-    elastic it is too high, so that the limit lies in between; a flat last step has reached it.
-    """
+def _extrapolate_limit(displacements: Array, factors: Array) -> tuple[float, float]:
+    """Return the limit of λ = λ_limit - C d^(-1/2), and its distance from the last factor."""
+    # C is fitted over the last doubling of d, since points of a joint open one by one. While part
+    # of d is elastic C is too high, so that the limit lies in between.
     last, before = float(factors[-1]), float(factors[-2])
-    grown = abs(last - before) * _shortness(displacements)
-    if grown <= FLAT * abs(last):
-        return last, FLAT * abs(last)
-    if len(factors) == 2:  # one step tells no curve
+    # The last step may be shorter than one that grows as usual: its change is scaled up to that.
+    d, step = float(displacements[-1]), float(displacements[-1] - displacements[-2])
+    shortness = max(1.0, (1.0 - 1.0 / STEP_GROWTH) * d / step) if step > 0.0 else 1.0
+    flat = 1e-6 * abs(last)
+    if abs(last - before) * shortness <= flat:  # the limit is reached
+        return last, flat
+    if len(factors) == 2:  # one step defines no curve
         return float("nan"), float("nan")
     half = min(int(np.searchsorted(displacements, 0.5 * displacements[-1])), len(factors) - 2)
     x = np.maximum(displacements, displacements[1]) ** -0.5
     beyond = (last - float(factors[half])) * x[-1] / (x[half] - x[-1])
-    if abs(beyond) > STEEP * abs(last):
+    if abs(beyond) > 0.2 * abs(last):  # too far for the asymptote to hold
         return float("nan"), float("nan")
     return last + beyond, abs(beyond)

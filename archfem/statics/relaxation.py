@@ -1,135 +1,249 @@
-"""Equilibria that Newton's method alone does not find: a structure that creeps to rest.
+"""Relaxation to equilibrium where Newton's method fails, and irreversible joints.
 
-Where blocks slide, or hang from joints that open in the first iteration, tangents are singular on
-the way although the structure stands. A drag on every motion, µ K (q - q_0) with K the stiffness
-of the closed structure, keeps them regular: steps of creep follow one another, joints remembering
-each, and the drag fades as the structure comes to rest. It is pseudo-transient continuation:
-Kelley and Keyes, SIAM Journal on Numerical Analysis 35 (1998) 508-523.
+Where blocks slide, or are suspended from joints that open in the first iteration, tangents are
+singular on the way although the structure stands. A drag on every motion, µ K (q - q_0) with K the
+stiffness of the closed structure, makes them regular: steps of creep follow one another, each with
+the joint memory of the one before, and the drag fades as the residual falls. It is pseudo-transient
+continuation (Kelley and Keyes 1998).
 
-A step whose Newton iterations cycle is made with limits of friction that are given: first those
-that no shear reaches, then those that follow from the solution before.
+A step whose Newton iterations cycle is solved with Tresca's law, whose limits of friction do not
+depend on the normal forces. Its energy is convex, and its tangents are symmetric. The limits are
+then updated from the solution and the step is repeated, first with limits that no shear reaches
+(Haslinger, Hlaváček and Nečas 1996).
+
+Slip changes no force in a flat dry joint. Dilatancy raises the blocks that have slid, and a bond
+that breaks releases its force: then equilibrium is solved again, from the present state, until
+nothing slides or breaks any more. Of overstrained bonds those break first where each joint opens
+most, so that a crack grows from its tip, and stops where the rest bears the load.
+
+Where joints slide a structure has many equilibria, and the loading path decides between them. A
+search therefore starts near the last equilibrium, and joint memory is taken from equilibria alone.
+
+References: Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523. Haslinger, Hlaváček and
+Nečas, Handbook of Numerical Analysis IV (1996).
 """
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.errors import DidNotConverge
-from archfem.joints.given_limits import GivenLimits
-from archfem.joints.operator import JointOperator
-from archfem.models.jointed import Jointed
+from archfem.joints.operator import SLIP_LIMIT_TOLERANCE, JointOperator
+from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Model
-from archfem.statics.newton import ROUGHLY, Solved, Solver, magnitude
+from archfem.statics.newton import (
+    CONVEX_SEARCHES,
+    MAX_ROUND_OFF_RESIDUAL,
+    EquilibriumSolver,
+    Solution,
+    load_magnitude,
+)
 
-STEPS = 100
-"""Of creep, at most."""
+# Equilibria under one load, between which joints may slide or break
+MAX_IRREVERSIBLE_ITERATIONS = 1000
 
-EASY = 8
-"""Iterations up to which a step was easy, and the next one is made with less drag."""
+# Finds an equilibrium of a model under a load (n,) from an initial guess (n,), and returns the
+# model with its joint memory there
+Search = Callable[[EquilibriumSolver, Model, Array, Array], tuple[Model, Solution]]
 
-CHANGE = 4.0
-"""Factor by which the drag falls after an easy step, and grows after one that failed."""
-
-HARD = 256.0
-"""Drag beyond which no step will succeed [-]."""
-
-WAIT = 12
-"""Steps in which what is out of balance must halve; else the structure flows."""
-
-ROUNDS = 6
-"""In which limits of friction are taken from the solution before, within a step."""
+# Searches for the first trial of a whole step, for halved steps and for the smallest steps
+SearchSequence = tuple[Search, Search, Search]
 
 
-def relaxed(solver: Solver, model: Model, load: Array, start: Array) -> tuple[Model, Solved]:
-    """Let a structure creep to equilibrium.
+@dataclass(frozen=True, eq=False)
+class TrescaJoints(JointOperator):
+    """Joint operator with shear limits independent of the normal forces (Tresca's law)."""
 
-    Args:
-        solver: for the pattern of this model's tangents.
-        model: with what its joints remember at the start.
-        load: generalised forces (n,).
-        start: coordinates from which it creeps (n,).
+    # limit at each point, not negative (p,) [N]
+    shear_limit: Array = field(default_factory=lambda: np.zeros(0))
 
-    Returns:
-        The model with what its joints remember in the end, and the coordinates there.
+    @classmethod
+    def of(cls, joints: JointOperator, shear_limit: Array) -> "TrescaJoints":
+        """Return joints with other shear limits and the same memory."""
+        operator = joints.law, joints.opening, joints.slip, joints.gap_offset
+        return cls(*operator, joints.irreversible_slip, joints.broken, shear_limit)
 
-    Raises:
-        DidNotConverge: it does not come to rest: it falls, or flows.
-    """
-    drag, iterations, rests = 1.0, 0, [np.inf]
-    q, closed, scale = start, model.closed(), magnitude(load)
-    while drag <= HARD and len(rests) <= STEPS:
+    def coulomb_limit(self, normal: Array, closed: Array) -> Array:
+        """Return the shear limits, for any normal forces (p,) [N]."""
+        return self.shear_limit
+
+    def stiffness(self, q: Array) -> Array:
+        """Return the point stiffnesses of the tangent, as `tangents` takes them (m,) [N/m]."""
+        across = self.law.stiffness(self.effective_gaps(q))
+        limit = (1.0 + SLIP_LIMIT_TOLERANCE) * self.shear_limit
+        over = self.points.slides & (np.abs(self.trial_shear(q)) > limit)
+        along = np.where(over, 0.0, self.points.shear_spring)
+        # no coupling of slip with opening: it is zero where that of Coulomb's law would stand
+        return np.concatenate([across, along, *([np.zeros_like(across)] if self.slides else [])])
+
+
+def relax(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solution]:
+    """Find an equilibrium by steps of creep against a fading drag."""
+    drag, max_drag, max_steps = 1.0, 256.0, 100  # drag relative to the closed stiffness [-]
+    easy_iterations, drag_factor, patience = 8, 4.0, 12
+    iterations, residuals = 0, [np.inf]
+    q, closed, scale = start, model.closed_tangent(), load_magnitude(load)
+    while drag <= max_drag and len(residuals) <= max_steps:
         try:
-            crept = _crept(solver, model, load, q, drag * closed)
+            step = _solve_creep_step(solver, model, load, q, drag * closed)
         except DidNotConverge:
-            drag *= CHANGE
+            drag *= drag_factor
             continue
-        q, iterations = crept.q, iterations + crept.iterations
-        model = model.remembering(model.remembered(q))
-        rest = float(np.linalg.norm(model.force(q) - load))
-        if rest <= _least(solver, model, q, scale):
-            return model, Solved(q, iterations, rest)
-        rests.append(rest)
-        if len(rests) > WAIT and rest > 0.5 * rests[-WAIT]:
+        q, iterations = step.q, iterations + step.iterations
+        model = model.with_memory(model.updated_memory(q))
+        residual = float(np.linalg.norm(model.force(q) - load))
+        if residual <= _relaxation_tolerance(solver, model, q, scale):
+            return model, Solution(q, iterations, residual)
+        residuals.append(residual)
+        # a residual that does not halve in a dozen steps belongs to a structure that flows
+        if len(residuals) > patience and residual > 0.5 * residuals[-patience]:
             break
-        drag /= CHANGE if crept.iterations <= EASY else 1.0
+        drag /= drag_factor if step.iterations <= easy_iterations else 1.0
     raise DidNotConverge(
-        f"it does not come to rest in {len(rests) - 1} steps of creep: {rests[-1]:.2e} of "
+        f"it does not come to rest in {len(residuals) - 1} steps of creep: {residuals[-1]:.2e} of "
         f"{scale:.2e} stays out of balance"
     )
 
 
-def _crept(
-    solver: Solver, model: Model, load: Array, start: Array, drag: sparse.csr_matrix
-) -> Solved:
-    """One step against a drag (n, n)."""
+def _solve_creep_step(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array, drag: sparse.csr_matrix
+) -> Solution:
+    """Solve one step against a drag (n, n), by Coulomb's law or by updated Tresca limits."""
     try:
-        return _dragged(solver, model, load, (start, start), drag, ("basic",))
+        return _solve_with_drag(solver, model, load, (start, start), drag, ("basic",))
     except DidNotConverge:
-        if not isinstance(model, Jointed):
+        if not isinstance(model, LinearBlockModel):
             raise
-    points = len(model.operator.points.arm)
-    given, q, iterations = np.full(points, magnitude(load)), start, 0
-    for _ in range(ROUNDS):
-        held = model.between(GivenLimits.of(model.operator, given))
-        solved = _dragged(solver, held, load, (start, q), drag, ("basic", "cp"))
-        q, iterations = solved.q, iterations + solved.iterations
-        given = _limits(model.operator, q)
-    return Solved(q, iterations, solved.residual)
+    joints = model.operator
+    limit, q, iterations = np.full(len(joints.points.offset), load_magnitude(load)), start, 0
+    for _ in range(6):  # updates of the limits, of which a step needs no more accuracy
+        tresca = model.with_joint_law(TrescaJoints.of(joints, limit))
+        solution = _solve_with_drag(solver, tresca, load, (start, q), drag, ("basic", "cp"))
+        q, iterations = solution.q, iterations + solution.iterations
+        opening = joints.effective_gaps(q)
+        limit = joints.coulomb_limit(joints.law.forces(opening), joints.law.closed_area(opening))
+    return Solution(q, iterations, solution.residual)
 
 
-def _limits(joints: JointOperator, q: Array) -> Array:
-    """Coulomb's limits at q (p,) [N]."""
-    opening = joints.felt(q)
-    return joints.limits(joints.law.forces(opening), joints.law.closed(opening))
-
-
-def _dragged(
-    solver: Solver,
+def _solve_with_drag(
+    solver: EquilibriumSolver,
     model: Model,
     load: Array,
     starts: tuple[Array, Array],
     drag: sparse.csr_matrix,
     searches: tuple[str, ...],
-) -> Solved:
-    """Solve a step: from where the drag counts, and where iterations begin, each (n,)."""
-    first, guess = starts
+) -> Solution:
+    """Solve a step from the origin of the drag and an initial guess, each (n,)."""
+    origin, guess = starts
 
     def tangent(q: Array) -> sparse.csr_matrix:
         stiffness = model.tangent(q)
-        together = stiffness.copy()
-        together.data = stiffness.data + drag.data
-        return together
+        # both have one pattern: adding the entries keeps it, where a sparse sum might not
+        total = stiffness.copy()
+        total.data = stiffness.data + drag.data
+        return total
 
     return solver.solve(
-        lambda q: model.force(q) - load + drag @ (q - first),
+        lambda q: model.force(q) - load + drag @ (q - origin),
         tangent,
         guess,
-        magnitude(load),
+        load_magnitude(load),
         searches,
     )
 
 
-def _least(solver: Solver, model: Model, q: Array, scale: float) -> float:
-    """What may be left out of balance: the tolerance, or the rounding of large motions."""
+def _relaxation_tolerance(solver: EquilibriumSolver, model: Model, q: Array, scale: float) -> float:
+    """Return the accepted residual: the tolerance, or the round-off of large motions [N]."""
     rounding = 8.0 * np.finfo(float).eps * np.linalg.norm(abs(model.tangent(q)) @ abs(q))
-    return min(max(solver.settings.tolerance * scale, float(rounding)), ROUGHLY * scale)
+    tolerance = max(solver.settings.tolerance * scale, float(rounding))
+    return min(tolerance, MAX_ROUND_OFF_RESIDUAL * scale)
+
+
+def has_irreversible_joints(model: Model) -> bool:
+    """Return whether joint memory may change joint forces: dilatancy or bonds."""
+    return model.operator is not None and not model.operator.points.is_plain
+
+
+def is_stationary(model: Model, q: Array, iterations: int) -> bool:
+    """Return whether an equilibrium was in balance without iterations, and tears no bond."""
+    operator = model.operator
+    if iterations > 0 or operator is None or operator.bonds is None:
+        return iterations == 0
+    return not operator.bonds.exceeded(operator.effective_gaps(q)).any()
+
+
+def solve_irreversible(
+    solver: EquilibriumSolver,
+    model: Model,
+    load: Array,
+    start: Array,
+    searches: tuple[str, ...] = CONVEX_SEARCHES,
+) -> tuple[Model, Solution]:
+    """Find an equilibrium that remains one with the joint memory updated by it."""
+    q, iterations = start, 0
+    for number in range(MAX_IRREVERSIBLE_ITERATIONS):
+        solution = _solve_balance(solver, model, load, q, searches)
+        q, iterations = solution.q, iterations + solution.iterations
+        # the first equilibrium may be in balance by chance, with memory of its own still to come
+        if number > 0 and is_stationary(model, solution.q, solution.iterations):
+            return model, Solution(q, iterations, solution.residual)
+        before, model = model.memory, model.with_memory(model.updated_memory(q))
+        if not has_irreversible_joints(model):
+            return model, solution
+    change = float(np.abs(model.memory - before).max())
+    raise DidNotConverge(
+        f"joints still dilate or break in {MAX_IRREVERSIBLE_ITERATIONS} rounds under the same "
+        f"load, by {change:.2g} m in the last one: give less dilatancy, or softer joints across "
+        "than along"
+    )
+
+
+def _solve_balance(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array, searches: tuple[str, ...]
+) -> Solution:
+    """Find an equilibrium by Newton's method with the present joint memory."""
+    scale = load_magnitude(load)
+    return solver.solve(lambda q: model.force(q) - load, model.tangent, start, scale, searches)
+
+
+def linear_predictor(model: Model, q: Array, motion: Array) -> Array:
+    """Return coordinates after a motion of the supports, with joint statuses frozen (n,)."""
+    # Supports that move together carry the structure with them as it is.
+    try:
+        return q - splu(model.tangent(q).tocsc()).solve(model.support_forces(q, motion))
+    except RuntimeError:  # the tangent is singular
+        return q
+
+
+def solve_local(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solution]:
+    """Find an equilibrium near the start, by a few full Newton steps."""
+    return solve_irreversible(solver, model, load, start, ("basic",))
+
+
+def solve_or_relax(
+    solver: EquilibriumSolver, model: Model, load: Array, start: Array
+) -> tuple[Model, Solution]:
+    """Find an equilibrium by Newton's method, and where that fails by relaxation."""
+    try:
+        return solve_irreversible(solver, model, load, start)
+    except DidNotConverge:
+        model, solution = relax(solver, model, load, start)
+        if has_irreversible_joints(model):
+            return solve_irreversible(solver, model, load, solution.q)
+        return model, solution
+
+
+# While a load grows: the structure may relax, once, to all of it
+LOAD_SEARCHES: SearchSequence = (solve_or_relax, solve_irreversible, solve_irreversible)
+
+# While supports move: where full Newton steps do not converge the motion is halved, since a search
+# far from the start may end in an equilibrium that the loading path does not reach
+SUPPORT_SEARCHES: SearchSequence = (solve_local, solve_local, solve_or_relax)

@@ -1,30 +1,209 @@
-"""Several cases side by side: what a measure buys, what an assumption decides."""
+"""Several cases side by side: what a measure buys, what an assumption decides.
 
+What a study finds of its cases: kept in files, set side by side in tables.
+
+A study's file as tables.
+"""
+
+import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from archfem._files import align_columns, atomic_write
+from archfem._typing import Array
 from archfem.cases.case import Case
-from archfem.cases.settings import checked, refuse_unknown
-from archfem.dynamics.history import History, history_of
-from archfem.dynamics.verdicts import first_mechanisms
+from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
+from archfem.dynamics.fall import FALLEN_STATES
+from archfem.dynamics.history import (
+    MECHANISM_DEFINITIONS,
+    PUBLISHED_DEFINITION,
+    Ending,
+    History,
+    first_mechanisms,
+    partial_history,
+)
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import judged, roles_of
-from archfem.studies.asking import Asked
-from archfem.studies.files import study_tables
-from archfem.studies.finders import Found, of_scales, run_of
-from archfem.studies.findings import by_part
-from archfem.studies.memory import first_mode, ground_motion, ground_suite, resting
-from archfem.studies.over import Axis
-from archfem.studies.points import PAIR, Point
+from archfem.joints.criteria import assessed_joints, part_roles
+from archfem.limit.mechanism_count import MECHANISM_KINDS
+from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
+from archfem.studies.evaluators import Evaluator, Findings, of_scales, run_motion
+from archfem.studies.parameter_space import PAIR, Axis, Point
+
+
+def study_tables(path: Path) -> dict[str, Any]:
+    """Return the tables of a study's file."""
+    return read_tables(path, "study")
+
+
+@dataclass
+class Finding:
+    """What was found of one case.
+
+    Attributes:
+        case: the case as text.
+        frequency: of the first mode about the dead load [Hz].
+        mass: its share of the mass along x [-].
+        roles: of the rings and piers, by part.
+        dead: largest |e| of each of them under dead load [-].
+        runs: by pair, the largest `eccentricity` and `friction` of each part [-], the first of the
+            `mechanisms` by each definition, its kind and time [s], how the run `ended`, the same in
+            words, `outcome`, and what it left, `fall`, where displacements may be large.
+        scales: by pair and definition, the least factor found to fail and the largest below it
+            found not to; infinite where none failed.
+        search: options with which they were searched for; None where that was not kept.
+    """
+
+    case: str
+    frequency: float
+    mass: float
+    roles: dict[str, str]
+    dead: dict[str, float]
+    runs: dict[str, dict[str, Any]] = field(default_factory=dict)
+    scales: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    search: dict[str, Any] | None = None
+
+    def of_pairs(self, pairs: Sequence[str]) -> "Finding":
+        """Return what was found under some of the pairs.
+
+        Args:
+            pairs: their names; those of which nothing is known are left out.
+        """
+        runs, scales = ({p: of[p] for p in pairs if p in of} for of in (self.runs, self.scales))
+        return replace(self, runs=runs, scales=scales)
+
+    def least(self, definition: str) -> Array:
+        """Return the least factor that fails by a definition, of each pair (pairs,) [-].
+
+        Args:
+            definition: one of `MECHANISM_DEFINITIONS`.
+        """
+        return np.array([found[definition][0] for found in self.scales.values()])
+
+    @property
+    def factors(self) -> dict[str, Array]:
+        """`least` of each definition."""
+        return {definition: self.least(definition) for definition in MECHANISM_DEFINITIONS}
+
+
+def by_part(values: xr.DataArray) -> dict[str, float]:
+    """Return the largest value of each part's joints."""
+    largest = values.groupby("part").max()
+    return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
+
+
+def write(finding: Finding, path: Path) -> None:
+    """Write findings in one stroke."""
+    with atomic_write(path) as draft:
+        draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
+
+
+def study_table(findings: Mapping[str, Finding]) -> str:
+    """Return two tables, a line for each case.
+
+    The first tells of the motions as each case applies them: the first mode, the gravest joint of
+    rings and piers (its median over the pairs), in how many pairs each definition of a mechanism
+    is met, in how many a mechanism of which class by the words of Demirel and Aldemir, and, where
+    displacements may be large, in how many blocks fall; a run
+    that broke off tells only of the time before, and is counted below. The second, where they were
+    looked for, tells by what factor on the whole motions they begin: the median over the pairs, and
+    their range.
+
+    Args:
+        findings: by name of the case.
+    """
+    head = [
+        "case",
+        "mode 1",
+        "mass x",
+        "|e| dead",
+        "|e| rings",
+        "|e| piers",
+        *MECHANISM_DEFINITIONS,
+    ]
+    head.append(PUBLISHED_DEFINITION)
+    falling = any(_falls(found) for found in findings.values())
+    head += ["blocks fall"] if falling else []
+    rows = []
+    for name, found in findings.items():
+        cells = [name, f"{found.frequency:.2f} Hz", f"{found.mass:.0%}"]
+        cells.append(f"{max(found.dead.values()):.3f}")
+        cells += [_largest(found, role) for role in ("ring", "pier")]
+        for definition in MECHANISM_DEFINITIONS:
+            met = [run["mechanisms"][definition] is not None for run in found.runs.values()]
+            cells.append(f"{sum(met)} of {len(met)}")
+        rows.append([*cells, _classes(found), *([_falls(found) or "-"] if falling else [])])
+    tables = [align_columns(head, rows), *_broken(findings)]
+    if any(found.scales for found in findings.values()):
+        rows = [
+            [name, *(_range(found.least(definition)) for definition in MECHANISM_DEFINITIONS)]
+            for name, found in findings.items()
+        ]
+        tables.append(align_columns(["factor at first mechanism", *MECHANISM_DEFINITIONS], rows))
+    return "\n\n".join(tables)
+
+
+def _classes(finding: Finding) -> str:
+    """In how many pairs a mechanism of each class is met, by the words of Demirel and Aldemir."""
+    met = [
+        found["kind"]
+        for run in finding.runs.values()
+        if (found := run["mechanisms"][PUBLISHED_DEFINITION])
+    ]
+    return (
+        ", ".join(f"{met.count(kind)} {kind}" for kind in MECHANISM_KINDS if kind in met) or "none"
+    )
+
+
+def _falls(finding: Finding) -> str:
+    """In how many pairs blocks fall; empty where displacements were taken as small."""
+    known = [kind for run in finding.runs.values() if (kind := run.get("fall")) is not None]
+    return f"{sum(kind in FALLEN_STATES for kind in known)} of {len(known)}" if known else ""
+
+
+def _broken(findings: Mapping[str, Finding]) -> list[str]:
+    """A line for each case with runs that broke off, as one text or none."""
+    lines = []
+    for name, finding in findings.items():
+        failed = [run["ended"] == Ending.FAILED for run in finding.runs.values()]
+        if any(failed):
+            lines.append(f"{name}: {sum(failed)} of {len(failed)} runs broke off")
+    return ["\n".join(lines)] if lines else []
+
+
+def _largest(finding: Finding, role: str) -> str:
+    """Median over the pairs of the largest |e| in all rings, or in all piers."""
+    each = [
+        max(
+            (e for part, e in run["eccentricity"].items() if finding.roles[part] == role),
+            default=None,
+        )
+        for run in finding.runs.values()
+    ]
+    known = [e for e in each if e is not None]
+    return f"{np.median(known):.3f}" if known else "-"
+
+
+def _range(factors: Array) -> str:
+    """Median and range of factors; a dash where there is none up to the largest that was tried."""
+    if not len(factors) or np.isinf(factors).all():
+        return "-"
+    low, middle, high = np.quantile(factors, [0.0, 0.5, 1.0], method="nearest")
+    return f"{_factor(middle)} ({_factor(low)} to {_factor(high)})"
+
+
+def _factor(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "-"
+
 
 CASE = {"case": str, "set": [str]}
-SCALES = {"precision": "1", "between": ["1"]}
+SCALES = {"precision": "1", "range": ["1"]}
 STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
 
 
@@ -52,9 +231,9 @@ class Comparison:
         return float(suite.get("reduction", 1.0) / suite.get("scale", 1.0))
 
     @property
-    def asked(self) -> Asked:
+    def asked(self) -> Evaluator:
         """What is asked of each case under each pair."""
-        return Asked(beside, {"scales": self.scales})
+        return Evaluator(evaluate_comparison, {"scales": self.scales})
 
     @cached_property
     def axis(self) -> Axis:
@@ -109,9 +288,9 @@ class Comparison:
         path = Path(path)
         given = study_tables(path)
         refuse_unknown(given, STUDY)
-        given, cases = checked(given, STUDY, "study"), {}
+        given, cases = check_table(given, STUDY, "study"), {}
         for name, table in given.get("cases", {}).items():
-            own = checked(table, CASE, f"cases.{name}")
+            own = check_table(table, CASE, f"cases.{name}")
             if "case" not in own:
                 raise InvalidInput(f"{path}: cases.{name} names no case file")
             both = [*given.get("set", []), *own.get("set", []), *changes]
@@ -130,35 +309,20 @@ class Comparison:
         )
 
 
-def beside(case: Case, scales: Mapping[str, Any] | None = None) -> Found:
-    """Return what is set side by side of a case under the one pair of its suite.
-
-    Args:
-        case: what is asked.
-        scales: options of the search for factors on the whole motion; None looks for none.
-
-    Returns:
-        Of the dead load `frequency` [Hz] and `mass` [-] of the first mode, and of each part "role:"
-        and "dead:", its |e|; of the run, of each part, "eccentricity:" and "friction:", by each
-        definition "mechanism:" and "time:", and how it `ended`; and, where they are looked for, the
-        factors "scale:" and "survives:" by each definition.
-
-    Raises:
-        DidNotConverge: the structure does not stand.
-        KeyboardInterrupt: on Ctrl-C.
-    """
-    rest, motion = resting(case), ground_motion(case)
-    joints, first = judged(rest.dead.joints), first_mode(rest)
-    found: Found = {
+def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
+    """Return what is set side by side of a case under the one pair of its suite."""
+    rest, motion = dead_load_of(case), ground_motion(case)
+    joints, first = assessed_joints(rest.dead.joints), first_mode(rest)
+    found: Findings = {
         "frequency": float(first.frequencies[0]),
         "mass": float(first.mass_ratios[0, 0]),
-        **_each("role", roles_of(joints)),
+        **_each("role", part_roles(joints)),
         **_each("dead", by_part(abs(joints["eccentricity"]).fillna(0.5))),
     }
     try:
-        run = run_of(rest, motion)
+        run = run_motion(rest, motion)
     except DidNotConverge as error:
-        run = history_of(error)
+        run = partial_history(error)
     found |= of_run(run)
     if scales is not None:
         suite = ground_suite(case)
@@ -169,28 +333,21 @@ def beside(case: Case, scales: Mapping[str, Any] | None = None) -> Found:
     return found
 
 
-def of_run(run: History) -> Found:
-    """Return what is kept of a run, which may have broken off.
-
-    Args:
-        run: what happened.
-
-    Returns:
-        As `beside` does.
-    """
-    joints, met = judged(run.joints), first_mechanisms(run)
+def of_run(run: History) -> Findings:
+    """Return what is kept of a run, which may have broken off."""
+    joints, met = assessed_joints(run.joints), first_mechanisms(run)
     return {
         **_each("eccentricity", by_part(abs(joints["eccentricity"]).max("time").fillna(0.5))),
         **_each("friction", by_part(joints["friction"].max("time").fillna(np.inf))),
         **_each("mechanism", {name: str(m.kind) if m else "" for name, m in met.items()}),
         **_each("time", {name: m.time if m else np.inf for name, m in met.items()}),
         "fall": "" if run.fall is None else run.fall.kind,
-        "ended": str(run.ended),
+        "ended": str(run.ending),
         "outcome": run.outcome,
     }
 
 
-def _each(word: str, values: Mapping[str, Any]) -> Found:
+def _each(word: str, values: Mapping[str, Any]) -> Findings:
     """Values under their names, a word before each."""
     return {f"{word}: {name}": value for name, value in values.items()}
 
@@ -199,18 +356,16 @@ def _search(given: Any) -> dict[str, Any] | None:
     """What a study says of the search for factors: a table of options, true or false."""
     if isinstance(given, bool):
         return {} if given else None
-    options = checked(given, SCALES, "scales")
-    if len(options.get("between", (0, 0))) != 2:
-        raise InvalidInput(f"scales.between = {options['between']}: give the least and the largest")
+    options = check_table(given, SCALES, "scales")
+    if "range" in options:
+        if len(options["range"]) != 2:
+            raise InvalidInput(f"scales.range = {options['range']}: give the least and the largest")
+        options["between"] = options.pop("range")  # keyword of `mechanism_scales`
     return options
 
 
 def file_name(name: str) -> str:
-    """Return a name as that of a file.
-
-    Args:
-        name: of a case.
-    """
+    """Return a name as that of a file."""
     return re.sub(r"[^\w+-]+", "_", name).strip("_")
 
 

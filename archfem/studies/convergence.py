@@ -4,6 +4,8 @@ References:
     Richardson, Phil. Trans. R. Soc. A 210 (1911) 307-357. Roache, J. Fluids Eng. 116 (1994) 405-413
     and Celik and others, J. Fluids Eng. 130 (2008) 078001 for the grid convergence index.
     Eça and Hoekstra, J. Comput. Phys. 262 (2014) 104-130 where no order can be believed.
+
+Speed against error of a case over rungs, meshes, rules and steps: a study, a point a setting.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,17 +17,31 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem.arrays import Array
+from archfem._files import align_columns
+from archfem._typing import Array
 from archfem.cases.case import Case
-from archfem.errors import InvalidInput
+from archfem.cases.run import expected_damping
+from archfem.dynamics.accuracy import (
+    Accuracy,
+    Setting,
+    TimedRun,
+    candidate_settings,
+    compare_runs,
+    reference_settings,
+    time_run,
+)
+from archfem.dynamics.schemes import Viscous
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.models.builder import build
+from archfem.studies.cache import dead_load_of, ground_motion
+from archfem.studies.evaluators import Findings
 from archfem.studies.study import Study
-from archfem.tables import aligned
 
+# Factors on the estimated error: where an order is seen, and where none is
 SAFETY, UNSURE = 1.25, 3.0
-"""Factors on the estimated error: where an order is seen, and where none is."""
 
+# Orders that are believed of elements and schemes whose order is 2: more is chance
 ORDERS = 0.5, 2.1
-"""Orders that are believed of elements and schemes whose order is 2: more is chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +148,7 @@ class MeshSensitivity:
                              f"{found.error:.2g}"])  # fmt: skip
         for kind, values in (("rule", self.rules), ("rung", self.rungs)):
             rows += [[f"{kind} {name}", f"{each:.6g}", "", "", ""] for name, each in values.items()]
-        return aligned([self.quantity, "value", "order", "limit", "error bar"], rows)
+        return align_columns([self.quantity, "value", "order", "limit", "error bar"], rows)
 
 
 def mesh_sensitivity(  # noqa: PLR0913  (what differs, each with its usual values)
@@ -170,7 +186,7 @@ def mesh_sensitivity(  # noqa: PLR0913  (what differs, each with its usual value
     Raises:
         InvalidInput: there is no such finding, or a point of the mesh or the steps failed.
     """
-    find = find or ("history" if case.moves else "dead load")
+    find = find or ("history" if case.has_motion else "dead load")
     timed = find != "dead load"
     base: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
     base |= {"analysis.dt": steps[-1]} if timed else {}
@@ -214,3 +230,76 @@ def _told(table: xr.Dataset, quantity: str) -> MeshSensitivity:
     ]
     assert paths[0] is not None
     return MeshSensitivity(quantity, paths[0], paths[1], along("rule"), along("rung"), table)
+
+
+# Keys of a case's model that settings say
+VARIED = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
+
+
+def case_accuracy(
+    case: Case, folder: str | Path | None = None, *, workers: int | None = 1, client: Any = None
+) -> Accuracy:
+    """Run a case over rungs × meshes × quadratures × time steps against a converged reference.
+
+    Args:
+        case: with one motion; its own rung, mesh, rule and step do not matter.
+        folder: as for `Study.run`, and `workers` and `client`.
+        workers: more than one share what there is of memory bandwidth: seconds are the processor's,
+            and rise by a few per cent.
+        client: likewise.
+
+    Returns:
+        As `archfem.accuracy`, of the structure under its dead load as the case says it was built.
+
+    Raises:
+        InvalidInput: the case has no motion, or several; or as `Study.run`.
+        DidNotConverge: the reference failed.
+        StudyStopped: the disk is full or the scheduler was lost; what was finished is kept.
+    """
+    motion = ground_motion(case)
+    references = reference_settings(case.structure)
+    damping = expected_damping(case)
+    if callable(damping):
+        damping = damping(build(case.structure, references[0].discretisation))
+    settings = [*references, *candidate_settings(case.structure)]
+    model = {key: v for key, v in case.settings.get("model", {}).items() if key not in VARIED}
+    study = Study.of(
+        Case.of({**case.settings, "model": model}, case.folder),
+        [_changes(setting) for setting in settings],
+        {"name": timed_case, "damping": damping},
+        title=f"{case.title}: speed against error",
+    )
+    table = study.run(folder, workers=workers, client=client)
+    if "peaks" not in table:
+        raise DidNotConverge(f"no setting ran: {table['error'].values[0] or 'each failed'}")
+    runs = [_run(table.isel(point=k)) for k in range(len(settings))]
+    return compare_runs(settings, runs, motion.duration, case.tolerance)
+
+
+def _changes(setting: Setting) -> dict[str, Any]:
+    """What a setting is in a case file."""
+    asked = setting.discretisation
+    told: dict[str, Any] = {
+        "model.fidelity": asked.fidelity,
+        "model.cells": list(asked.cells),
+        "model.quadrature": asked.quadrature,
+        "analysis.dt": setting.dt,
+    }
+    return told if asked.points is None else told | {"model.quadrature_points": asked.points}
+
+
+def _run(row: xr.Dataset) -> TimedRun:
+    """A point of the table: one that ended in an error has neither size nor peaks."""
+    if not row["coordinates"].notnull():
+        return TimedRun(0, inf, None)
+    peaks = row["peaks"].values
+    failed = bool(np.isnan(peaks).any())
+    return TimedRun(int(row["coordinates"]), float(row["seconds"]), None if failed else peaks)
+
+
+def timed_case(case: Case, damping: Viscous | None) -> Findings:
+    """Return how long a run of a case takes, and the largest |e| of each joint."""
+    rest, motion = dead_load_of(case), ground_motion(case)
+    run = time_run(rest.dead.model, motion, damping, case.analysis["dt"], start=rest.dead)
+    found: Findings = {"coordinates": run.size, "seconds": run.seconds}
+    return found if run.peaks is None else found | {"peaks": run.peaks}

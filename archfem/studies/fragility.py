@@ -18,21 +18,21 @@ import numpy as np
 from scipy import stats
 from scipy.special import ndtr
 
-from archfem.arguments import real, reals, whole
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem._validation import check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 
+# Samples of the bootstrap
 RESAMPLES = 500
-"""Samples of the bootstrap."""
 
+# Motions or stripes that two parameters take at least
 LEAST = 3
-"""Motions or stripes that two parameters take at least."""
 
+# Relative change at which an iteration has settled, and its largest number of rounds
 SETTLED, MOST = 1e-9, 2000
-"""Relative change at which an iteration has settled, and its largest number of rounds."""
 
+# Dispersions between which one is looked for [-]
 NARROWEST, WIDEST = 0.005, 5.0
-"""Dispersions between which one is looked for [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Fragility:
         Args:
             dispersion: of the median, by stiffness, friction and damping that are not known [-].
         """
-        more = real(dispersion, "dispersion", least=0.0)
+        more = check_number(dispersion, "dispersion", minimum=0.0)
         resampled = np.column_stack([self.resampled[:, 0], np.hypot(self.resampled[:, 1], more)])
         return replace(self, dispersion=hypot(self.dispersion, more), resampled=resampled)
 
@@ -141,22 +141,9 @@ def spread(curves: Iterable[Fragility]) -> Spread:
 def fragility(
     upper: Any, lower: Any = None, *, resamples: int = RESAMPLES, seed: int = 0
 ) -> Fragility:
-    """Fit a fragility curve to capacities of motions, as incremental dynamic analysis finds them.
-
-    Args:
-        upper: least intensity at which each motion fails (n,); infinite where none was found.
-        lower: largest below it at which it does not (n,); by default capacities are exact.
-        resamples: how many samples the bootstrap draws.
-        seed: of these.
-
-    Returns:
-        The curve of greatest likelihood, as censored data have it.
-
-    Raises:
-        InvalidInput: there are fewer than three capacities, they are not above 0, or all alike.
-    """
+    """Fit a fragility curve to capacities of motions, as incremental dynamic analysis finds them."""
     high = np.array([float(value) for value in upper])
-    low = high.copy() if lower is None else np.array(reals(lower, "lower", len(high)))
+    low = high.copy() if lower is None else np.array(check_numbers(lower, "lower", len(high)))
     if len(high) < LEAST or not (high >= low).all() or not (low >= 0.0).all() or (high <= 0).any():
         raise InvalidInput(
             f"capacities from {low.tolist()} to {high.tolist()}: give {LEAST} or more, above 0, "
@@ -170,8 +157,8 @@ def fragility(
     with np.errstate(divide="ignore"):
         ends = np.log(np.array([low, high]))
     mean, deviation = _censored(ends[:, None, :])
-    chance = np.random.default_rng(whole(seed, "seed", least=0))
-    drawn = chance.integers(len(high), size=(whole(resamples, "resamples"), len(high)))
+    chance = np.random.default_rng(check_integer(seed, "seed", minimum=0))
+    drawn = chance.integers(len(high), size=(check_integer(resamples, "resamples"), len(high)))
     means, deviations = _censored(ends[:, drawn])
     median, dispersion = float(np.exp(mean[0])), float(deviation[0])
     misfit = float(_distance(ends[:, None, :], mean, deviation)[0])
@@ -202,9 +189,9 @@ def stripe_fragility(
         InvalidInput: there are fewer than three levels, counts that cannot be meant, or none that
             tells of the spread: nothing fails up to one level, and everything from the next.
     """
-    x = np.array(reals(levels, "levels"))
+    x = np.array(check_numbers(levels, "levels"))
     count = np.broadcast_to(np.asarray(motions, dtype=float), x.shape)
-    failed = np.array(reals(failures, "failures", len(x)))
+    failed = np.array(check_numbers(failures, "failures", len(x)))
     if len(x) < LEAST or (x <= 0.0).any() or (failed > count).any() or (failed < 0.0).any():
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: give "
@@ -217,8 +204,10 @@ def stripe_fragility(
         )
     median, dispersion = (float(each[0]) for each in _probit(x, failed[None], count))
     share = _curve(x, median, dispersion)
-    chance = np.random.default_rng(whole(seed, "seed", least=0))
-    drawn = chance.binomial(count.astype(int), share, size=(whole(resamples, "resamples"), len(x)))
+    chance = np.random.default_rng(check_integer(seed, "seed", minimum=0))
+    drawn = chance.binomial(
+        count.astype(int), share, size=(check_integer(resamples, "resamples"), len(x))
+    )
     resampled = np.column_stack(_probit(x, drawn.astype(float), count))
     deviance = 2.0 * float(
         np.sum(_entropy(failed, count * share) + _entropy(count - failed, count * (1.0 - share)))
@@ -283,8 +272,7 @@ def _between(a: Array, b: Array) -> Array:
     """Normal probability between two ends, in the tail that keeps its digits."""
     flip = a > 0.0
     left, right = np.where(flip, -b, a), np.where(flip, -a, b)
-    found: Array = ndtr(right) - ndtr(left)
-    return found
+    return ndtr(right) - ndtr(left)
 
 
 def _distance(ends: Array, mean: Array, deviation: Array) -> Array:
@@ -296,8 +284,7 @@ def _distance(ends: Array, mean: Array, deviation: Array) -> Array:
     fitted = ndtr((place - mean[:, None]) / deviation[:, None])
     steps = np.arange(count + 1) / count
     apart = np.maximum(np.abs(fitted - steps[:-1]), np.abs(fitted - steps[1:]))
-    found: Array = np.where(np.isfinite(place), apart, 0.0).max(axis=1)
-    return found
+    return np.where(np.isfinite(place), apart, 0.0).max(axis=1)
 
 
 def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
@@ -326,5 +313,4 @@ def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
 def _entropy(seen: Array, expected: Array) -> Array:
     """Terms of the deviance; none where nothing was seen."""
     ratio = np.where(seen > 0.0, seen / np.maximum(expected, 1e-300), 1.0)
-    found: Array = seen * np.log(ratio)
-    return found
+    return seen * np.log(ratio)

@@ -1,28 +1,170 @@
-"""Incremental dynamic analysis: motions scaled up until limit states are met, by hunt and fill."""
+"""Incremental dynamic analysis: motions scaled up until limit states are met, by hunt and fill.
+
+Hunt and fill: scales of one motion at which a case meets limit states, and what runs came to.
+
+References:
+    Vamvatsikos and Cornell, Earthq. Spectra 20 (2004) 523-553.
+
+Intensity measures of a motion as incremental dynamic analysis scales it.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.cases.case import Case
-from archfem.cases.settings import chosen
-from archfem.errors import InvalidInput
+from archfem.cases.run import DeadLoadResult
+from archfem.cases.toml_file import check_choice
+from archfem.dynamics.events import applicable_definitions
+from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
+from archfem.dynamics.motion_scaling import (
+    COLLAPSE_DEFINITION,
+    ScaledRun,
+    largest_allowed_scale,
+    search_scales,
+)
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import assessed_joints, with_failure_flags
+from archfem.limit.mechanism_count import Mechanism
+from archfem.motion import signal_processing
 from archfem.motion.motion import Motion
-from archfem.studies.asking import Asked
+from archfem.motion.response_spectra import response_spectrum
+from archfem.studies.cache import dead_load_of, first_mode, ground_motion
+from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
 from archfem.studies.fragility import Fragility, fragility
-from archfem.studies.hunt import BETWEEN, DEMANDS, LIMITS, PRECISION, searched
-from archfem.studies.intensity import MEASURES, scaled_intensity
-from archfem.studies.over import Axis
-from archfem.studies.points import PAIR, Point
+from archfem.studies.parameter_space import PAIR, Axis, Point
 from archfem.studies.study import Study
 
+# By name what each is, its unit, and the power of a scale on the motion with which it grows
+MEASURES: Mapping[str, tuple[str, str, int]] = {
+    "pga": ("peak ground acceleration", "m/s²", 1),
+    "pgv": ("peak ground velocity", "m/s", 1),
+    "sa": ("spectral acceleration at the first mode, 5 %", "m/s²", 1),
+    "arias": ("Arias intensity", "m/s", 2),
+}
+
+
+def intensities(motion: Motion, period: float) -> dict[str, float]:
+    """Return the measures of the horizontal component of a motion."""
+    samples = motion.component("horizontal")
+    return {
+        "pga": float(np.abs(samples).max()),
+        "pgv": float(np.abs(motion.velocity("horizontal")).max()),
+        "sa": float(response_spectrum(motion, np.array([period]))[0]),
+        "arias": float(signal_processing.integrate_arias(samples, motion.dt)[-1]),
+    }
+
+
+def scaled_intensity(measure: str, whole: Array, scale: Array) -> Array:
+    """Return a measure of motions that are multiplied by scales."""
+    power = MEASURES[measure][2]
+    return whole * scale**power
+
+
+# Limit states: a joint of a ring or pier hinges; four of them fail at once; the failed joints
+# permit a motion of the blocks; blocks fall, where displacements are large
+LIMITS = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
+
+# What is kept of each run for the curves
+DEMANDS = ("eccentricity", "rotation", "slip", "largest_displacement", "residual_displacement")
+
+PRECISION, BETWEEN = 0.05, (0.05, 10.0)
+
+# Most runs that fill gaps between others, and the ratio of two scales that are near enough
+FILL, NARROW = 4, 1.2
+
+
+def search_limit_states(
+    case: Case,
+    limits: Sequence[str] | None = None,
+    precision: float = PRECISION,
+    between: Sequence[float] = BETWEEN,
+) -> Findings:
+    """Return at which scales of its motion a case meets limit states, and what each run came to."""
+    rest, motion = dead_load_of(case), ground_motion(case)
+    asked = _asked(rest, limits)
+    made: dict[float, Findings] = {}
+
+    def shaken(scale: float) -> ScaledRun:
+        run, met, made[scale] = _run(rest, motion.scaled(scale))
+        return ScaledRun(scale, met, run.ending, run.outcome, run.fall)
+
+    least, largest = between
+    reach = (least, max(least, min(largest, largest_allowed_scale(motion))))
+    found = search_scales(shaken, asked, precision, reach)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    for _ in range(FILL):
+        if (scale := _gap(sorted(made))) is not None:
+            found = found.with_run(shaken(scale))
+    period = 1.0 / float(first_mode(rest).frequencies[0])
+    told: Findings = {"period": period, **intensities(motion, period)}
+    for limit in asked:
+        bracket = found[limit]
+        told |= {limit: bracket.upper, f"{limit}, survives": bracket.lower}
+        told[f"{limit}, survives above"] = len(bracket.above)
+    told["scale"] = scales = sorted(made)
+    return told | {name: [made[scale][name] for scale in scales] for name in DEMANDS}
+
+
+def _gap(scales: Sequence[float]) -> float | None:
+    """The scale in the middle of the widest gap between runs; None where all are narrow."""
+    low, high = max(pairwise(scales), key=lambda pair: pair[1] / pair[0], default=(1.0, 1.0))
+    return sqrt(low * high) if high > NARROW * low else None
+
+
+def _run(
+    rest: DeadLoadResult, motion: Motion
+) -> tuple[History, dict[str, Mechanism | None], dict[str, Any]]:
+    """A whole run, which limit states it has met, and demands, infinite where it broke off."""
+    try:
+        run = run_motion(rest, motion)
+    except DidNotConverge as error:
+        run = partial_history(error)
+        return run, _met(run, first_mechanisms(run)), dict.fromkeys(DEMANDS, inf)
+    mechanisms = first_mechanisms(run)
+    found = of_history(run, mechanisms)
+    if run.ending is Ending.PARTED:
+        found |= dict.fromkeys(DEMANDS, inf)
+    return run, _met(run, mechanisms), {name: found[name] for name in DEMANDS}
+
+
+def _met(run: History, mechanisms: Mapping[str, Mechanism | None]) -> dict[str, Mechanism | None]:
+    """Which limit states a run has met; words for a first hinge are those of a mechanism."""
+    hinges = assessed_joints(with_failure_flags(run.joints))["hinge"] != 0
+    first = Mechanism("local", "", (), None) if bool(hinges.any()) else None
+    return {
+        "first hinge": first,
+        "four failures": mechanisms["any four joints"],
+        "verified": mechanisms["verified"],
+    }
+
+
+def _asked(rest: DeadLoadResult, limits: Sequence[str] | None) -> tuple[str, ...]:
+    """Limit states that can be looked for."""
+    large = rest.case.discretisation.displacements == "large"
+    counts = applicable_definitions(rest.case.structure, rest.case.criteria)
+    possible = {"first hinge", "verified"}
+    possible |= {"four failures"} if "any four joints" in counts else set()
+    possible |= {COLLAPSE_DEFINITION} if large else set()
+    asked = tuple(limit for limit in LIMITS if limit in (limits or possible))
+    if strange := [limit for limit in asked if limit not in possible]:
+        raise InvalidInput(
+            f"limit state {strange[0]!r} cannot be met: collapse needs model.displacements = "
+            "'large', four failures as many joints in rings and piers"
+        )
+    return asked
+
+
+# Fractiles that are usual: the median, and one standard deviation to either side
 SHARES = (0.16, 0.50, 0.84)
-"""Fractiles that are usual: the median, and one standard deviation to either side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +199,8 @@ class Ida:
         Raises:
             InvalidInput: limit state or measure are not known.
         """
-        chosen(limit, self.limits, "limit")
-        chosen(measure, MEASURES, "measure")
+        check_choice(limit, self.limits, "limit")
+        check_choice(measure, MEASURES, "measure")
         whole = self.table[measure].values
         ends = (
             scaled_intensity(measure, whole, self.table[name].values)
@@ -98,8 +240,8 @@ class Ida:
         Raises:
             InvalidInput: measure or demand are not known.
         """
-        chosen(measure, MEASURES, "measure")
-        chosen(demand, DEMANDS, "demand")
+        check_choice(measure, MEASURES, "measure")
+        check_choice(demand, DEMANDS, "demand")
         for k, name in enumerate(self.table["motion"].values):
             scale = self.table["scale"].values[k]
             made = np.isfinite(scale)
@@ -185,7 +327,7 @@ def ida(
         (2004) 523-553 for hunt and fill.
     """
     for limit in limits or ():
-        chosen(limit, LIMITS, "limits")
+        check_choice(limit, LIMITS, "limits")
     options = {
         "limits": None if limits is None else list(limits),
         "precision": precision,
@@ -193,7 +335,7 @@ def ida(
     }
     names, points = _points(case, motions)
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
-    study = Study(f"{case.title}: IDA", Asked(searched, options), (axis,), points)
+    study = Study(f"{case.title}: IDA", Evaluator(search_limit_states, options), (axis,), points)
     return Ida(study.run(folder, workers=workers, client=client))
 
 

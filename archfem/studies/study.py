@@ -11,21 +11,23 @@ from typing import Any
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from archfem.arguments import whole
+from archfem._validation import check_integer
 from archfem.cases.case import Case
-from archfem.cases.inputs import package_version
-from archfem.cases.settings import checked, refuse_unknown
+from archfem.cases.provenance import describe_version
+from archfem.cases.toml_file import check_table, refuse_unknown
 from archfem.errors import ArchfemError, InvalidInput
-from archfem.studies.asking import Asked, refuse_code
-from archfem.studies.comparison import Comparison
-from archfem.studies.files import study_tables
-from archfem.studies.over import Axis, axes_over, changes_along, ends
-from archfem.studies.points import Point, by_model
-from archfem.studies.processes import on_processes, serially
-from archfem.studies.progress import Progress, status
-from archfem.studies.store import Store
-from archfem.studies.table import load_tables, table, write_table
-from archfem.studies.worker import Row
+from archfem.studies.comparison import Comparison, study_tables
+from archfem.studies.evaluators import Evaluator, refuse_code
+from archfem.studies.parameter_space import (
+    Axis,
+    Point,
+    by_model,
+    changes_along,
+    check_points,
+    parameter_axes,
+)
+from archfem.studies.process_pool import Row, on_processes, serially
+from archfem.studies.result_store import Progress, Store, load_tables, status, table, write_table
 
 logger = logging.getLogger("archfem")
 
@@ -33,9 +35,9 @@ STUDY = {
     "title": str,
     "case": str,
     "set": [str],
-    "over": (dict, list),
+    "vary": (dict, list),
     "samples": dict,
-    "find": (str, dict),
+    "compute": (str, dict),
 }
 
 LOG = "workers.log"
@@ -54,7 +56,7 @@ class Study:
     """
 
     title: str
-    asked: Asked
+    asked: Evaluator
     axes: tuple[Axis, ...]
     points: tuple[Point, ...]
     samples: Mapping[str, Any] | None = None
@@ -87,11 +89,11 @@ class Study:
         Raises:
             InvalidInput: there are no points, or a point's case cannot be meant.
         """
-        axes = axes_over(over, samples)
+        axes = parameter_axes(over, samples)
         points = tuple(
             Point(case.settings, case.folder, changes) for changes in changes_along(axes)
         )
-        study = cls(title or case.title, Asked.of(find), axes, points, samples)
+        study = cls(title or case.title, Evaluator.of(find), axes, points, samples)
         study._check()
         return study
 
@@ -102,11 +104,12 @@ class Study:
         """Read a study: a TOML file with a case and what it goes over, or with cases side by side.
 
         Args:
-            path: with `case`, a file; `over`, `samples` and `find`, as for `of`; and `set`, a list
+            path: with `case`, a file; `vary`, `samples` and `compute`, as `over`, `samples`
+                and `find` of `of`; and `set`, a list
                 of "section.key=value". Or with a table [cases."name"] for each of some cases, as
                 for `Comparison.read`.
             changes: made to every case.
-            own_code: whether `find` may name a function of a module, which is code that runs;
+            own_code: whether `compute` may name a function of a module, which is code that runs;
                 without it only our own are taken, since a file may come from anywhere.
 
         Returns:
@@ -117,23 +120,23 @@ class Study:
         """
         path = Path(path)
         given = study_tables(path)
-        if "cases" in given or not {"case", "over"} & set(given):
+        if "cases" in given or not {"case", "vary"} & set(given):
             compared = Comparison.read(path, changes)
             return cls(compared.title, compared.asked, (compared.axis,), compared.points)
         refuse_unknown(given, STUDY)
-        given = checked(given, STUDY, "study")
-        if missing := [key for key in ("case", "over") if key not in given]:
+        given = check_table(given, STUDY, "study")
+        if missing := [key for key in ("case", "vary") if key not in given]:
             raise InvalidInput(
-                f'{path} says nothing of {missing[0]}: write case = "file.toml", and over, keys of '
+                f'{path} says nothing of {missing[0]}: write case = "file.toml", and vary, keys of '
                 "the case with lists of values or distributions"
             )
-        find = given.get("find", "history")
+        find = given.get("compute", "history")
         if not own_code:
             refuse_code(find)
         case = Case.read(path.parent / given["case"], [*given.get("set", []), *changes])
         return cls.of(
             case,
-            given["over"],
+            given["vary"],
             find,
             samples=given.get("samples"),
             title=given.get("title", path.stem),
@@ -174,7 +177,7 @@ class Study:
 
     @property
     def _attributes(self) -> dict[str, Any]:
-        told = {"title": self.title, "archfem": package_version()}
+        told = {"title": self.title, "archfem": describe_version()}
         return told | {f"samples {key}": value for key, value in (self.samples or {}).items()}
 
     def _rows(self, store: Store | None, workers: int | None, client: Any) -> list[Row]:
@@ -221,7 +224,9 @@ class Study:
         if client is not None:
             yield from _on_cluster(points, self.asked, client)
             return
-        count = whole(len(os.sched_getaffinity(0)) if workers is None else workers, "workers")
+        count = check_integer(
+            len(os.sched_getaffinity(0)) if workers is None else workers, "workers"
+        )
         if count > 1 and len(points) > 1:
             log = None if folder is None else folder / LOG
             yield from on_processes(points, self.asked, count, log, load_tables)
@@ -247,7 +252,7 @@ class Study:
 
     def _check(self) -> None:
         """Make the cases at the ends of each axis: what cannot be meant is found now."""
-        for number in ends(self.axes):
+        for number in check_points(self.axes):
             point = self.points[number]
             try:
                 _ = point.case
@@ -257,7 +262,7 @@ class Study:
 
 
 def _on_cluster(
-    points: list[tuple[int, Point]], asked: Asked, client: Any
+    points: list[tuple[int, Point]], asked: Evaluator, client: Any
 ) -> Iterator[tuple[int, Row]]:
     """Answer points on a cluster, which few have installed what it takes for."""
     try:

@@ -1,31 +1,19 @@
-"""Pictures and films of structures, what they did, and what they can take.
+"""Figures and films of structures and of results.
 
-    style      one look for all pictures
-    marks      what a picture shows of the joints at one instant
-    loads      live loads as arrows
-    states     what a state's joints carry
-    moved      where ends of joints and loose blocks are at some time of a run
-    structure  a structure at an instant; several side by side
-    dead       the dead load with its numbers
-    displaced  a structure where its blocks have gone
-    names      which joint is which
-    joints     joints over time
-    envelopes  eccentricity part by part
-    stress     a map of principal compression
-    modes      vibration shapes
-    freebody   a block cut free and its closing polygon
-    collapse   mechanism and thrust line of limit analysis; capacity of rings
-    pushover   what is resisted over displacement
-    motions    accelerograms with their integrals, and spectra
-    accuracy   speed against error
-    falls      blocks on their way to the ground
-    studies    factors at first mechanism, case by case
-    incremental  curves of incremental dynamic analysis; fragility
-    sensitivity  tornado and convergence
-    films      films, stills and a viewer: all that knows imageio, its encoder and pyvista
-    pages      the player of a run, and documents, for a browser
+    collapse     limit analysis and falls
+    films        films, still pictures and a viewer of moving structures
+    histories    joints over time, envelopes
+    joint_marks  hinges, thrust line, slips at an instant
+    motions      accelerograms and spectra
+    pages        HTML pages: the player of a run, and documents that embed it
+    positions    positions of blocks and joint ends over a run
+    statics      dead load, stress, modes, free body, pushover
+    stress       stress map
+    structure    a structure, its names, loads, displaced shape
+    studies      study factors, IDA, fragility, tornado, convergence, accuracy
+    style        one look for all figures
 
-It imports from all rooms to its left. Start reading at `structure`, with `style` beside it.
+Imports all rooms before it. Start reading at `structure`, then at `style`.
 """
 
 import lazy_loader

@@ -1,4 +1,7 @@
-"""Pictures of limit analysis: thrust line and mechanism in one, and the capacity of rings."""
+"""Pictures of limit analysis: thrust line and mechanism in one, and the capacity of rings.
+
+The picture of a fall: where the blocks are, from the joint that lets go to the ground.
+"""
 
 from collections.abc import Mapping
 
@@ -9,36 +12,38 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
-from archfem.masonry.rigid_motion import motion_of
-from archfem.masonry.structure import Structure
-from archfem.view.loads import draw_loads
-from archfem.view.marks import displaced, swung
-from archfem.view.structure import draw_structure
+from archfem.masonry.structure import Structure, rigid_motion_matrix
+from archfem.view.joint_marks import displaced, swung
+from archfem.view.positions import FallingBlocks
+from archfem.view.structure import draw_loads, draw_structure
 from archfem.view.style import (
     COLUMN,
     EDGE,
+    GHOST,
     HINGE,
     INK,
     LIGHT_TO_DARK,
     MOVED,
+    NORMAL,
     SLIP,
     SMALL,
+    STONE,
+    SUPPORT,
     THRUST,
     Page,
+    canvas,
     dress,
     entitle,
     legend,
 )
 
+# Horizontal accelerations between which the map of capacity changes its colour [g]
 LEVELS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]
-"""Horizontal accelerations between which the map of capacity changes its colour [g]."""
-
-NEVER = 1e3
-"""Height of the map where no acceleration overturns a ring [g]."""
 
 
 def draw_collapse(structure: Structure, found: Collapse) -> Figure:
@@ -66,17 +71,7 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
 
 
 def draw_found(found: Collapse) -> Figure:
-    """Draw what was found for the structure that it knows, as by `draw_collapse`.
-
-    Args:
-        found: what limit analysis found.
-
-    Returns:
-        The page.
-
-    Raises:
-        InvalidInput: it does not know its structure.
-    """
+    """Draw what was found for the structure that it knows, as by `draw_collapse`."""
     if found.structure is None:
         raise InvalidInput(
             "this result does not know its structure: use draw_collapse(structure, …)"
@@ -104,7 +99,8 @@ def draw_capacity(
     figure = Page(figsize=(COLUMN, 4.4), layout="constrained")
     axes = figure.add_subplot()
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
-    values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=NEVER)
+    # height of the map where no acceleration overturns a ring [g]
+    values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=1e3)
     filled = axes.contourf(embraces, ratios, values, LEVELS, cmap=LIGHT_TO_DARK, extend="max")
     axes.contour(embraces, ratios, values, LEVELS[1:], colors="white", linewidths=0.5)
     edge = np.array(sorted(thinnest.items()))
@@ -141,7 +137,7 @@ def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Arra
     for number, side in found.hinges:
         joint = structure.joints[number]
         end = joint.ends[0 if side == "intrados" else 1]
-        carrier = motion_of(end[None, :], structure.blocks[joint.lower].centroid)[0]
+        carrier = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
         points.append(end + carrier @ motion[joint.lower])
     if points:
         x, y = np.array(points).T
@@ -191,3 +187,62 @@ def _mark_known(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
             text, point, (-8, 3), textcoords="offset points", fontsize=SMALL, ha="right", zorder=6
         )
         note.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+
+
+# Of the way down, by the mean of all blocks, at which they are drawn
+SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+
+
+def draw_fall(run: History) -> Figure:
+    """Draw the blocks of a structure at four instants of its fall, over where they stood.
+
+    Args:
+        run: in which blocks came loose, and which knows its structure.
+
+    Returns:
+        The page, a panel for each instant.
+
+    Raises:
+        InvalidInput: the run does not know its structure, or nothing came loose.
+    """
+    falls = None if run.structure is None else FallingBlocks.of(run.structure, run)
+    if falls is None:
+        raise InvalidInput(
+            "there is no fall to draw: no block came loose, displacements were taken as small, or "
+            "the run does not know its structure; read it with History.read(path, structure)"
+        )
+    wide, high = canvas(falls.structure).get_size_inches()
+    figure = Page(figsize=(1.5 * wide, 1.35 * high), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+    for axes, time in zip(panels, _instants(falls), strict=True):
+        _panel(axes, falls, time)
+    return figure
+
+
+def _instants(falls: FallingBlocks) -> list[float]:
+    """Times of the instants that are drawn [s]."""
+    sunk = -falls.poses[:, list(falls.structure.free), 1].mean(axis=1)
+    way = np.maximum.accumulate(sunk - sunk[0])
+    first = [int(np.argmax(way >= share * way[-1])) for share in SHARES[:-1]]
+    return [float(falls.times[k]) for k in (*first, -1)]
+
+
+def _panel(axes: Axes, falls: FallingBlocks, time: float) -> None:
+    """Draw one instant."""
+    blocks = falls.structure.blocks
+    dress(axes, "x [m]", "y [m]")
+    axes.set_aspect("equal")
+    axes.axhline(falls.level, color=EDGE, lw=1.2, zorder=0)
+    built = [block.drawn() for block in blocks]
+    axes.add_collection(
+        PolyCollection(built, facecolors="none", edgecolors=GHOST, linewidths=0.6, zorder=1)
+    )
+    faces = [SUPPORT if block.fixed else STONE for block in blocks]
+    moved = PolyCollection(
+        falls.outlines(time), facecolors=faces, edgecolors=EDGE, linewidths=0.7, zorder=2
+    )
+    moved.set_gid("blocks")
+    axes.add_collection(moved)
+    axes.set_title(f"t = {time:.2f} s", fontsize=NORMAL, color=INK)
+    axes.autoscale_view()
+    axes.label_outer()

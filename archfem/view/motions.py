@@ -6,17 +6,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import COMPONENTS, Motion
-from archfem.motion.spectra import response_spectrum
+from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.style import COLUMN, HINGE, INK, LINES, NORMAL, SMALL, Page, dress
 
+# Periods at which spectra are drawn [s]
 PERIODS = np.geomspace(0.02, 3.0, 150)
-"""Periods at which spectra are drawn [s]."""
 
 
 def draw_motion(motion: Motion) -> Figure:

@@ -12,50 +12,33 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.joints.resultants import joint_dataset
-from archfem.masonry.softness import yielding_blocks
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
-from archfem.models.cells import Cells
-from archfem.models.model import Model
+from archfem.models.model import Cells, Model
 from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.stress import at_corners, cell_stress, principal_values
+from archfem.statics.stress import cell_stress, corner_stress_operator, principal_values
 from archfem.units import MPa, kPa
-from archfem.view.marks import joint_marks
-from archfem.view.states import drawn
+from archfem.view.joint_marks import drawn, joint_marks
 from archfem.view.structure import draw_blocks, draw_thrust
-from archfem.view.style import (
-    BEYOND,
-    EDGE,
-    INK,
-    MOVED,
-    SMALL,
-    STONE,
-    canvas,
-    entitle,
-    stand,
-)
+from archfem.view.style import BEYOND, EDGE, INK, MOVED, SMALL, STONE, canvas, entitle, stand
 
+# From none to the largest compression; warm, so that the thrust line stands out
 SHADES = LinearSegmentedColormap.from_list(
     "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
 )
-"""From none to the largest compression; warm, so that the thrust line stands out."""
 
-PITCH = 0.21
-"""Distance between two crosses on paper, and length of the longest arms [inch]."""
 
-SEEN = 0.08
-"""Arms shorter than this, relative to the longest, are left out."""
-
+# Cells whose mean stress a cross shows
 TOGETHER = 4
-"""Cells whose mean stress a cross shows."""
 
+# Into how many a cell's sides are cut for shading
 PIECES = 3
-"""Into how many a cell's sides are cut for shading."""
 
+# Width of the colour bar, and its distance from the picture [inch]
 BAR = 0.16
-"""Width of the colour bar, and its distance from the picture [inch]."""
 
 Numbers = NDArray[np.intp]
 
@@ -88,7 +71,7 @@ def draw_stress(
     model, q = drawn(model, q)
     structure, cells = model.structure, model.cells
     chosen = _chosen(structure, parts)
-    corners = (at_corners(cells) @ q).reshape(-1, 3)
+    corners = (corner_stress_operator(cells) @ q).reshape(-1, 3)
     own = axes is None
     axes = canvas(structure).add_subplot() if axes is None else axes
     page = cast(Figure, axes.figure)
@@ -111,7 +94,7 @@ def draw_stress(
 
 def _chosen(structure: Structure, parts: Collection[str] | None) -> Numbers:
     """Numbers of the blocks that are shaded."""
-    soil = yielding_blocks(structure)
+    soil = find_yielding_blocks(structure)
     if parts is None:
         return np.array([number for number in structure.free if number not in soil])
     known = {structure.blocks[number].part for number in structure.free}
@@ -154,8 +137,7 @@ def _inside(corners: Array) -> Array:
     """Values on a grid in each cell from those at its four corners (cells, 4, …)."""
     s, t = np.meshgrid(*(np.linspace(0.0, 1.0, PIECES + 1),) * 2)
     share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]).reshape(4, -1)
-    inside: Array = np.einsum("kp,ck...->cp...", share, corners)
-    return inside
+    return np.einsum("kp,ck...->cp...", share, corners)
 
 
 def _cut(corners: Array) -> tuple[Array, Numbers]:
@@ -176,7 +158,8 @@ def _cut(corners: Array) -> tuple[Array, Numbers]:
 
 def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
-    spacing = PITCH * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
+    # distance between two crosses on paper, and length of the longest arms [inch]
+    spacing = 0.21 * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
     groups = [
         np.flatnonzero(cells.owner == number)[group]
@@ -195,7 +178,8 @@ def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
     arm = 0.5 * spacing * np.abs(share)[..., None] * direction
     ends = np.stack([middle - arm, middle + arm], axis=2)
     for sign, colour, name in ((-1.0, INK, "compression"), (1.0, MOVED, "tension")):
-        lines = ends[sign * share > SEEN]
+        # arms shorter than this, relative to the longest, are left out
+        lines = ends[sign * share > 0.08]
         if len(lines):
             drawn = LineCollection(list(lines), colors=colour, linewidths=0.8, label=name)
             drawn.set(zorder=4, gid=name)

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter, MaxNLocator
 
+from archfem._files import atomic_write
 from archfem.errors import InvalidInput
-from archfem.files import in_one_stroke
 from archfem.masonry.structure import Structure
 
 STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
@@ -23,63 +23,52 @@ INK, FAINT, GHOST = "#1b1b1b", "#8d8d8d", "#cfcac0"
 THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
 MOVED = "#009e73"
 LOAD = "#7b3294"
+# Colours of lines that share axes; they stay apart for all common kinds of colour blindness
 LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
-"""Colours of lines that share axes; they stay apart for all common kinds of colour blindness."""
 
+# From none to much
 LIGHT_TO_DARK = LinearSegmentedColormap.from_list(
     "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
 )
-"""From none to much."""
 
+# Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
+# take all of it
 BEYOND = 0.5
-"""Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
-take all of it."""
 
+# Sizes of type [points]: ticks, legends and labels; titles
 SMALL, NORMAL = 8.0, 9.5
-"""Sizes of type [points]: ticks, legends and labels; titles."""
 
-COLUMN, TALL = 6.4, 6.8
-"""Width and largest height of a picture [inch]."""
+# Width and largest height of a picture [inch]
+COLUMN = 6.4
 
+# Width of a picture of a long structure, or of many panels [inch]
 WIDE = 11.0
-"""Width of a picture of a long structure, or of many panels [inch]."""
 
+# Width over height from which a structure is long; a ring has at most about 3
 LONG = 4.0
-"""Width over height from which a structure is long; a ring has at most about 3."""
 
 
+# Width of a letter, relative to the size of its type in points [inch]
 LETTER = 0.56 / 72.0
-"""Width of a letter, relative to the size of its type in points [inch]."""
 
+# Height of a line of a legend [inch]
 LINE = 0.17
-"""Height of a line of a legend [inch]."""
 
+# Room that an entry of a legend takes beside its words [inch]
 SYMBOL = 0.6
-"""Room that an entry of a legend takes beside its words [inch]."""
-
-TICK = 0.55
-"""Room that the label of a tick takes [inch]."""
 
 
 class Page(Figure):
     """A page on which names and titles are words, though they hold a $."""
 
     def draw(self, renderer: RendererBase) -> None:
-        """Draw it.
-
-        Args:
-            renderer: that draws.
-        """
+        """Draw it."""
         plain(self)
         super().draw(renderer)
 
 
 def plain(drawn: Artist) -> None:
-    """Take every text for words, not for mathematics; only powers of ten at an axis are that.
-
-    Args:
-        drawn: a page or axes.
-    """
+    """Take every text for words, not for mathematics; only powers of ten at an axis are that."""
     powers = {
         label
         for axes in drawn.findobj(Axes)
@@ -93,12 +82,7 @@ def plain(drawn: Artist) -> None:
 
 
 def entitle(axes: Axes, words: str) -> None:
-    """Write a title above axes, in as many lines as their part of the page has it take.
-
-    Args:
-        axes: to entitle.
-        words: as users may have written them.
-    """
+    """Write a title above axes, in as many lines as their part of the page has it take."""
     place = axes.get_subplotspec()
     parts = 1 if place is None else place.get_gridspec().ncols
     letters = int(axes.figure.get_figwidth() / parts / (LETTER * NORMAL))
@@ -107,29 +91,19 @@ def entitle(axes: Axes, words: str) -> None:
 
 
 def stand(axes: Axes, structure: Structure) -> None:
-    """Dress axes in which a structure stands, true to scale, with room between ticks.
-
-    Args:
-        axes: to dress.
-        structure: to be drawn in them.
-    """
+    """Dress axes in which a structure stands, true to scale, with room between ticks."""
     dress(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
     wide = np.ptp(np.concatenate([block.drawn()[:, 0] for block in structure.blocks]))
     broad = scale_of(structure) * wide
+    # room that the label of a tick takes [inch]
     axes.xaxis.set_major_locator(
-        MaxNLocator(int(np.clip(broad / TICK, 1, 9)), steps=[1, 2, 2.5, 5, 10])
+        MaxNLocator(int(np.clip(broad / 0.55, 1, 9)), steps=[1, 2, 2.5, 5, 10])
     )
 
 
 def dress(axes: Axes, x: str = "", y: str = "") -> None:
-    """Label axes and take away what is not needed.
-
-    Args:
-        axes: to dress.
-        x: label of the horizontal axis, with its unit.
-        y: label of the vertical axis, with its unit.
-    """
+    """Label axes and take away what is not needed."""
     axes.set_xlabel(x, fontsize=SMALL)
     axes.set_ylabel(y, fontsize=SMALL)
     axes.spines[["top", "right"]].set_visible(False)
@@ -138,11 +112,7 @@ def dress(axes: Axes, x: str = "", y: str = "") -> None:
 
 
 def legend(axes: Axes) -> None:
-    """Explain what is labelled: below axes that have a page to themselves, else among the lines.
-
-    Args:
-        axes: with labelled lines.
-    """
+    """Explain what is labelled: below axes that have a page to themselves, else among the lines."""
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
         labels = axes.get_legend_handles_labels()[1]
@@ -156,11 +126,7 @@ def legend(axes: Axes) -> None:
 
 
 def renew_legend(page: Figure) -> None:
-    """Explain anew what is labelled, where more was drawn after a page was explained.
-
-    Args:
-        page: with axes that have it to themselves.
-    """
+    """Explain anew what is labelled, where more was drawn after a page was explained."""
     for old in page.legends:
         old.remove()
     legend(page.axes[0])
@@ -169,11 +135,7 @@ def renew_legend(page: Figure) -> None:
 
 
 def canvas(structure: Structure) -> Figure:
-    """Return an empty page that fits a structure, long ones on a wide page.
-
-    Args:
-        structure: to be drawn on it, true to scale.
-    """
+    """Return an empty page that fits a structure, long ones on a wide page."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
     scale = scale_of(structure)
@@ -182,15 +144,12 @@ def canvas(structure: Structure) -> Figure:
 
 
 def scale_of(structure: Structure) -> float:
-    """Return how large a structure is drawn on a page of its own, about [inch / m].
-
-    Args:
-        structure: to be drawn.
-    """
+    """Return how large a structure is drawn on a page of its own, about [inch / m]."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
     wide, high = np.ptp(points, axis=0)
     room = COLUMN if wide < LONG * high else WIDE
-    return float(min((room - 0.8) / wide, (TALL - 1.2) / high))
+    # width and largest height of a picture [inch]
+    return float(min((room - 0.8) / wide, (6.8 - 1.2) / high))
 
 
 def save(figure: Figure, path: str | Path) -> Path:
@@ -213,6 +172,6 @@ def save(figure: Figure, path: str | Path) -> Path:
         raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
     plain(figure)
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
-    with in_one_stroke(target) as draft, matplotlib.rc_context(fonts):
+    with atomic_write(target) as draft, matplotlib.rc_context(fonts):
         figure.savefig(draft, format=kind, dpi=300)
     return target

@@ -12,15 +12,16 @@ step. The bridge stood through the two earthquakes of 1999.
 
 import argparse
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from setting import plain_options, quick_motion
 from timing import table
 
 import archfem as af
 from archfem.cases import damping_of
-from archfem.dynamics.history import History, history_of
-from archfem.masonry.softness import yielding_blocks
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.units import mm
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -33,7 +34,9 @@ HEAD += ["residual [mm]", "drift", "ms/step", "the run"]
 
 
 def motion(chosen: argparse.Namespace, path: Path) -> af.Motion:
-    """Read the record that was asked for, or make the pair."""
+    """Read the chosen record, or make the chosen pair."""
+    if chosen.quick:
+        return quick_motion(4.9)
     if chosen.record is None:
         suite = af.Case.read(path, ["suite.reduction=1"]).ground_suite()
         return next(each for each in suite.motions if each.name == chosen.pair)
@@ -60,7 +63,7 @@ def built(case: af.Case, fill: str, cells: int) -> tuple[af.Structure, object]:
     return cut, af.build(cut, fidelity="rigid", displacements="large", quadrature="exact")
 
 
-def row(fill: str, scale: float, run: History, stones: np.ndarray, cost: float) -> list[str]:
+def row(fill: str, scale: float, run: af.History, stones: np.ndarray, cost: float) -> list[str]:
     """Write the row of a run."""
     data, fall = run.dataset, run.fall
     opening, slip = (
@@ -81,8 +84,8 @@ def row(fill: str, scale: float, run: History, stones: np.ndarray, cost: float) 
     ]
 
 
-def main(chosen: argparse.Namespace) -> None:
-    """Run all scales on the models that were asked for, and print rows as they come."""
+def run_scales(chosen: argparse.Namespace) -> None:
+    """Run all scales on the models that were chosen, and print each row when it is ready."""
     path = MESHES / f"prusias{'_restored' if chosen.restored else ''}.toml"
     case, rows = af.Case.read(path), []
     shake = motion(chosen, path)
@@ -90,22 +93,23 @@ def main(chosen: argparse.Namespace) -> None:
         structure, model = built(case, fill, chosen.cells)
         dead = af.dead_load(model)
         damping = damping_of(case, dead)[0]
-        stones = ~np.isin(structure.pairs, yielding_blocks(structure)).any(axis=1)
+        stones = ~np.isin(structure.pairs, find_yielding_blocks(structure)).any(axis=1)
         for scale in chosen.scales:
             begun = time.process_time()
             try:
                 given = {"start": dead, "damping": damping, "dt": chosen.step}
                 run = af.time_history(model, shake.scaled(scale), **given)
             except af.DidNotConverge as error:
-                run = history_of(error)
+                run = af.dynamics.partial_history(error)
             cost = 1e3 * (time.process_time() - begun) / max(1, run.dataset.attrs["steps"])
             rows.append(row(fill, scale, run, stones, cost))
             print(*rows[-1], sep=" | ", flush=True)
     print(f"\n{table(HEAD, rows)}")
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def options() -> argparse.ArgumentParser:
+    """Make the parser of the command line."""
+    parser = plain_options(__doc__)
     parser.add_argument("--restored", action="store_true", help="the bridge after its restoration")
     parser.add_argument("--pair", default="pair-1", help="made pair to take without a record")
     parser.add_argument("--record", type=Path, help="file with a ground motion")
@@ -118,4 +122,16 @@ if __name__ == "__main__":
     parser.add_argument("--cells", type=int, default=2, help="facets on a joint, elastic fill")
     parser.add_argument("--step", type=float, default=0.005, help="time step [s]")
     parser.add_argument("--scales", type=float, nargs="+", default=[1.0 / 3.0, 1.0, 2.0])
-    main(parser.parse_args())
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run all scales on the models that were chosen."""
+    chosen = options().parse_args(arguments)
+    if chosen.quick:
+        chosen.scales = [1.0 / 3.0]
+    run_scales(chosen)
+
+
+if __name__ == "__main__":
+    main()

@@ -22,14 +22,14 @@ from math import sqrt
 from pathlib import Path
 
 import xarray as xr
+from setting import plain_options, quick_motion
 from timing import table
 
 import archfem as af
 from archfem.dynamics.history import History
-from archfem.joints.criteria import failed, judged
-from archfem.limit.counted import Mechanism
-from archfem.limit.episodes import episode, lasting
-from archfem.models.build import build
+from archfem.joints.criteria import assessed_joints, failed_joints
+from archfem.limit.mechanism_count import Mechanism, duration_text, episode
+from archfem.models.builder import build
 from archfem.units import mm
 
 DT = 0.005
@@ -121,7 +121,7 @@ def rubbed(structure: af.Structure, friction: float | None) -> af.Structure:
     return replace(structure, joints=tuple(joints))
 
 
-def shaken(
+def run_setting(
     path: Path, options: Sequence[str], setting: Setting, motions: Sequence[af.Motion]
 ) -> Iterator[tuple[str, History, float]]:
     """Yield of each motion in a setting its name, its run and the seconds it took."""
@@ -143,12 +143,12 @@ def told(joints: xr.Dataset, found: Mechanism | None) -> str:
         return "none"
     episode_of = episode(joints, found)
     wide = f"{episode_of.opening / mm:.2g} mm"
-    return f"{found.kind}, {found.time:.3f} s, {lasting(episode_of.duration)}, {wide}"
+    return f"{found.kind}, {found.time:.3f} s, {duration_text(episode_of.duration)}, {wide}"
 
 
 def widest(run: History) -> float:
     """Largest opening of a hinge in rings and piers [m]."""
-    joints = judged(run.joints)
+    joints = assessed_joints(run.joints)
     return float(joints["opening"].where(joints["hinge"] != 0, 0.0).max())
 
 
@@ -158,7 +158,7 @@ HEAD += ["left [mm]", "any four joints", "four in one ring", "verified", "wall [
 
 def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
     """Write the row of a run."""
-    joints, dataset = judged(run.joints), run.dataset
+    joints, dataset = assessed_joints(run.joints), run.dataset
     first = af.first_mechanisms(run)
     own = [n for n, block in enumerate(run.structure.blocks) if block.role != "other"]
     stones = dataset["block"].isin([run.structure.blocks[n].name for n in own])
@@ -166,7 +166,7 @@ def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
         name,
         pair,
         f"{float(abs(joints['eccentricity']).max()):.3f}",
-        int(failed(joints).sum("joint").max()),
+        int(failed_joints(joints).sum("joint").max()),
         f"{widest(run) / mm:.2f}",
         f"{float(abs(joints['slip']).max()) / mm:.2f}",
         f"{float(dataset['residual_displacement'].where(stones, 0.0).max()) / mm:.2f}",
@@ -185,8 +185,8 @@ def scene(chosen: argparse.Namespace) -> tuple[Path, list[str]]:
     return MESHES / "prusias_records.toml", [f"suite.folder={chosen.records.resolve()}"]
 
 
-def main(chosen: argparse.Namespace) -> None:
-    """Run the rows that were asked for, print each as it is found, and then the table."""
+def run_rows(chosen: argparse.Namespace) -> None:
+    """Run the rows that were chosen, print each when it is ready, and then the table."""
     path, options = scene(chosen)
     motions = list(af.Case.read(path, options).ground_suite().motions)
     rows: list[list[object]] = []
@@ -196,7 +196,7 @@ def main(chosen: argparse.Namespace) -> None:
         for name, setting in settings.items():
             if chosen.only and name not in chosen.only:
                 continue
-            for pair, run, seconds in shaken(path, options, setting, pairs):
+            for pair, run, seconds in run_setting(path, options, setting, pairs):
                 rows.append(row(name, pair, run, seconds))
                 if setting == EVERYWHERE[PAPER]:
                     widths[pair] = widest(run)
@@ -211,10 +211,28 @@ def main(chosen: argparse.Namespace) -> None:
     print(f"\n{table(HEAD, rows)}")
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def options() -> argparse.ArgumentParser:
+    """Make the parser of the command line."""
+    parser = plain_options(__doc__)
     parser.add_argument("--restored", action="store_true", help="the bridge after its restoration")
     parser.add_argument("--pair", help="the rows under this pair alone")
     parser.add_argument("--only", nargs="+", help="names of the rows to run")
     parser.add_argument("--records", type=Path, help="folder of the records to take instead")
-    main(parser.parse_args())
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table of the rows that were chosen."""
+    chosen = options().parse_args(arguments)
+    if chosen.quick:
+        path, changes = scene(chosen)
+        for pair, run, seconds in run_setting(
+            path, changes, EVERYWHERE["exact"], [quick_motion(4.9 / 3.0)]
+        ):
+            print(table(HEAD, [row("exact", pair, run, seconds)]))
+        return
+    run_rows(chosen)
+
+
+if __name__ == "__main__":
+    main()

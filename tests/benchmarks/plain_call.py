@@ -1,22 +1,22 @@
-"""`af.time_history(model, motion)` and nothing more, under real records: an answer to each?
+"""A plain `af.time_history(model, motion)` under records: does every run end with a result?
 
-    python tests/benchmarks/plain_call.py FOLDER [--duration 20]
+    python tests/benchmarks/plain_call.py [FOLDER] [--duration 20]
 
-The rigid validation ring, undamped, in steps that choose their length, under all horizontal records
-in the folder and below: how each run ended, what it took, and what energy came from nowhere.
+The rigid validation ring, undamped, with adaptive steps, under all horizontal records in the folder
+and below: outcome of each run, its processor time, and its energy drift.
 """
 
-import argparse
 import logging
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from energy_drift import motions
-from setting import ring
+from scenes import ring
+from setting import plain_options, quick_motion
 from timing import table
 
 import archfem as af
-from archfem.dynamics.history import history_of
 
 HEAD = ["record", "PGA [m/s²]", "the run", "steps", "CPU [s]", "drift", "tolerance unmet"]
 
@@ -27,31 +27,35 @@ def row(name: str, motion: af.Motion, model: af.models.Model) -> list[object]:
     try:
         run = af.time_history(model, motion)
     except af.DidNotConverge as error:
-        run = history_of(error)
-    told = run.dataset.attrs
+        run = af.dynamics.partial_history(error)
+    attrs = run.dataset.attrs
     return [
         name,
         f"{motion.pga:.2f}",
         run.outcome[:60],
-        told["steps"],
+        attrs["steps"],
         f"{time.process_time() - begun:.1f}",
-        f"{told['energy_drift']:.0e}",
-        f"{told.get('tolerance_unmet', 0.0):.1%}",
+        f"{attrs['energy_drift']:.0e}",
+        f"{attrs.get('tolerance_unmet', 0.0):.1%}",
     ]
 
 
-def main(chosen: argparse.Namespace) -> None:
-    """Run all of them, and print rows as they come."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run all records, and print each row when it is ready."""
+    parser = plain_options(__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", help="with records; default: synthetic")
+    parser.add_argument("--duration", type=float, default=20.0, help="of each motion, at most [s]")
+    chosen = parser.parse_args(arguments)
     logging.disable(logging.WARNING)
     model, rows = af.build(ring(), fidelity="rigid"), []
-    for name, motion in motions(chosen.folder, chosen.duration):
+    shaking = (
+        [("quick", quick_motion(1.6))] if chosen.quick else motions(chosen.folder, chosen.duration)
+    )
+    for name, motion in shaking:
         rows.append(row(name, motion, model))
         print(*rows[-1], sep=" | ", flush=True)
     print(f"\n{table(HEAD, rows)}")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="with records, also in folders of its own")
-    parser.add_argument("--duration", type=float, default=20.0, help="of each motion, at most [s]")
-    main(parser.parse_args())
+    main()

@@ -1,129 +1,81 @@
-"""Where the time of a step goes.
+"""Profile whole time histories, from set-up to recording.
 
     python tests/benchmarks/profile_step.py [--fidelity full --quadrature nodal --method snes]
 
-Functions by their own time, per step, as Python's profiler sees them: its own cost counts too, so
-shares matter rather than sums. A compiled loop is one line; its parts are timed by themselves.
+Functions are listed by their own time, divided by the number of steps, as Python's profiler
+measures it. The profiler's own cost is included, so shares matter more than sums. A compiled loop
+is one line.
 """
 
 import argparse
 import cProfile
 import pstats
+from collections.abc import Sequence
 from pathlib import Path
 
-import numba
-import numpy as np
-from setting import DT, ground_motion, options, ring
-from stepping import Run, warm_up
-from timing import least, table, watched
+from scenes import DT, ring
+from setting import DAMPING, ground_motion, options
+from stepping import SteppedRun
+from timing import table
 
 import archfem as af
-from archfem.dynamics.stepping import linear, loop
-from archfem.dynamics.stepping.choice import METHODS
 
-LINES = 12
-"""Functions shown."""
-
-CASES = [("full", "nodal", "snes"), ("full", "nodal", "contact"), ("faces", "exact", "contact")]
-"""Fidelity, quadrature and method profiled where none is chosen."""
+CASES = [("full", "nodal", "snes"), ("full", "nodal", "auto"), ("faces", "exact", "auto")]
+"""Fidelity, quadrature and method that are profiled by default."""
 
 
-def functions(run: Run) -> str:
-    """Profile all steps of a run and list the functions that take most time of their own."""
+def profile_table(run: SteppedRun, lines: int = 12) -> str:
+    """Profile a whole call and list the functions that take most time of their own."""
     profile = cProfile.Profile()
-    profile.runcall(run.step)
+    profile.runcall(run.call)
     stats = pstats.Stats(profile)
-    whole = stats.total_tt
-    found = sorted(stats.stats.items(), key=lambda item: -item[1][2])[:LINES]
+    functions = sorted(stats.stats.items(), key=lambda item: -item[1][2])[:lines]
     rows = [
         [
-            _name(*where),
+            _short_name(*where),
             f"{calls / run.steps:.2f}",
             f"{1e3 * own / run.steps:.4f}",
-            f"{100 * own / whole:.0f} %",
+            f"{100 * own / stats.total_tt:.0f} %",
         ]
-        for where, (_, calls, own, _, _) in found
+        for where, (_, calls, own, _, _) in functions
     ]
     return table(["function", "calls/step", "own ms/step", "share"], rows)
 
 
-def _name(path: str, line: int, function: str) -> str:
-    """Short name of a profiled function."""
+def _short_name(path: str, line: int, function: str) -> str:
+    """Return the short name of a profiled function."""
     return f"{Path(path).name}:{line} {function}" if line else function
-
-
-@numba.njit
-def _begun(system, state):
-    """What is carried from step to step."""
-    return loop.begin(system, state)
-
-
-@numba.njit
-def _settled(system, kept, states, ground, times):
-    """Take the first step again and again."""
-    for _ in range(times):
-        loop.settle(system, kept, 0, states, ground)
-
-
-@numba.njit
-def _solved(system, kept, contact, times):
-    """Find the contact of a step again and again."""
-    for _ in range(times):
-        contact[:] = kept.right
-        linear.solve(system, contact, kept.gap, kept.before, kept.force)
-
-
-@numba.njit
-def _measured(system, kept, states, ground, room, times):
-    """Take resultants and energies of the first step again and again."""
-    for _ in range(times):
-        loop.measure(system, kept, 0, states, ground, room[0], room[1])
-
-
-def parts(run: Run, repeat: int) -> str:
-    """Time the parts of a strategy's compiled loop, each by itself, on the dead load."""
-    times = 2000
-    ends = run.start.time + DT * np.arange(1, 3)
-    series, results, _, system = run.stepper.prepared(run.start, DT, ends)
-    kept = _begun(system, series[0])
-    room, still = (results[0][0], results[2][0]), np.zeros(2)
-    actions = {
-        "settle": lambda: _settled(system, kept, series[:2], still, times),
-        "  of that, solve": lambda: _solved(system, kept, np.empty_like(kept.right), times),
-        "measure": lambda: _measured(system, kept, series[:2], still, room, times),
-    }
-    rows = []
-    for name, action in actions.items():
-        action()
-        rows.append([name, f"{least(watched(action), times, repeat).cpu:.4f}"])
-    open_points = int(np.count_nonzero(kept.force))
-    return table([f"part (dead load, {open_points} open points)", "ms/step"], rows)
 
 
 def report(cases: list[tuple[str, str, str]], motion: af.Motion, repeat: int) -> str:
     """Profile each case."""
-    warm_up(motion)
-    found = []
+    parts = []
     for fidelity, rule, method in cases:
         model = af.build(ring(), fidelity=fidelity, cells=(4, 4), quadrature=rule)
-        run = Run(model, motion, method)
-        found += [f"{fidelity}, {rule}, {method}: {run.clock(repeat).cpu:.4f} ms/step"]
-        found += [functions(run)]
-        if method != "snes":
-            found += [parts(run, repeat)]
-    return "\n\n".join(found)
+        settings = {"start": af.dead_load(model), "damping": DAMPING, "dt": DT, "method": method}
+        run = SteppedRun(lambda m=model, s=settings: af.time_history(m, motion, **s))
+        times = f"{run.time_steps(repeat).cpu:.4f} ms of processor time a step"
+        parts += [f"{fidelity}, {rule}, {run.method}: {times}", profile_table(run)]
+    return "\n\n".join(parts)
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of this benchmark."""
-    made = options(__doc__.splitlines()[0])
-    made.add_argument("--fidelity")
-    made.add_argument("--quadrature", default="nodal")
-    made.add_argument("--method", default="contact", choices=METHODS)
+    """Make the parser of the command line."""
+    made = options(__doc__)
+    made.add_argument("--fidelity", help="profile this one case in place of the default ones")
+    made.add_argument("--quadrature", default="exact")
+    made.add_argument("--method", default="auto")
     return made
 
 
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print a table a case."""
+    chosen = parser().parse_args(arguments)
+    cases = [(chosen.fidelity, chosen.quadrature, chosen.method)] if chosen.fidelity else CASES
+    if chosen.quick:
+        cases, chosen.repeat = [("rigid", "exact", "auto")], 1
+    print(report(cases, ground_motion(chosen), chosen.repeat))
+
+
 if __name__ == "__main__":
-    chosen = parser().parse_args()
-    one = [(chosen.fidelity, chosen.quadrature, chosen.method)]
-    print(report(one if chosen.fidelity else CASES, ground_motion(chosen), chosen.repeat))
+    main()

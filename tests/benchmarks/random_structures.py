@@ -8,13 +8,14 @@ is not plain, or for each, and the totals. Energy that rises by more than 1e-4 o
 is wrong; loose stones that gain more than that end in an error of ours.
 """
 
-import argparse
 import logging
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from setting import plain_options
 
 import archfem as af
 
@@ -87,13 +88,13 @@ class Came:
     spent: float = 0.0
 
 
-def tried(seed: int, displacements: str) -> Came:
-    """Run one."""
+def tried(seed: int, displacements: str, duration: float = 4.0) -> Came:
+    """Run one structure under one motion."""
     rng = np.random.default_rng(seed)
     try:
         built = structure(rng)
         motion = af.Motion.synthetic(
-            duration=4.0, pga=rng.uniform(0.5, 20.0), seed=int(rng.integers(1000))
+            duration=duration, pga=rng.uniform(0.5, 20.0), seed=int(rng.integers(1000))
         )
         damping = None if rng.random() < 0.3 else af.StiffnessDamping(0.05, 8.0)
         rung = ("rigid", "faces")[int(rng.random() < 0.15)]
@@ -114,20 +115,23 @@ def tried(seed: int, displacements: str) -> Came:
     return Came("WRONG" if wrong else kind, words, *counts, spent / steps)
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print what is not plain, and the totals."""
-    made = argparse.ArgumentParser(description=__doc__)
+    made = plain_options(__doc__)
     made.add_argument("--count", type=int, default=200)
     made.add_argument("--seed", type=int, default=0)
     made.add_argument("--displacements", default="small", choices=("small", "large"))
     made.add_argument("--all", action="store_true", help="print a line for each run")
-    asked = made.parse_args()
+    chosen = made.parse_args(arguments)
+    duration = 4.0
+    if chosen.quick:
+        chosen.count, duration = 2, 0.5
     logging.getLogger("archfem").setLevel(logging.ERROR)
     runs = []
-    for seed in range(asked.seed, asked.seed + asked.count):
-        came = tried(seed, asked.displacements)
+    for seed in range(chosen.seed, chosen.seed + chosen.count):
+        came = tried(seed, chosen.displacements, duration)
         runs.append(came)
-        if asked.all or not came.steps or came.kind == "WRONG":
+        if chosen.all or not came.steps or came.kind == "WRONG":
             print(
                 f"{seed:5} {came.kind:16} {came.steps:4} steps, {came.halved} halved, "
                 f"{came.left} by SNES, drift {came.drift:.1e}, {came.spent:.3f} ms; {came.words}",

@@ -9,26 +9,29 @@ of every joint; and on which rung a mechanism forms by count. Then the shares be
 says of its ring.
 """
 
-import argparse
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 from random_structures import structure
+from setting import plain_options
 
 import archfem as af
-from archfem.dynamics.probe import largest_difference, peaks_of
-from archfem.masonry.softness import softness
+from archfem.dynamics.error_estimation import largest_difference, peak_eccentricities
+from archfem.masonry.stiffness_ratio import estimate_block_stiffness
 
 PROMISED = {"rigid": 0.005, "faces": 0.002}
 """Errors in the largest |e| of the ring of the README."""
 
 
-def compared(seed: int) -> tuple[float, float, dict[str, float], dict[str, bool]] | None:
+def compared(
+    seed: int, duration: float
+) -> tuple[float, float, dict[str, float], dict[str, bool]] | None:
     """Stiffness ratio, largest |e|, errors and mechanisms by rung; None where a run ends early."""
     rng = np.random.default_rng(seed)
     built = structure(rng)
     pga = rng.uniform(0.5, 6.0)
-    motion = af.Motion.synthetic(duration=4.0, pga=pga, seed=int(rng.integers(1000)))
+    motion = af.Motion.synthetic(duration=duration, pga=pga, seed=int(rng.integers(1000)))
     damping, found, formed = af.StiffnessDamping(0.05, 8.0), {}, {}
     for rung in ("rigid", "faces", "full"):
         try:
@@ -37,22 +40,25 @@ def compared(seed: int) -> tuple[float, float, dict[str, float], dict[str, bool]
         except af.ArchfemError as error:
             print(f"{seed:4} {rung}: {str(error)[:90]}")
             return None
-        found[rung], formed[rung] = peaks_of(run), run.mechanism is not None
+        found[rung], formed[rung] = peak_eccentricities(run), run.mechanism is not None
     errors = {rung: largest_difference(found[rung], found["full"]) for rung in PROMISED}
-    ratio = min(softness(built, number).ratio for number in built.free)
+    ratio = min(estimate_block_stiffness(built, number).ratio for number in built.free)
     return ratio, float(found["full"].max()), errors, formed
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table and the shares."""
-    made = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    made = plain_options(__doc__)
     made.add_argument("--count", type=int, default=30)
     made.add_argument("--seed", type=int, default=0)
-    asked = made.parse_args()
+    chosen = made.parse_args(arguments)
+    duration = 4.0
+    if chosen.quick:
+        chosen.count, duration = 1, 0.5
     logging.getLogger("archfem").setLevel(logging.CRITICAL)
     rows = []
-    for seed in range(asked.seed, asked.seed + asked.count):
-        if (row := compared(seed)) is None:
+    for seed in range(chosen.seed, chosen.seed + chosen.count):
+        if (row := compared(seed, duration)) is None:
             continue
         rows.append(row)
         ratio, largest, errors, formed = row

@@ -14,7 +14,6 @@ PYTHONDONTWRITEBYTECODE each run compiles our modules anew, which no installed c
 unset, and let a first run write them.
 """
 
-import argparse
 import resource
 import tempfile
 import time
@@ -26,13 +25,14 @@ from unittest.mock import patch
 
 import numpy as np
 import tomli_w
+from setting import plain_options
 
 import archfem as af
-from archfem.studies import processes
-from archfem.studies.asking import Asked
-from archfem.studies.points import Point
-from archfem.studies.table import load_tables
-from archfem.studies.worker import Row
+from archfem.studies import process_pool
+from archfem.studies.evaluators import Evaluator
+from archfem.studies.parameter_space import Point
+from archfem.studies.process_pool import Row
+from archfem.studies.result_store import load_tables
 
 MESHES = Path(__file__).parents[2] / "meshes"
 RING, BRIDGE = MESHES / "ring.toml", MESHES / "prusias_sensitivity.toml"
@@ -61,9 +61,9 @@ def bridge() -> af.Study:
         return af.Study.read(path)
 
 
-def alone(points: Sequence[tuple[int, Point]], asked: Asked) -> Iterator[tuple[int, Row]]:
+def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tuple[int, Row]]:
     """Answer points on one process that is not this one."""
-    return processes.on_processes(points, asked, 1, meanwhile=load_tables)
+    return process_pool.on_processes(points, asked, 1, meanwhile=load_tables)
 
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
@@ -74,19 +74,23 @@ def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
         return time.monotonic() - begun, processor() - spent, failed
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print wall and processor time by the number of workers."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = plain_options(__doc__)
     parser.add_argument("--points", type=int, default=64)
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--repeat", type=int, default=1)
     parser.add_argument("--fidelity", default="rigid")
     parser.add_argument("--bridge", action="store_true", help="the bridge in place of the ring")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     if given.bridge:
         study = bridge()
     else:
-        case = af.Case.read(RING, [f"model.fidelity={given.fidelity}", "output.animation=false"])
+        changes = [f"model.fidelity={given.fidelity}", "output.animation=false"]
+        if given.quick:
+            given.points, given.workers = 1, [1]
+            changes += ["motion.end=0.5"]
+        case = af.Case.read(RING, changes)
         scales = [0.2 + 0.6 * k / given.points for k in range(given.points)]
         study = af.Study.of(case, {"motion.scale": scales})
     sums = {workers: np.zeros(2) for workers in given.workers}

@@ -8,7 +8,6 @@ a time drawn evenly; a killed driver is started again. Should the study end befo
 in another folder, which is compared as well. At last nobody is left of all that were begun.
 """
 
-import argparse
 import os
 import random
 import signal
@@ -16,7 +15,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
+
+from setting import plain_options
 
 CASE = """
 title = "a small ring"
@@ -37,12 +39,12 @@ synthetic = { seed = 1, duration = 4.0, pga = 3.0 }
 SAME = ("results.nc", "results.csv")
 
 
-def driver(folder: Path, out: Path) -> "subprocess.Popen[bytes]":
-    """The study's command, begun."""
+def driver(folder: Path, out: Path, workers: int = 2) -> "subprocess.Popen[bytes]":
+    """Start the command of the study."""
     command = [sys.executable, "-m", "archfem", "study", "--own-code", str(folder / "study.toml")]
     with (folder / "log.txt").open("a") as log:
         return subprocess.Popen(
-            [*command, "--out", str(out), "--workers", "2"], stdout=log, stderr=log
+            [*command, "--out", str(out), "--workers", str(workers)], stdout=log, stderr=log
         )
 
 
@@ -102,13 +104,15 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
     return met
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Compare a study left alone with others that were not."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = plain_options(__doc__)
     parser.add_argument("--points", type=int, default=160)
     parser.add_argument("--kills", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
+    if given.quick:
+        given.points, given.kills = 4, 0
     chance = random.Random(given.seed)
     each = given.kills // 3
     kills = {"driver": each, "worker": given.kills - 2 * each, "nursery": each}
@@ -121,7 +125,7 @@ def main() -> None:
             f"motion.scale = {scales}\n"
         )
         begun = time.monotonic()
-        assert driver(folder, folder / "alone").wait() == 0
+        assert driver(folder, folder / "alone", 1 if given.quick else 2).wait() == 0
         spent = time.monotonic() - begun
         print(f"left alone: {rows(folder / 'alone')} points in {spent:.1f} s", flush=True)
         studies, total = 0, given.kills

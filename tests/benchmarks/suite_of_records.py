@@ -3,28 +3,27 @@
     python tests/benchmarks/suite_of_records.py FOLDER_WITH_RECORDS [FOLDER_FOR_PICTURES]
 
 Matches the pairs to the spectrum of TBEC-2018 (S_S 1.140, S_1 0.315, class ZD). Prints misfit and
-drift of each component, with peak, Arias intensity and significant duration before and after, and
-how far the mean is from the target. Saves the accelerograms (figure 8 of the paper) and the spectra
-against their target (figure 9) to the second folder, by default out/suite.
+drift of each component, with PGA, Arias intensity and significant duration before and after, and
+the difference between mean and target. Saves the accelerograms (figure 8 of the paper) and the
+spectra against their target (figure 9) to the second folder, by default out/suite.
 """
 
-import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from setting import plain_options, print_left_out
 
-from archfem.cases.summary import match_table
-from archfem.motion.design_spectra import Tbec2018
-from archfem.motion.motion import Motion
-from archfem.motion.suite import Suite
+import archfem as af
+from archfem.cases.result_text import match_table
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.motions import draw_suite
 from archfem.view.style import COLUMN, LINES, NORMAL, SMALL, dress, save
 
-TARGET = Tbec2018(ss=1.140, s1=0.315, site="ZD")
+TARGET = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
 STEP = 0.005  # s, that of most of the records
 
 # Each vertical goes with the two horizontals of its own station.
@@ -39,13 +38,13 @@ DIRECTIONS = {"Duzce": ("180", "270"), "El Centro": ("180", "270"), "Tolmezzo": 
 def records(folder):
     """Read the six pairs, each under the name of its station and direction."""
     for station, stem in STATIONS.items():
-        upright = Motion.read(folder / f"{stem}-UP.AT2").resampled(STEP)
+        upright = af.Motion.read(folder / f"{stem}-UP.AT2").resampled(STEP)
         for direction in DIRECTIONS[station]:
-            level = Motion.read(folder / f"{stem}{direction}.AT2").resampled(STEP)
+            level = af.Motion.read(folder / f"{stem}{direction}.AT2").resampled(STEP)
             yield replace(level.with_vertical(upright), name=f"{station} {direction}")
 
 
-def drawn(suite):
+def draw_accelerograms(suite):
     """Draw the matched accelerograms, divided by R: six horizontals, three verticals."""
     figure = Figure(figsize=(1.5 * COLUMN, 9.0), layout="constrained")
     axes = figure.subplots(5, 2, sharex=True)
@@ -68,28 +67,35 @@ def drawn(suite):
     return figure
 
 
-def mean_apart(suite, component):
-    """Root mean square, least and largest of mean/target - 1 from 0.05 to 2 s."""
+def mean_difference(suite, component):
+    """Return root mean square, smallest and largest of mean/target - 1 from 0.05 to 2 s."""
     periods = np.geomspace(0.05, 2.0, 150)
     mean = suite.spectra(periods, component=component).mean(axis=0) / STANDARD_GRAVITY
     apart = mean / getattr(TARGET, component)(periods) - 1.0
     return np.sqrt(np.mean(apart**2)), apart.min(), apart.max()
 
 
-def main(folder, pictures):
+def main(arguments: Sequence[str] | None = None) -> None:
     """Match, print and draw."""
+    parser = plain_options(__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, help="with records")
+    parser.add_argument("pictures", nargs="?", type=Path, default=Path("out/suite"))
+    chosen = parser.parse_args(arguments)
+    if chosen.folder is None:
+        print_left_out("no folder with records is given")
+        return
+    nested = chosen.folder / "peer_at2"
     begun = time.perf_counter()
-    suite = Suite("TBEC-2018, class ZD", tuple(records(folder)), reduction=3.0).matched(TARGET)
+    motions = tuple(records(nested if nested.is_dir() else chosen.folder))
+    suite = af.Suite("TBEC-2018, class ZD", motions, reduction=3.0).matched(TARGET)
     print(match_table(suite.matches))
     print(f"matched in {time.perf_counter() - begun:.1f} s; before the reduction R = 3")
     for component in ("horizontal", "vertical"):
-        rms, least, most = mean_apart(suite, component)
+        rms, least, most = mean_difference(suite, component)
         print(f"mean of {component} against target: rms {rms:.2%}, {least:+.1%} to {most:+.1%}")
-    print(f"wrote {save(drawn(suite), pictures / 'accelerograms.png')}")
-    print(f"wrote {save(draw_suite(suite, TARGET), pictures / 'spectra.png')}")
+    print(f"wrote {save(draw_accelerograms(suite), chosen.pictures / 'accelerograms.png')}")
+    print(f"wrote {save(draw_suite(suite, TARGET), chosen.pictures / 'spectra.png')}")
 
 
 if __name__ == "__main__":
-    here = Path(sys.argv[1])
-    nested = here / "peer_at2"
-    main(nested if nested.is_dir() else here, Path((sys.argv[2:] or ["out/suite"])[0]))
+    main()

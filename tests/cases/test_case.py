@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.case import MODEL
+from archfem.cases.case import BUILD_KEYWORDS, MODEL_KEYS
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 
@@ -55,7 +55,7 @@ def test_changes_from_the_command_line():
         ("model.cells=4", r"model.cells = 4 is not a list"),
         ("model.cells=[0, 4]", "ring.toml: cells through = 0 is not a whole number"),
         ("model.tolerance=2", "ring.toml: tolerance 2 on .e. is not between 0 and 1"),
-        ("model.fidelity=modal", "'modal' is no longer known, for 'faces' is faster"),
+        ("model.fidelity=modal", "fidelity 'modal' is not known: use one of"),
         ("analysis.damping={ratio=0.05}", "give a ratio and a frequency"),
         ("analysis.scheme=euler", "use 'conserving', 'newmark', or 'hht'"),
         ("analysis.alpha=-0.1", "'conserving' with alpha -0.1: use .* 'hht' and alpha"),
@@ -66,7 +66,10 @@ def test_changes_from_the_command_line():
             "tension 1e.03 Pa .* is not between 0 and 0 Pa",
         ),
         ("contacts.stone to stone.cohesion=-1", "cohesion -1 Pa of 'stone to stone' is not betw"),
-        ("analysis.halt=maybe", "not true or false"),
+        ("analysis.stop_at_mechanism=maybe", "not true or false"),
+        ("analysis.halt=true", "unknown key 'analysis.halt'"),
+        ("model.points=3", "unknown key 'model.points'"),
+        ("output.every=2", "unknown key 'output.every'"),
         ("criteria.hinge=0.7", "criteria hinge = 0.7: .* at most 0.5"),
         ("criteria.limit=0.4", "unknown key 'criteria.limit'"),
         ("criteria.failures=4.0", "criteria.failures = 4.0 is not a whole number"),
@@ -156,7 +159,7 @@ damping = { ratio = 0.05, frequencies = ["8 Hz", "16 Hz"] }
 def test_a_case_says_only_what_differs_from_its_base(tmp_path):
     (tmp_path / "ring.toml").write_text(BASE)
     (tmp_path / "by_span.toml").write_text(
-        'base = "ring.toml"\nwithout = ["structure.radius", "structure.embrace"]\n'
+        'base = "ring.toml"\nremove = ["structure.radius", "structure.embrace"]\n'
         "[structure]\nspan = 4.0\nrise = 1.5\n[analysis.damping]\nratio = 0.02\n"
     )
     case = af.Case.read(tmp_path / "by_span.toml", ["structure.voussoirs=9"])
@@ -178,7 +181,7 @@ def test_a_case_says_only_what_differs_from_its_base(tmp_path):
         ('base = "nothing.toml"', "there is no case file"),
         ('base = "case.toml"', "is its own base"),
         ("base = 3", "not the name of a file"),
-        ('base = "ring.toml"\nwithout = ["structure.rise"]', "the base has no such key"),
+        ('base = "ring.toml"\nremove = ["structure.rise"]', "the base has no such key"),
         ('base = "ring.toml"\n[structure]\nradios = 3.0', "did you mean 'radius'"),
     ],
 )
@@ -205,8 +208,9 @@ def test_a_case_with_some_of_its_pairs_keeps_its_structure(small):
 
 def test_a_case_may_say_all_that_a_discretisation_takes():
     fields = set(af.models.Discretisation.__dataclass_fields__)
-    assert set(MODEL) == fields | {"tolerance"}
+    assert {BUILD_KEYWORDS.get(key, key) for key in MODEL_KEYS} == fields | {"tolerance"}
     case = af.Case.read(RING, ["model.fidelity=auto", "model.tolerance=0.02"])
-    assert (case.chooses, case.tolerance) == (True, 0.02)
+    assert (case.selects_model, case.tolerance) == (True, 0.02)
     assert case.discretisation == af.models.Discretisation("full", (4, 4))
-    assert af.Case.read(RING, ["model.coarse=50 cm"]).discretisation.coarse == pytest.approx(0.5)
+    case = af.Case.read(RING, ["model.max_cell_size=50 cm"])
+    assert case.discretisation.coarse == pytest.approx(0.5)

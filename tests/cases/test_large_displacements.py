@@ -3,8 +3,8 @@
 import pytest
 
 import archfem as af
-from archfem.cases.summary import pair_table
-from archfem.commands.cases import run as run_command
+from archfem.cases.result_text import tabulate_runs
+from archfem.commands.run import run as run_command
 
 CASE = """
 title = "a column that falls"
@@ -68,18 +68,19 @@ def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):
 
     run_command(Given)
     names = {file.name for file in Given.out.iterdir()}
-    written = {"dead.png", "names.png", "gravest.png", "envelope.png", "joints.png", "fall.png"}
+    written = {f"{name}.png" for name in ("dead", "names", "critical_instant", "envelope")}
+    written |= {"joints.png", "fall.png"}
     assert written | {"history.nc"} <= names
     summary = (Given.out / "summary.txt").read_text(encoding="utf-8")
     assert summary.startswith("the structure is fallen, at ")
     assert "before blocks came loose none was farther than " in summary
     history = af.dynamics.History.read(Given.out / "history.nc", af.Case.read(path).structure)
     assert history.fall.kind == "fallen"
-    assert pair_table({"pair": history}).rstrip().endswith(", fallen")
+    assert tabulate_runs({"pair": history}).text.rstrip().endswith(", fallen")
 
 
 def test_a_run_that_holds_says_so(path):
     case = af.Case.read(path, ["motion.scale=0.01", "motion.end=0.5"])
-    *_, done = af.cases.carried_out(case)
+    *_, done = af.cases.run_case(case)
     assert done.history.verdict.startswith("the structure stands; ")
     assert "at the end no block is farther than " in done.history.verdict

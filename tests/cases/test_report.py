@@ -1,39 +1,153 @@
-"""Files of what was found."""
+"""Reports: they contain all files of the folder, and name missing results."""
 
-import os
+import logging
+import shutil
+import tomllib
+from pathlib import Path
 
+import numpy as np
 import pytest
+from pages import read_page
 
 import archfem as af
-from archfem.cases import report as results
+from archfem.cases.report.checks import hash_bytes, supported_weight_ratio
+from archfem.cases.report.report_data import rebuild_motion
+
+CASE = """
+title = "a column <b>& more</b> under two pairs"
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0, 1.0]
+[model]
+fidelity = "rigid"
+[suite]
+name = "small"
+reduction = 2.0
+[suite.pairs]
+first = { synthetic = { seed = 1, duration = 1.0, pga = 1.0 } }
+second = { synthetic = { seed = 2, duration = 1.0, pga = 1.0, vertical_ratio = 0.0 } }
+[output]
+save_fields_every = 10
+"""
 
 
-def test_more_pairs_than_colours_share_several_pictures(small, tmp_path):
-    rest, _, run = af.cases.carried_out(af.Case.read(small), pairs=["first"])
-    runs = {str(number): run.history for number in range(7)}
-    files = results.write_pairs(runs, rest, "a table", tmp_path)
-    assert [path.name for path in files] == ["suite.txt", "envelope.png", "envelope_2.png"]
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Folder of a suite of two pairs, with what a report reads of it."""
+    folder = tmp_path_factory.mktemp("suite")
+    case = af.Case.of(tomllib.loads(CASE))
+    (folder / "case.toml").write_text(case.text())
+    list(af.cases.run_case(case, folder))
+    return folder
 
 
-def test_files_of_a_run_are_written_again_where_the_run_is_newer(small, undrawn, tmp_path):
-    rest, _, run = af.cases.carried_out(af.Case.read(small), tmp_path, pairs=["first"])
-    assert not results.is_written(run)
-    files = results.write_run(run, rest, "a table", run.path.parent)
-    assert files[-1].name == "summary.txt"
-    assert files[-1].read_text() == "a table\n"
-    assert results.is_written(run)
-    later = files[-1].stat().st_mtime_ns + 1
-    os.utime(run.path, ns=(later, later))
-    assert not results.is_written(run)
+@pytest.fixture
+def kept(carried_out, undrawn, tmp_path):
+    """A copy of it."""
+    return Path(shutil.copytree(carried_out, tmp_path / "out"))
 
 
-@pytest.mark.slow
-def test_a_case_may_ask_for_a_free_body(tmp_path):
-    ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
-    tables = {"structure": {**ring, "voussoirs": 9}, "output": {"free_body": "voussoir 3"}}
-    for cells, more in (({"fidelity": "rigid"}, []), ({"cells": [2, 2]}, ["png", "txt"])):
-        rest = af.cases.Rest.of(af.Case.of({**tables, "model": cells}))
-        files = [path.name for path in results.write_dead(rest, tmp_path)]
-        drawn = [f"dead_stress.{kind}" for kind in more]
-        assert files == ["dead.png", "names.png", *drawn, "free_body.png"]
-    assert (tmp_path / "dead_stress.txt").read_text().splitlines()[1].startswith("arch ")
+def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
+    (kept / "modes.txt").write_text("mode 1 at 3.14 Hz")
+    page = kept / "page.html"
+    assert af.commands.main(["report", str(kept), "--out", str(page)]) == 0
+    assert f"wrote {page}" in capsys.readouterr().out
+    read = read_page(page.read_text(encoding="utf-8"))
+    words = " ".join(read.words)
+    assert [scene["title"].split(": ")[1] for scene in read.scenes] == ["first", "second"]
+    assert all(scene["note"] == "" for scene in read.scenes)
+    assert "a column <b>& more</b> under two pairs" in words
+    assert "mode 1 at 3.14 Hz" in words
+    assert "Not among the results: stress in the blocks, for they are rigid" in words
+    assert "Not among the results: a target spectrum" in words
+    assert "another case" not in words
+    case = af.Case.read(kept / "case.toml")
+    assert hash_bytes(case.text().encode()) in words
+    assert "1.0000 of the weight" in words
+    run = af.History.read(kept / "first" / "history.nc", case.structure)
+    assert f"{float(run.joints['friction'].max()):.3f}" in words
+
+
+def test_pairs_that_lack_and_cases_that_differ_are_said(kept):
+    (kept / "second" / "history.nc").unlink()
+    text = (kept / "case.toml").read_text()
+    (kept / "case.toml").write_text(text.replace("reduction = 2.0", "reduction = 3.0"))
+    found = af.cases.open_results(kept)
+    assert (list(found.runs), found.missing) == (["first"], ("second",))
+    assert found.player().scene.run is found.runs["first"]
+    with pytest.raises(af.InvalidInput, match=r"no run 'third': there are \['first'\]"):
+        found.player("third")
+    assert found.report() == kept / "report.html"
+    words = " ".join(read_page((kept / "report.html").read_text(encoding="utf-8")).words)
+    assert "Not among the results: runs of second" in words
+    assert "first: the run carries another case than that of this report" in words
+
+
+def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
+    with pytest.raises(af.InvalidInput, match="there is no folder"):
+        af.cases.open_results(tmp_path / "nowhere")
+    with pytest.raises(af.InvalidInput, match=r"has no case.toml.*run the case again"):
+        af.cases.open_results(tmp_path)
+    with pytest.raises(af.InvalidInput, match="of one pair of a suite; give the suite's folder"):
+        af.cases.open_results(kept / "first")
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(af.InvalidInput, match="it is of a study"):
+        af.cases.open_results(tmp_path)
+    (tmp_path / "case.toml").write_text("title = ")
+    with pytest.raises(af.InvalidInput, match="is not TOML"):
+        af.cases.open_results(tmp_path)
+    drawing = '[structure]\nshape = "outlines"\nfile = "stones.geojson"\n'
+    (tmp_path / "case.toml").write_text(drawing)
+    with pytest.raises(af.InvalidInput, match=r"names the drawing stones.geojson.*--inputs"):
+        af.cases.open_results(tmp_path)
+
+
+def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
+    case = af.Case.read(small, ["analysis.damping={ratio=0.05, frequency=5.0}"])
+    *_, run = af.cases.run_case(case, pairs=["first"])
+    words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
+    assert "5 % of critical at 5 Hz, proportional to stiffness" in words
+    assert "kept no displacements" in run.player().scene.data["note"]
+
+
+def test_a_history_has_them_too(kept, tmp_path):
+    """By the case that it keeps; one of a model made in Python has a player alone."""
+    run = af.History.read(kept / "first" / "history.nc")
+    run.dataset.attrs["title"] = "of another name: second"  # what it ran is told by `motion` alone
+    words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
+    assert "a column <b>& more</b> under two pairs" in words
+    assert run.dataset.attrs["motion"] == "first"
+    assert "runs of first" not in words
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
+    alone = af.time_history(model, af.Motion(np.array([0.0, 0.1, 0.0]), 0.01), dt=0.01)
+    with pytest.raises(af.InvalidInput, match="keeps no case to report on"):
+        alone.report(tmp_path / "none.html")
+    assert "<iframe" in alone.player()._repr_html_()
+
+
+def test_a_case_without_motion_has_a_report_too(small, undrawn, tmp_path):
+    text = small.read_text().split("[suite]")[0]
+    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "limit.txt").write_text("it stands")
+    words = " ".join(read_page(af.cases.open_results(tmp_path).report().read_text()).words)
+    assert "Not among the results: the dead load" in words
+    assert "Not among the results: a run." in words
+    assert "it stands" in words
+
+
+def test_supports_bear_the_weight_or_the_report_doubts_it(ring, caplog):
+    caplog.set_level(logging.ERROR)
+    rest = af.dead_load(af.build(ring, fidelity="rigid"))
+    assert supported_weight_ratio(ring, rest.joints) == pytest.approx(1.0, abs=1e-9)
+    half = rest.joints.assign(N=0.5 * rest.joints["N"], V=0.5 * rest.joints["V"])
+    assert supported_weight_ratio(ring, half) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_the_ground_of_a_run_is_that_which_was_applied(stack):
+    motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
+    run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
+    found = rebuild_motion(run, "ground")
+    assert found.dt == pytest.approx(0.005)
+    assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
+    assert found.pga == pytest.approx(motion.pga)

@@ -28,7 +28,7 @@ def breaking():
     def stepper(model, motion, breaks, scheme=None):
         damping = af.Rayleigh(0.05, (8.0, 16.0))
         equation = af.dynamics.Equation(model, motion, damping, scheme or af.dynamics.Conserving())
-        real = af.dynamics.Exact(equation)
+        real = af.dynamics.SnesSolver(equation)
         tried = real.averaged if equation.conserving else real.attempt
 
         def attempt(state, dt):
@@ -36,6 +36,8 @@ def breaking():
                 raise af.DidNotConverge("made to fail")
             return tried(state, dt)
 
-        return af.dynamics.Stepper(equation, exact=af.dynamics.Exact(equation, attempts=attempt))
+        return af.dynamics.Stepper(
+            equation, exact=af.dynamics.SnesSolver(equation, attempts=attempt)
+        )
 
     return stepper

@@ -7,13 +7,13 @@ import pytest
 
 import archfem as af
 from archfem.dynamics.damping import (
-    EffectiveRange,
-    _modes_up_to,
+    EffectiveModeRange,
+    _modes_with_share,
     effective_damping,
-    effective_range,
-    first_effective,
+    effective_mode_range,
+    first_effective_mode,
 )
-from archfem.dynamics.stepping.choice import stepper_for
+from archfem.dynamics.solvers.selection import stepper_for
 
 SAME = 1e-9
 """Two ways to the same numbers: rounding of a stiffness whose ω² span eight decades."""
@@ -33,14 +33,14 @@ def test_effective_modes_are_those_of_all_modes(ring):
     dead = af.dead_load(model)
     everything = af.modes(model, 51, about=dead)
     for share in (0.8, 0.9, 0.999):
-        found = effective_range(model, dead, share=share)
+        found = effective_mode_range(model, dead, mass_share=share)
         reached = [everything.mass_ratios[:number, 0].sum() for number in range(52)]
         assert reached[found.first - 1] < 0.05 <= reached[found.first]
         assert reached[found.last - 1] < share <= reached[found.last]
-        assert found.share == pytest.approx(reached[found.last], abs=1e-9)
+        assert found.mass_share == pytest.approx(reached[found.last], abs=1e-9)
         ends = everything.frequencies[[found.first - 1, found.last - 1]]
         assert found.frequencies == pytest.approx(ends, rel=SAME)
-    text = effective_range(model, dead, share=0.8).text
+    text = effective_mode_range(model, dead, mass_share=0.8).text
     assert text.startswith("modes 1 and 4, the first and the last effective along x; up to the ")
     assert "88.2 % of the mass, most of it 1 (7.91 Hz, 70.7 %), 2 (" in text
 
@@ -49,20 +49,22 @@ def test_effective_modes_are_those_of_all_modes(ring):
 def test_the_mesh_hardly_moves_the_last_effective_mode(ring, cells):
     """The third mode along x, near 41 Hz, whose mass is 8 % on one mesh and 4 % on the other."""
     model = af.build(ring, fidelity="full", cells=cells)
-    assert effective_range(model, af.dead_load(model)).frequencies[1] == pytest.approx(
+    assert effective_mode_range(model, af.dead_load(model)).frequencies[1] == pytest.approx(
         40.8, rel=0.02
     )
 
 
 def test_search_goes_on_until_the_share_is_reached(ring):
     model = af.build(ring, fidelity="rigid")
-    whole = effective_range(model)
-    assert effective_range(model, few=1).frequencies == pytest.approx(whole.frequencies, rel=SAME)
+    whole = effective_mode_range(model)
+    assert effective_mode_range(model, initial_count=1).frequencies == pytest.approx(
+        whole.frequencies, rel=SAME
+    )
 
 
 def test_a_search_that_is_cut_short_says_so(ring, caplog):
     model = af.build(ring, fidelity="rigid")
-    found = effective_range(model, share=0.95, few=2, most=4)
+    found = effective_mode_range(model, mass_share=0.95, initial_count=2, max_count=4)
     assert (found.first, found.last) == (1, 4)
     assert "4 modes, up to 29.7 Hz, have only 90.1 % of the mass along x, not 95 %" in caplog.text
 
@@ -71,8 +73,8 @@ def test_effective_damping_has_its_ratio_at_the_first_effective_mode(ring):
     """By the complex modes of the damped closed structure, not by the formula for the ratio."""
     model = af.build(ring, fidelity="rigid")
     damping = effective_damping(model, 0.05)
-    assert damping == af.StiffnessDamping(0.05, effective_range(model).frequencies[0])
-    mass, stiffness = model.mass.toarray(), model.closed().toarray()
+    assert damping == af.StiffnessDamping(0.05, effective_mode_range(model).frequencies[0])
+    mass, stiffness = model.mass.toarray(), model.closed_tangent().toarray()
     lag = damping.mass * mass + damping.stiffness * stiffness
     none, one = np.zeros_like(mass), np.eye(len(mass))
     first = np.block(
@@ -87,7 +89,7 @@ def test_effective_damping_has_its_ratio_at_the_first_effective_mode(ring):
 
 def test_first_effective_mode_is_told(ring):
     model = af.build(ring, fidelity="rigid")
-    text = first_effective(model, af.dead_load(model)).text
+    text = first_effective_mode(model, af.dead_load(model)).text
     assert text == "mode 1, the first effective along x, has 70.7 % of the mass"
 
 
@@ -103,7 +105,7 @@ def test_a_block_in_flight_is_not_dragged():
         equation = af.dynamics.Equation(model, af.Motion(np.zeros(2), 0.2), damping)
         q = np.array([0.0, 0.5, 0.0])
         start = equation.at_rest(q, memory=af.dead_load(model).model.memory)
-        *_, last = stepper_for("snes", equation, start, 0.01).batches(start, 0.01, 0.2)
+        *_, last = stepper_for("snes", equation).batches(start, 0.01, 0.2)
         ends[name] = last.state(len(last.times) - 1).velocity[1]
     assert ends["free"] == pytest.approx(-9.81 * 0.2, rel=1e-9)
     assert ends["stiffness"] == pytest.approx(ends["free"], rel=1e-9)
@@ -113,7 +115,7 @@ def test_a_block_in_flight_is_not_dragged():
 def test_rayleigh_damping_has_its_ratio_at_both_ends(ring):
     model = af.build(ring, fidelity="rigid")
     damping = effective_damping(model, 0.05, kind="rayleigh", joints="none")
-    first, last = effective_range(model).frequencies
+    first, last = effective_mode_range(model).frequencies
     for frequency in (first, last):
         omega = 2.0 * np.pi * frequency
         ratio = 0.5 * (damping.mass / omega + damping.stiffness * omega)
@@ -123,11 +125,11 @@ def test_rayleigh_damping_has_its_ratio_at_both_ends(ring):
 
 def test_too_few_effective_modes():
     with pytest.raises(af.InvalidInput, match=r"mode 1 alone has 75\.3 % of the mass along x"):
-        effective_range(block(), share=0.5)
+        effective_mode_range(block(), mass_share=0.5)
     with pytest.raises(af.InvalidInput, match=r"share 5\.0 of the mass"):
-        effective_range(block(), share=5.0)
+        effective_mode_range(block(), mass_share=5.0)
     with pytest.raises(af.InvalidInput, match="modes to compute at first = 0"):
-        effective_range(block(), few=0)
+        effective_mode_range(block(), initial_count=0)
     with pytest.raises(af.InvalidInput, match="damping kind = 'mass': use one of"):
         effective_damping(block(), kind="mass")
 
@@ -165,7 +167,7 @@ def test_the_first_effective_mode_has_five_percent(breadth, number):
         af.Joint((0, 2), (-1.0, 0.0), (breadth - 1.0, 0.0), contact, "slender", "pier", "pier"),
     )
     model = af.build(af.Structure(blocks, beds), fidelity="rigid")
-    found = first_effective(model, af.dead_load(model))
+    found = first_effective_mode(model, af.dead_load(model))
     assert found.number == number
     assert found.modes.mass_ratios[0, 0] == pytest.approx(0.05, abs=0.0012)
 
@@ -186,7 +188,7 @@ def test_twice_as_many_modes_are_computed_until_they_have_the_share(
         return SimpleNamespace(mass_ratios=ratios, frequencies=1.0 + np.arange(count))
 
     monkeypatch.setattr("archfem.dynamics.damping.modes", modes)
-    found, total = _modes_up_to(SimpleNamespace(size=50), None, 0.9, 3, 10)
+    found, total = _modes_with_share(SimpleNamespace(size=50), None, 0.9, 3, 10)
     assert asked == counts
     assert len(total) == len(found.frequencies) == counts[-1]
     assert bool(caplog.text) is (reached == 99)
@@ -196,7 +198,7 @@ def test_four_modes_of_large_mass_are_named_in_their_order():
     ratios = np.zeros((6, 2))
     ratios[:, 0] = 0.3, 0.02, 0.25, 0.05, 0.2, 0.1
     given = SimpleNamespace(mass_ratios=ratios, frequencies=np.arange(1.0, 7.0))
-    text = EffectiveRange(given, 1, 6).text
+    text = EffectiveModeRange(given, 1, 6).text
     assert text.endswith(
         "1 (1.00 Hz, 30.0 %), 3 (3.00 Hz, 25.0 %), 5 (5.00 Hz, 20.0 %), 6 (6.00 Hz, 10.0 %)"
     )

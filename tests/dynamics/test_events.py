@@ -1,4 +1,4 @@
-"""Events that end a run, on joints whose state is known and in whole runs."""
+"""Events that end a run, and the scan of joints for failures."""
 
 from itertools import pairwise
 
@@ -9,8 +9,9 @@ import archfem as af
 from archfem.dynamics.events import (
     CountedMechanism,
     EveryMechanism,
+    FailureScan,
     MovingMechanism,
-    possible_counts,
+    applicable_definitions,
 )
 
 WEIGHT = 1e4
@@ -46,7 +47,7 @@ SAME_SIDE = {0: -0.5, 6: -0.5, 12: -0.5, 17: -0.5}
 
 def told(event, structure, *states, criteria=None):
     """What a fresh watch says of the last of some states, one after another."""
-    watch = event.watch(structure, criteria or af.Criteria())
+    watch = event.start_monitor(structure, criteria or af.Criteria())
     return [watch(resultants, STEP) for resultants in states][-1]
 
 
@@ -132,18 +133,22 @@ def test_soil_that_slides_is_no_event():
 
 def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
     structure, event = on_piers(), EveryMechanism()
-    watch = event.watch(structure, af.Criteria())
+    watch = event.start_monitor(structure, af.Criteria())
     in_ring = state(structure, {3: -0.5, 6: -0.5, 9: -0.5, 12: -0.5})  # one face: cannot move
     with_pier = state(structure, {0: -0.5, 3: -0.5, 6: -0.5, 9: -0.5})
     moving = state(structure, {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
-    assert possible_counts(structure) == ("any four joints", "four in a ring", "ring and pier")
+    assert applicable_definitions(structure) == (
+        "any four joints",
+        "four in a ring",
+        "ring and pier",
+    )
     for resultants in (state(structure), in_ring, in_ring, with_pier):
         assert watch(resultants, STEP) is None
     assert "by each definition" in watch(moving, STEP)
     assert told(event, structure, moving) is None  # a fresh watch: never four in the ring
     assert "by each definition" in told(EveryMechanism(), ring(), state(ring(), ALTERNATING))
     alone = af.column(breadth=1.0, heights=[1.0])
-    assert possible_counts(alone) == ()
+    assert applicable_definitions(alone) == ()
     assert "by each definition" in told(EveryMechanism(), alone, state(alone, {0: 0.5}))
 
 
@@ -151,8 +156,80 @@ def test_events_wait_for_as_long_as_a_mechanism_lasts():
     """0.6 ms, a break, then twice 0.6 ms by different joints: only the last is long enough."""
     hinges = [state(ring(), each) for each in (ALTERNATING, ALTERNATING | {9: 0.5})]
     for event in (CountedMechanism(), MovingMechanism(), EveryMechanism()):
-        watch = event.watch(ring(), af.Criteria())
+        watch = event.start_monitor(ring(), af.Criteria())
         said = [watch(each, 6e-4) for each in (hinges[0], state(ring()), *hinges)]
         assert said[:3] == [None] * 3
         assert "a mechanism" in said[3]
-        assert event.watch(ring(), af.Criteria(duration=0.0))(hinges[0], 6e-4) is not None
+        assert event.start_monitor(ring(), af.Criteria(duration=0.0))(hinges[0], 6e-4) is not None
+
+
+SCAN_WEIGHT = 1e4
+
+
+def hinging(structure, hinges):
+    """N, V, M with some joints hinging, {joint: e}."""
+    resultants = np.zeros((len(structure.joints), 3))
+    resultants[:, 0] = SCAN_WEIGHT
+    for joint, e in hinges.items():
+        resultants[joint, 2] = e * SCAN_WEIGHT * structure.joints[joint].depth
+    return resultants
+
+
+def at(scan, resultants, min_failures):
+    """What holds at one step."""
+    (found,) = scan(resultants[None], min_failures)
+    return found
+
+
+class Query:
+    """Query that stores the joints of each call."""
+
+    def __init__(self):
+        self.calls = []
+
+    def __call__(self, seen):
+        self.calls.append(seen.joint_states())
+        return frozenset({str(len(self.calls))})
+
+
+def test_no_query_runs_while_no_joint_fails_and_nothing_twice(ring):
+    query = Query()
+    scan = FailureScan(ring, af.Criteria(), range(18), query)
+    first, second = hinging(ring, {0: -0.5, 6: -0.5}), hinging(ring, {0: -0.5, 6: 0.5})
+    assert at(scan, hinging(ring, {}), 1) == frozenset()
+    for number, hinges in enumerate((first, second), 1):
+        assert at(scan, hinges, 1) == {str(number)}
+        assert np.flatnonzero(query.calls[-1]["hinge"]).tolist() == [0, 6]
+        assert query.calls[-1]["M"].values == pytest.approx(hinges[:, 2])
+        # other forces, the same joints on the same faces
+        assert at(scan, 1.1 * hinges, 1) == {str(number)}
+    assert len(query.calls) == 2
+
+
+def test_a_joint_may_slide_either_way_or_come_apart(ring):
+    query = Query()
+    scan = FailureScan(ring, af.Criteria(), range(18), query)
+    for number, force in enumerate(
+        ([SCAN_WEIGHT, SCAN_WEIGHT, 0.0], [SCAN_WEIGHT, -SCAN_WEIGHT, 0.0], [0.0, 0.0, 0.0]), 1
+    ):
+        resultants = hinging(ring, {})
+        resultants[3] = force
+        assert at(scan, resultants, 1) == at(scan, resultants, 1) == {str(number)}
+
+
+def test_only_some_joints_and_so_many_of_them_count(ring):
+    scan = FailureScan(ring, af.Criteria(), [1, 2, 3], Query())
+    assert not at(scan, hinging(ring, {0: 0.5}), 1)
+    assert not at(scan, hinging(ring, {0: 0.5, 1: 0.5}), 2)
+    assert at(scan, hinging(ring, {1: 0.5, 2: 0.5}), 2)
+
+
+def test_many_steps_at_once_are_seen_as_one_by_one(ring):
+    steps = np.array([hinging(ring, {}), hinging(ring, {2: 0.5}), hinging(ring, {2: -0.5, 9: 0.5})])
+    steps[1, 4] = SCAN_WEIGHT, -SCAN_WEIGHT, 0.0
+    query, alone = Query(), Query()
+    together = list(FailureScan(ring, af.Criteria(), range(18), query)(steps, 1))
+    scan = FailureScan(ring, af.Criteria(), range(18), alone)
+    assert together == [at(scan, step, 1) for step in steps] == [set(), {"1"}, {"2"}]
+    for first, second in zip(query.calls, alone.calls, strict=True):
+        assert first.identical(second)

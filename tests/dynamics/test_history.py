@@ -1,4 +1,4 @@
-"""The record of a run: its mechanisms, the criteria it obeys, and its file."""
+"""Histories: files, criteria, first mechanisms, and displacements of corners."""
 
 from dataclasses import replace
 
@@ -7,13 +7,18 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.dynamics.history import History, history_of
+from archfem.dynamics.history import (
+    History,
+    corner_displacements,
+    first_mechanisms,
+    partial_history,
+)
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 
 
 def test_everything_said_of_a_run_obeys_its_criteria(run, model, tmp_path):
-    loose = run.judged_by(af.Criteria(hinge=0.3, failures=5))
+    loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     assert loose.mechanism.time < run.mechanism.time
     assert len(loose.mechanism.joints) >= 5
     assert loose.verified.moved.time < run.verified.moved.time
@@ -44,7 +49,7 @@ def test_a_file_of_an_earlier_version(run, tmp_path):
     assert read.mechanism == run.mechanism
     assert read.verified.moved == run.verified.moved
     with pytest.raises(af.InvalidInput, match=r"only in words .* 'reached the end of the motion'"):
-        _ = read.ended
+        _ = read.ending
 
 
 def test_file_and_back(run, tmp_path):
@@ -132,10 +137,10 @@ def test_files_that_are_no_history(tmp_path):
 
 
 def test_the_history_that_a_failure_carries(run):
-    assert history_of(af.DidNotConverge("failed", history=run)) is run
+    assert partial_history(af.DidNotConverge("failed", history=run)) is run
     early = af.DidNotConverge("failed before the first step")
     with pytest.raises(af.DidNotConverge, match="before the first step") as caught:
-        history_of(early)
+        partial_history(early)
     assert caught.value is early
 
 
@@ -153,3 +158,45 @@ def test_a_mechanism_counts_from_a_millisecond_on_and_is_known_before(ring, held
     uneven = np.concatenate([1e-4 * np.arange(20.0), 2e-3 + 1e-2 * np.arange(20.0)])
     some = af.History(af.joints.joint_dataset(ring, resultants, uneven))
     assert some._first_of_any_duration["by count"].time == 5e-4
+
+
+def test_corners_of_a_rigid_block_move_with_it():
+    """A column of one stone: translation and a small turn about its centroid, by hand."""
+    model = af.build(af.column(breadth=0.4, heights=[0.8]), fidelity="rigid")
+    found = corner_displacements(model, np.array([[0.0, 0.0, 0.0], [0.01, -0.02, 0.003]]))
+    x, y = found["corner_x"].values, found["corner_y"].values
+    u = found["displacement"].values
+    assert sorted(set(np.round(x, 9))) == [-0.2, 0.2]
+    assert not u[0].any()
+    centre = model.structure.blocks[model.structure.free[0]].centroid
+    expected = [0.01 - 0.003 * (y - centre[1]), -0.02 + 0.003 * (x - centre[0])]
+    np.testing.assert_allclose(u[1].T, expected, atol=1e-12)
+
+
+def test_a_run_gives_displacements_over_time_point_and_direction(tmp_path):
+    model = af.build(af.column(breadth=0.4, heights=[0.8, 0.8]), fidelity="rigid")
+    motion = af.Motion(np.full(21, 0.5), 0.005)
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=5))
+    moved = run.displacement
+    assert moved.dims == ("time", "point", "xy")
+    assert moved.attrs["units"] == "m"
+    np.testing.assert_array_equal(moved["time"], run.dataset["frame_time"])
+    top = moved.where(moved["block"] == model.structure.blocks[-1].name, drop=True).sel(xy="x")
+    assert top.sizes["point"] == 4
+    assert float(top[-1].max()) < 0.0  # the ground goes to the right, relative to it all goes left
+    read = af.History.read(run.save(tmp_path / "run.nc"))
+    np.testing.assert_array_equal(read.displacement, moved)
+
+
+def test_a_run_without_fields_says_how_to_keep_them():
+    model = af.build(af.column(breadth=0.4, heights=[0.8]), fidelity="rigid")
+    run = af.time_history(model, af.Motion([0.0, 0.1, 0.0], 0.01), dt=0.005)
+    with pytest.raises(af.InvalidInput, match="fields_every=10"):
+        _ = run.displacement
+
+
+def test_definitions_obey_the_criteria_of_the_run(run):
+    loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
+    found = first_mechanisms(loose)
+    assert found == first_mechanisms(run, loose.criteria)
+    assert found["any four joints"] == replace(loose.mechanism, blocks=())

@@ -1,4 +1,4 @@
-"""The loop over steps, apart from the strategies that archfem has."""
+"""The loop over steps, apart from the solvers that archfem has."""
 
 import os
 from typing import NamedTuple
@@ -9,9 +9,9 @@ import pytest
 from numba.extending import overload
 
 import archfem as af
-from archfem.dynamics.stepping.loop import advance, begin, measure, settle
-from archfem.dynamics.stepping.stepper import BATCH
-from archfem.files import forget_stale
+from archfem._numba import delete_stale_cache
+from archfem.dynamics.solvers.base import advance, evaluate_step, solve_step, start_run
+from archfem.dynamics.solvers.integrator import STEPS_PER_BATCH
 
 GRAVITY = 9.81
 FRICTION = 0.5
@@ -23,13 +23,14 @@ class SlidingSystem(NamedTuple):
     mass: float
     dt: float
     stored: float
+    work: np.ndarray  # the friction that acts, and how far the block has slid, there and back
 
 
 class Sliding:
-    """Coulomb's friction: neither linear nor elastic, and with one coordinate instead of three."""
+    """Coulomb's friction: neither linear nor elastic."""
 
     name = "sliding"
-    setup = 0.0
+    order = np.arange(3)
 
     def __init__(self, equation):
         self.mass = equation.model.mass[0, 0]
@@ -40,64 +41,62 @@ class Sliding:
     def of(cls, equation):
         return cls(equation)
 
-    def enter(self, vectors):
-        return vectors[:, :1]
-
-    def leave(self, vectors):
-        return np.hstack([vectors, np.zeros((3, 2))])
-
     def system(self, dt):
-        return SlidingSystem(self.mass, dt, self.stored)
+        return SlidingSystem(self.mass, dt, self.stored, np.zeros(2))
 
 
 def slides(system):
     return getattr(system, "instance_class", None) is SlidingSystem
 
 
-@overload(begin)
-def _begin(system, state, memory):
-    if slides(system):
-        # the friction that acts, and how far the block has slid, there and back
-        return lambda system, state, memory: np.array([0.0, memory[0]])
-
-
-@overload(settle)
-def _settle(system, kept, step, states, ground):
+@overload(start_run)
+def _start_run(system, state, memory):
     if slides(system):
 
-        def slide(system, kept, step, states, ground):
+        def start(system, state, memory):
+            system.work[0], system.work[1] = 0.0, memory[0]
+
+        return start
+
+
+@overload(solve_step)
+def _solve_step(system, step, states, ground):
+    if slides(system):
+
+        def slide(system, step, states, ground):
             (before, after), dt = states, system.dt
+            after[:] = before
             free = before[1, 0] - dt * ground[0]
             after[1, 0] = np.sign(free) * max(abs(free) - FRICTION * GRAVITY * dt, 0.0)
             moved = 0.5 * dt * (before[1, 0] + after[1, 0])
             after[0, 0] = before[0, 0] + moved
             after[2, 0] = (after[1, 0] - before[1, 0]) / dt
-            kept[0] = -system.mass * (after[2, 0] + ground[0])
-            kept[1] += abs(moved)
+            system.work[0] = -system.mass * (after[2, 0] + ground[0])
+            system.work[1] += abs(moved)
             return 1
 
         return slide
 
 
-@overload(measure)
-def _measure(system, kept, step, states, ground, results, memory):
+@overload(evaluate_step)
+def _evaluate_step(system, step, states, ground, results, memory):
     if slides(system):
 
-        def measured(system, kept, step, states, ground, results, memory):
+        def evaluated(system, step, states, ground, results, memory):
             resultants, energy = results
-            memory[:] = kept[1]
+            memory[:] = system.work[1]
             moved = states[1, 0, 0] - states[0, 0, 0]
             resultants[0, 0] = system.mass * GRAVITY
-            resultants[0, 1] = kept[0]
+            resultants[0, 1] = system.work[0]
             energy[1] = system.stored
             energy[0] = 0.5 * system.mass * states[1, 1, 0] ** 2
             energy[2] = -system.mass * ground[0] * moved
-            energy[3] = kept[0] * moved
+            energy[3] = system.work[0] * moved
 
-        return measured
+        return evaluated
 
 
-def test_a_strategy_with_memory_and_friction_is_stepped_by_the_same_loop():
+def test_a_solver_with_memory_and_friction_is_stepped_by_the_same_loop():
     """Newmark's block: a pulse a for a time t slides it by ½ (a - μ g) t² a/(μ g)."""
     model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid")
     dt, pulse, lasts = 1e-4, 0.8 * GRAVITY, 0.3
@@ -109,7 +108,7 @@ def test_a_strategy_with_memory_and_friction_is_stepped_by_the_same_loop():
     run = af.time_history(model, equation.motion, dt=dt, method=stepper)
     over = pulse - FRICTION * GRAVITY
     slid = 0.5 * over * lasts**2 * pulse / (FRICTION * GRAVITY)
-    assert len(run.time) > 10 * BATCH
+    assert len(run.time) > 10 * STEPS_PER_BATCH
     assert run.dataset.attrs["method"] == "sliding"
     assert run.dataset["last_q"].values[0] == pytest.approx(slid, rel=1e-3)
     assert np.abs(run.joints["V"]).max() <= FRICTION * run.joints["N"].max() * (1.0 + 1e-9)
@@ -125,8 +124,8 @@ def test_compiled_code_older_than_any_source_is_forgotten(tmp_path):
     cache = tmp_path / "__pycache__"
     cache.mkdir()
     old, young, other = cache / "loop.nbi", cache / "band.1.nbc", cache / "loop.pyc"
-    for path, when in ((old, 1.0), (tmp_path / "modal.py", 2.0), (young, 3.0), (other, 1.0)):
+    for path, when in ((old, 1.0), (tmp_path / "newton.py", 2.0), (young, 3.0), (other, 1.0)):
         path.touch()
         os.utime(path, (when, when))
-    forget_stale(tmp_path)
+    delete_stale_cache(tmp_path)
     assert sorted(cache.iterdir()) == [young, other]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.dynamics.guard import Guard
-from archfem.dynamics.recorder import Reach, Recorder, Rows
+from archfem.dynamics.monitor import RunMonitor
+from archfem.dynamics.recorder import BlockDisplacements, GrowingArray, Recorder
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -20,7 +20,7 @@ def test_what_is_recorded(run, model, motion):
     assert run.dataset["q"].shape == (13, model.size)
     assert run.dataset["ground"].values == pytest.approx(motion.at(run.time))
     assert run.outcome == "reached the end of the motion"
-    assert run.ended is af.dynamics.Ending.FINISHED
+    assert run.ending is af.dynamics.Ending.FINISHED
     assert "archfem" in run.dataset.attrs["versions"]
     assert "extrados" in run.dataset.attrs["signs"]
 
@@ -69,7 +69,7 @@ def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
         resultants = np.ones((len(times), len(model.structure.joints), 3))
         energy = np.zeros((len(times), 4))
         ones = np.ones(len(times), dtype=np.int64)
-        readings = np.array([af.models.Gauges.on(model).read(start.q)] * len(times))
+        readings = np.array([model.observer().read(start.q)] * len(times))
         return af.dynamics.Batch(
             times, resultants, ones, 0.005 * ones, energy, state, readings=readings
         )
@@ -80,12 +80,12 @@ def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
         return start
 
     first = batch(np.zeros(1), lambda _: start)
-    guard = Guard(model, first)
-    recorder = Recorder(model=model, criteria=af.Criteria(), guard=guard, state=start, **given)
+    guard = RunMonitor(model, first)
+    recorder = Recorder(model=model, criteria=af.Criteria(), monitor=guard, state=start, **given)
     recorder.add(first)
     with pytest.raises(KeyboardInterrupt):
         recorder.add(batch(0.005 * np.arange(1.0, 5.0), pressed))
-    kept = recorder.history(motion, af.dynamics.Ending.INTERRUPTED, "by hand").dataset
+    kept = recorder.build_history(motion, af.dynamics.Ending.INTERRUPTED, "by hand").dataset
     assert kept["frame_time"].values == pytest.approx([0.0, 0.005, 0.01])
     assert kept["q"].shape == (3, model.size)
     assert kept["N"].notnull().all()
@@ -93,7 +93,7 @@ def test_ctrl_c_amid_a_batch_leaves_whole_records(model, motion):
 
 
 def test_rows_are_those_filled_so_far():
-    rows = Rows(4, (2,))
+    rows = GrowingArray(4, (2,))
     assert rows.values.shape == (0, 2)
     for filled in (np.ones((1, 2)), np.full((2, 2), 3.0)):
         rows.add(filled)
@@ -103,13 +103,13 @@ def test_rows_are_those_filled_so_far():
 
 def test_how_far_blocks_have_gone_and_when():
     """From where the first step has them, over batches; the first of equal ones counts."""
-    reach = Reach(SimpleNamespace(middles=lambda readings: readings))
+    reach = BlockDisplacements(SimpleNamespace(middles=lambda readings: readings))
     start = np.array([[[1.0, 1.0], [2.0, 2.0]]])
     reach.add(np.array([0.5]), start)
     moves = np.array([[[0.3, 0.4], [0.0, 0.0]], [[0.0, 0.1], [0.0, -0.2]]])
     reach.add(np.array([0.6, 0.7]), start + moves)
     reach.add(np.array([0.8, 0.9]), start + moves[::-1] * np.array([1.0, 0.5])[:, None, None])
-    found = {name: values for name, (_, values, _) in reach.variables().items()}
+    found = {name: values for name, (_, values, _) in reach.to_variables().items()}
     assert found["largest_displacement"] == pytest.approx([0.5, 0.2])
     assert found["largest_displacement_time"] == pytest.approx([0.6, 0.7])
     assert found["residual_displacement"] == pytest.approx([0.25, 0.0])

@@ -1,18 +1,14 @@
-"""Batches of steps by a strategy, and what it leaves to SNES."""
+"""Batches of steps by a solver, and what it leaves to SNES."""
 
 import numpy as np
 import pytest
 from glued import glued
-from scipy import sparse
 
 import archfem as af
-from archfem.dynamics.stepping.choice import STRATEGIES
-from archfem.dynamics.stepping.loop import ITERATIONS, advance
-from archfem.dynamics.stepping.modal import Modal
-from archfem.dynamics.stepping.stepper import Stepper
-from archfem.dynamics.stepping.strategy import in_own_terms
-from archfem.dynamics.stepping.tangent import Tangent
-from archfem.dynamics.stepping.turning import Turning
+from archfem.dynamics.solvers.base import MAX_ITERATIONS, advance
+from archfem.dynamics.solvers.compliance import ComplianceSolver
+from archfem.dynamics.solvers.integrator import Stepper
+from archfem.dynamics.solvers.newton import NewtonSolver
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -20,19 +16,20 @@ MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
 
 @pytest.mark.parametrize("rule", [pytest.param("lobatto", marks=pytest.mark.slow), "exact"])
 @pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
-def test_contact_stepper_falls_back(ring, rule, scheme):
+@pytest.mark.parametrize("solver", [NewtonSolver, ComplianceSolver])
+def test_a_stepper_falls_back(ring, rule, scheme, solver):
     """With one pass allowed, every step that opens or closes a point is left to SNES."""
     slides = scheme == af.dynamics.Conserving()
     model = af.build(ring if slides else glued(ring), fidelity="rigid", quadrature=rule)
     newton, short = af.statics.Newton(tolerance=1e-13), MOTION.cut(1.2, 1.6)
     equation = af.dynamics.Equation(model, short, DAMPING, scheme)
-    solves, given = af.dynamics.Exact(equation, newton), {"newton": newton, "dt": 0.005}
+    solves, given = af.dynamics.SnesSolver(equation, newton), {"newton": newton, "dt": 0.005}
     exact = af.time_history(model, short, method=Stepper(equation, exact=solves), **given)
-    stepper = Stepper(equation, Modal.of(equation), exact=solves, advance=_one_pass)
+    stepper = Stepper(equation, solver.of(equation), exact=solves, advance=_one_pass)
     run = af.time_history(model, short, method=stepper, **given)
     assert run.dataset.attrs["fallback_steps"] > 10
     assert exact.dataset.attrs["fallback_steps"] == 0
-    assert run.dataset["iterations"].max() > ITERATIONS
+    assert run.dataset["iterations"].max() > MAX_ITERATIONS
     off = np.abs(run.joints["M"] - exact.joints["M"]).max()
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
     drifts = [each.dataset["energy_drift"].values for each in (run, exact)]
@@ -42,17 +39,17 @@ def test_contact_stepper_falls_back(ring, rule, scheme):
         assert np.abs(drifts[0] - drifts[1]).max() < 1e-6 * np.abs(drifts[1]).max()
 
 
-def test_a_step_that_does_not_settle_is_halved_by_the_strategy(ring):
+def test_a_step_that_does_not_settle_is_halved_by_the_solver(ring):
     """Halves of steps of which none settles whole, by SNES neither, are steps half as long.
 
     Forces over the whole step are the mean of both.
     """
     model, short = af.build(ring, fidelity="rigid"), MOTION.cut(1.2, 1.6)
     equation = af.dynamics.Equation(model, short, DAMPING, af.dynamics.Conserving())
-    solves = af.dynamics.Exact(equation, attempts=_refused)
-    halving = Stepper(equation, Modal.of(equation), exact=solves, advance=_never_the_first())
+    solves = af.dynamics.SnesSolver(equation, attempts=_refused)
+    halving = Stepper(equation, NewtonSolver.of(equation), exact=solves, advance=_never_the_first())
     run = af.time_history(model, short, dt=0.005, method=halving)
-    plain = Stepper(equation, Modal.of(equation))
+    plain = Stepper(equation, NewtonSolver.of(equation))
     fine = af.time_history(model, short, dt=0.0025, method=plain)
     told = run.dataset.attrs
     assert (told["halved_steps"], told["fallback_steps"]) == (told["steps"], 0)
@@ -65,36 +62,6 @@ def test_a_step_that_does_not_settle_is_halved_by_the_strategy(ring):
         assert off.max() < 1e-8 * most  # each begins from λ = 0, and ends where rounding ends
     drifts = run.dataset["energy_drift"].values, fine.dataset["energy_drift"].values[::2]
     assert np.abs(drifts).max() < 1e-6  # of a joule, where tens are exchanged
-
-
-@pytest.mark.parametrize("kind", [each for each in STRATEGIES if each not in (Turning, Tangent)])
-def test_maps_in_the_terms_of_a_strategy(ring, kind):
-    """What a map gives of displacements, whichever terms they are in."""
-    model = af.build(glued(ring), fidelity="faces")
-    strategy = kind.of(af.dynamics.Equation(model, MOTION, DAMPING, af.dynamics.Newmark()))
-    matrix = sparse.random(7, model.size, 0.2, "csr", random_state=1)
-    own = strategy.enter(np.random.default_rng(1).normal(size=(3, model.size)))
-    found = in_own_terms(strategy, matrix, model.mass) @ own[0]
-    assert found == pytest.approx(matrix @ strategy.leave(own)[0], rel=1e-9, abs=1e-12)
-
-
-def test_maps_in_terms_of_any_kind(ring):
-    """Neither reordered nor modes: found vector by vector."""
-    model = af.build(ring, fidelity="rigid")
-    matrix = sparse.random(7, model.size, 0.2, "csr", random_state=1)
-    own = np.random.default_rng(1).normal(size=model.size)
-    found = in_own_terms(_Doubled(), matrix, model.mass)
-    assert found @ own == pytest.approx(2.0 * matrix @ own)
-
-
-class _Doubled:
-    """A strategy that halves all displacements."""
-
-    def enter(self, vectors):
-        return 0.5 * vectors
-
-    def leave(self, vectors):
-        return 2.0 * vectors
 
 
 def _one_pass(series, memories, results, ground, system):

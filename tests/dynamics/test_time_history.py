@@ -10,7 +10,13 @@ from glued import glued
 
 import archfem as af
 from archfem.dynamics.history import Ending
-from archfem.dynamics.time_history import Record, _reason, _steps, last_state, time_history
+from archfem.dynamics.time_history import (
+    Record,
+    _find_end,
+    _resolve_steps,
+    last_state,
+    time_history,
+)
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -18,11 +24,16 @@ GIVEN = {"damping": DAMPING, "dt": 0.005}
 
 def test_a_model_knows_what_was_predicted_of_it(model):
     foreseen = af.models.Prediction(
-        error=0.003, in_time=0.001, tolerance=0.005, dt=0.0025, pace=None, considered=()
+        error=0.003,
+        time_step_error=0.001,
+        tolerance=0.005,
+        dt=0.0025,
+        step_tolerance=None,
+        candidates=(),
     )
-    chosen = model.predicted(foreseen)
+    chosen = model.with_prediction(foreseen)
     assert (chosen.prediction, model.prediction) == (foreseen, None)
-    assert chosen.moved(chosen.supports).prediction == foreseen
+    assert chosen.with_support_motion(chosen.support_motion).prediction == foreseen
     short = time_history(chosen, af.Motion.synthetic(duration=0.25, seed=2))
     assert np.diff(short.time) == pytest.approx(0.0025)
     assert short.dataset.attrs["predicted_error"] == 0.003
@@ -51,7 +62,7 @@ def weak(motion):
 def test_criteria_of_the_event_are_those_of_the_run(model, weak, event):
     assert time_history(model, weak, **GIVEN).mechanism is None
     halted = time_history(model, weak, **GIVEN, until=event)
-    assert halted.ended is af.dynamics.Ending.EVENT
+    assert halted.ending is af.dynamics.Ending.EVENT
     assert halted.criteria == LOOSE
     assert halted.mechanism.time == halted.time[-1]
 
@@ -81,7 +92,7 @@ def test_criteria_of_run_and_event_must_be_the_same(model, motion):
 )
 def test_an_event_begins_afresh_in_each_run(model, motion, event):
     first, second = (time_history(model, motion, **GIVEN, until=event) for _ in range(2))
-    assert first.ended is second.ended is af.dynamics.Ending.EVENT
+    assert first.ending is second.ending is af.dynamics.Ending.EVENT
     assert first.outcome == second.outcome
     assert first.time[-1] == second.time[-1]
 
@@ -108,8 +119,8 @@ def test_ctrl_c_keeps_what_was_computed(model, motion):
     finally:
         signal.signal(signal.SIGINT, before)
     assert "interrupted at" in run.outcome
-    assert run.ended is af.dynamics.Ending.INTERRUPTED
-    assert not run.ended.by_itself
+    assert run.ending is af.dynamics.Ending.INTERRUPTED
+    assert not run.ending.is_complete
     assert 0.5 < run.time[-1] < 1.6
     assert run.joints["N"].notnull().all()
 
@@ -121,7 +132,7 @@ def test_a_failure_carries_the_history(model, motion, breaking):
     assert caught.value.history.time[-1] == pytest.approx(0.205, abs=0.006)
     assert caught.value.last.time == pytest.approx(0.205, abs=0.006)
     assert "failed at" in caught.value.history.outcome
-    assert caught.value.history.ended is af.dynamics.Ending.FAILED
+    assert caught.value.history.ending is af.dynamics.Ending.FAILED
 
 
 def test_hht_damps_less_than_it_changes(ring, motion):
@@ -143,19 +154,19 @@ def test_refusals(model, motion):
 
 def test_steps_are_those_asked_for_or_foreseen_or_chosen_by_a_tolerance(model):
     """Between a microsecond and a tenth of a second; 0.005 of |e| where nothing is said."""
-    assert _steps(model, None, None) == (None, 0.005)
-    assert _steps(model, None, 0.02) == (None, 0.02)
+    assert _resolve_steps(model, None, None) == (None, 0.005)
+    assert _resolve_steps(model, None, 0.02) == (None, 0.02)
     for dt in (1.01e-6, 0.1):
-        assert _steps(model, dt, None) == (dt, 0.005)
+        assert _resolve_steps(model, dt, None) == (dt, 0.005)
     for dt in (0.99e-6, 0.101):
         with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
-            _steps(model, dt, None)
-    told = {"error": 0.0, "in_time": 0.0, "tolerance": 0.01, "considered": ()}
-    paced = model.predicted(af.models.Prediction(dt=None, pace=0.003, **told))
-    stepped = model.predicted(af.models.Prediction(dt=0.002, pace=None, **told))
-    assert _steps(paced, None, None) == (None, 0.003)
-    assert _steps(stepped, None, None) == (0.002, 0.005)
-    assert _steps(stepped, 0.004, None) == (0.004, 0.005)
+            _resolve_steps(model, dt, None)
+    told = {"error": 0.0, "time_step_error": 0.0, "tolerance": 0.01, "candidates": ()}
+    paced = model.with_prediction(af.models.Prediction(dt=None, step_tolerance=0.003, **told))
+    stepped = model.with_prediction(af.models.Prediction(dt=0.002, step_tolerance=None, **told))
+    assert _resolve_steps(paced, None, None) == (None, 0.003)
+    assert _resolve_steps(stepped, None, None) == (0.002, 0.005)
+    assert _resolve_steps(stepped, 0.004, None) == (0.004, 0.005)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +188,9 @@ def test_what_comes_first_ends_a_run_within_a_batch(event, parting, said):
         lengths.append(step)
         return "enough" if resultants == event else None
 
-    apart = SimpleNamespace(step=lambda batch: None if parting is None else (parting, "apart"))
+    apart = SimpleNamespace(
+        find_first=lambda batch: None if parting is None else (parting, "apart")
+    )
     batch = SimpleNamespace(times=np.array([1.1, 1.2, 1.4, 1.5]), resultants=[0, 1, 2, 3])
-    assert _reason((watch, apart), batch, 1.0) == said
+    assert _find_end((watch, apart), batch, 1.0) == said
     assert lengths == pytest.approx([0.1, 0.1, 0.2, 0.1][: len(lengths)])

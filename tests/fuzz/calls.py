@@ -95,7 +95,7 @@ def ready() -> None:
         (af.verified_mechanism, {**at, "joints": dead.joints}),
         (af.first_mechanisms, {"run": run}),
         (run.joint, {"joint": "joint 1"}),
-        (run.judged_by, {"criteria": af.Criteria()}),
+        (run.with_criteria, {"criteria": af.Criteria()}),
         (
             af.time_history,
             {

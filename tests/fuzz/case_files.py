@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from archfem.commands import cases
+from archfem.commands import run
 from fuzz import odd
 from fuzz.trial import Came, judged
 
@@ -41,7 +41,7 @@ failures = 4
 friction = 0.6
 duration = 0.02
 [output]
-every = 1
+save_every = 1
 joints = [0, "joint 1"]
 free_body = "block 1"
 """,
@@ -161,7 +161,7 @@ DRAWING = (
 
 def ready() -> None:
     """Load what `check` needs."""
-    from archfem.masonry.survey import survey  # noqa: F401
+    from archfem.masonry.survey import outlines  # noqa: F401
     from archfem.units import in_unit
 
     in_unit("1 m", "m", "x")
@@ -192,7 +192,7 @@ def checked(path: Path) -> str | None:
     """Check a case and say what is wrong with what is printed."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
-        cases.check(argparse.Namespace(case=str(path), changes=[]))
+        run.check(argparse.Namespace(case=str(path), changes=[]))
     if "dead load in" not in said.getvalue():
         return "nothing is said of the dead load"
     found = re.search(r"^.*\b(nan|inf)\b.*$", said.getvalue(), re.MULTILINE)
@@ -239,7 +239,7 @@ def _picked(values: Any, rng: np.random.Generator) -> Any:
 LUMPS = (
     *(b"\xef\xbb\xbf", b"\xff\xfe", b"\0", b"\x1a", b"\r", b"[" * 5000, b"{a=" * 5000, b"\xc3"),
     *(b"1" * 5000, b"a." * 5000 + b"b = 1\n", b'"""', b"'", b"=", b"\n[model]\n", b"1e", b"0x" * 9),
-    *(b'\nbase = "case.toml"\n', b'\nbase = "/dev/zero"\n', b"\nwithout = 3\n", b"-", b"e999"),
+    *(b'\nbase = "case.toml"\n', b'\nbase = "/dev/zero"\n', b"\nremove = 3\n", b"-", b"e999"),
     *(b"1979-05-27T07:32:00Z", b"[[structure]]\n", b"\ntitle = 5\n", b"\xf0\x9f\x8f\x9b", b"nan"),
 )
 

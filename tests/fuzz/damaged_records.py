@@ -3,7 +3,7 @@
 import numpy as np
 
 from archfem.errors import InvalidInput
-from archfem.motion.records.read import read_channels
+from archfem.motion.records.reader import read_channels
 
 WAVE = 0.5 * np.sin(0.7 * np.arange(40)) - 0.5 * np.sin(0.7 * np.arange(40)).mean()  # m/s²
 PEAK = 100.0 * np.abs(WAVE).max()  # cm/s²

@@ -21,7 +21,7 @@ class Came:
     """What came of a trial.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `MECHANISM_KINDS`.
         words: the error, or what is wrong with the answer.
         told: what was tried, as text that a person can repeat it from.
     """

@@ -9,13 +9,13 @@ from time import perf_counter
 import numpy as np
 
 import archfem as af
-from archfem.dynamics.guard import DOUBTFUL
 from archfem.dynamics.history import Ending
-from archfem.dynamics.stepping.equation import Equation
-from archfem.dynamics.steps import State
+from archfem.dynamics.monitor import ENERGY_DRIFT_WARNING
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.state import State
 from archfem.masonry.materials import STONE_TO_STONE
 from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.newton import magnitude
+from archfem.statics.newton import load_magnitude
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 DT = 0.005
@@ -101,7 +101,10 @@ class _Told(logging.Handler):
 
 def _drifts(run: af.History) -> bool:
     """Whether the drift is such that archfem must speak of it, in a run that came to its end."""
-    return abs(run.dataset.attrs["energy_drift"]) > DOUBTFUL and run.ended is not Ending.FAILED
+    return (
+        abs(run.dataset.attrs["energy_drift"]) > ENERGY_DRIFT_WARNING
+        and run.ending is not Ending.FAILED
+    )
 
 
 CASES: list[Case] = []
@@ -193,19 +196,19 @@ def unbalanced_steps(run: af.History, dead: Equilibrium, motion: af.Motion, damp
     """
     equation, dt = Equation(dead.model, motion, damping), float(run.time[1] - run.time[0])
     stored = np.stack([run.joints[key].values for key in ("N", "V", "M")], axis=-1)
-    largest, scale = np.abs(stored).max(axis=(0, 1)), magnitude(equation.weight)
+    largest, scale = np.abs(stored).max(axis=(0, 1)), load_magnitude(equation.weight)
     before, worst = equation.at_rest(dead.q, memory=dead.model.memory), 0.0
     grounds, frames = equation.ground(run.time[1:], dt)[0], run.dataset["q"].values
     for time, ground, q, given in zip(run.time[1:], grounds, frames[1:], stored[1:], strict=True):
-        passage = equation.remembering(before).passage(before.q, equation.lag / dt)
+        passage = equation.with_memory(before).begin_step(before.q, equation.lag / dt)
         speed = 2.0 * (q - before.q) / dt - before.velocity
         change, drag = (speed - before.velocity) / dt, 0.5 * (speed + before.velocity)
-        load = equation.weight - equation.model.body @ ground
+        load = equation.weight - equation.model.mass_influence @ ground
         moving = equation.model.mass @ change + equation.viscous @ drag
         lacks = float(np.linalg.norm(moving + passage.force(q) - load)) / scale
         errs = float((np.abs(passage.resultants(q) - given) / largest).max())
         worst = max(worst, lacks, errs)
-        before = State(float(time), q, speed, change, passage.remembered(q))
+        before = State(float(time), q, speed, change, passage.updated_memory(q))
     return worst
 
 

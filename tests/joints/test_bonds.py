@@ -36,16 +36,16 @@ def places(model, seed, size=1e-4):
     """A memory with some bonds broken, and two places; a bond that has slid is broken."""
     random = np.random.default_rng(seed)
     points = model.operator.points
-    broken = np.where(random.random(len(points.arm)) < 0.4, 1.0, 0.0) * (points.tension > 0.0)
+    broken = np.where(random.random(len(points.offset)) < 0.4, 1.0, 0.0) * (points.tension > 0.0)
     free = points.slides & ((broken > 0.0) | (points.tension == 0.0))
     slid = np.where(free, size * random.standard_normal(len(broken)), 0.0)
     first, last = (size * random.standard_normal(model.size) for _ in range(2))
-    return model.remembering(np.concatenate([slid, broken])), first, first + 0.5 * last
+    return model.with_memory(np.concatenate([slid, broken])), first, first + 0.5 * last
 
 
 def scalar(model, i, gap, slip):
     """Normal and shear force of one spring, how far it has slid and whether it broke, by cases."""
-    points, count = model.operator.points, len(model.operator.points.arm)
+    points, count = model.operator.points, len(model.operator.points.offset)
     slid, broken = model.memory[i], model.memory[count + i]
     area, k_n, k_s = points.weight[i], points.normal_stiffness[i], points.shear_stiffness[i]
     bonded = points.tension[i] > 0.0 and not broken
@@ -67,7 +67,7 @@ def scalar(model, i, gap, slip):
 def test_a_path_of_springs_is_that_of_scalar_laws():
     """Forces are those of Mohr and Coulomb with a cut-off in tension, in true tractions."""
     model, random = ring(), np.random.default_rng(1)
-    count = len(model.operator.points.arm)
+    count = len(model.operator.points.offset)
     sizes = np.repeat([2e-6, 6e-6, 2e-5, 1e-4], 15)
     before = 0.0
     for size in sizes:
@@ -75,13 +75,13 @@ def test_a_path_of_springs_is_that_of_scalar_laws():
         gaps, slips = model.operator.openings(q), model.operator.slips(q)
         rows = [scalar(model, i, gaps[i], slips[i]) for i in range(count)]
         normal, shear, slid, broken = np.array(rows).T
-        found = model.operator.tractions(q)
+        found = model.operator.point_forces(q)
         assert found[0] == pytest.approx(normal, rel=1e-10, abs=1e-6)
         assert found[1] == pytest.approx(shear, rel=1e-10, abs=1e-6)
-        step = model.passage(q, 0.0)  # of no length: there all that is torn breaks
-        model = model.remembering(np.concatenate([model.remembered(q)[:count], broken]))
+        step = model.begin_step(q, 0.0)  # of no length: there all that is torn breaks
+        model = model.with_memory(np.concatenate([model.updated_memory(q)[:count], broken]))
         assert model.memory[:count] == pytest.approx(slid, rel=1e-9, abs=1e-14)
-        assert np.array_equal(step.remembered(q)[count:], broken)
+        assert np.array_equal(step.updated_memory(q)[count:], broken)
         assert broken.sum() >= before
         before = broken.sum()
     assert 0 < before <= (model.operator.points.tension > 0.0).sum()
@@ -100,7 +100,7 @@ def test_a_bonded_joint_is_linear_elastic_below_its_strength():
         shear = 1e9 * 2.0 * (0.5 * 3e-4) ** 2  # the joint is half a metre below the centroid
         expected = 0.5 * (2e9 * 2.0 * (1e-8 + 9e-8 / 12.0) + shear)
         assert model.energy(q) == pytest.approx(expected, rel=1e-12)
-        assert not model.remembered(q).any()
+        assert not model.updated_memory(q).any()
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -113,9 +113,9 @@ def test_forces_are_the_slope_of_the_energy_where_nothing_slides(rule, seed):
     )
     model = af.build(structure, fidelity="rigid", quadrature=rule, cells=(2, 2))
     random = np.random.default_rng(seed)
-    count = len(model.operator.points.arm)
+    count = len(model.operator.points.offset)
     memory = np.concatenate([np.zeros(count), np.round(random.random(count))])
-    model, q = model.remembering(memory), 1e-4 * random.standard_normal(model.size)
+    model, q = model.with_memory(memory), 1e-4 * random.standard_normal(model.size)
     step = 1e-9 * random.standard_normal(model.size)
     change = model.energy(q + step) - model.energy(q - step)
     assert change == pytest.approx(2.0 * model.force(q) @ step, rel=1e-6)
@@ -136,7 +136,7 @@ def test_the_static_tangent_is_the_slope_of_the_forces(fidelity, rule, seed):
 def settled(passage, q):
     """A step whose teeth end where the slip puts them, and the turns that took."""
     for turn in range(TURNS):
-        following = passage.raising(q)
+        following = passage.with_dilatancy(q)
         if following is passage:
             return passage, turn
         passage = following
@@ -154,14 +154,14 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late, rule):
     broke = rose = 0
     for seed in range(8):
         model, first, last = places(ring(fidelity, rule), seed)
-        passage, turns = settled(model.passage(first, late), last)
-        after = model.remembering(passage.remembered(last))
+        passage, turns = settled(model.begin_step(first, late), last)
+        after = model.with_memory(passage.updated_memory(last))
         work = passage.force(last) @ (last - first)
-        stored, lost = after.energy(last) - model.energy(first), passage.lost(last)
+        stored, lost = after.energy(last) - model.energy(first), passage.dissipation(last)
         scale = np.abs(passage.force(last) * (last - first)).sum()
         assert work == pytest.approx(stored + lost, abs=1e-8 * scale)
         assert lost >= -1e-8 * scale
-        count = len(model.operator.points.arm)
+        count = len(model.operator.points.offset)
         broke, rose = broke + (after.memory - model.memory)[count:].sum(), rose + turns
     assert broke > 10
     assert rose > 10
@@ -172,7 +172,7 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late, rule):
 def test_the_tangent_of_a_step_of_springs_is_exact(late, seed):
     """With the end of the teeth given, a central difference over 1e-10 m, to 1e-7."""
     model, first, last = places(ring(), seed)
-    passage, _ = settled(model.passage(first, late), last)
+    passage, _ = settled(model.begin_step(first, late), last)
     step = 1e-10 * np.random.default_rng(7).standard_normal(model.size)
     change = passage.force(last + step) - passage.force(last - step)
     expected = 2.0 * passage.tangent(last) @ step
@@ -196,13 +196,13 @@ def test_a_broken_bond_is_a_dry_joint():
             )
         ]
         bonded, dry = models
-        random, count = np.random.default_rng(3), len(dry.operator.points.arm)
+        random, count = np.random.default_rng(3), len(dry.operator.points.offset)
         slid, first, last = (
             1e-4 * random.standard_normal(size) for size in (count, dry.size, dry.size)
         )
-        bonded = bonded.remembering(np.concatenate([slid, np.ones(count)]))
-        dry = dry.remembering(slid)
+        bonded = bonded.with_memory(np.concatenate([slid, np.ones(count)]))
+        dry = dry.with_memory(slid)
         assert np.array_equal(bonded.force(first), dry.force(first))
-        steps = bonded.passage(first, 0.1), dry.passage(first, 0.1)
+        steps = bonded.begin_step(first, 0.1), dry.begin_step(first, 0.1)
         assert np.array_equal(steps[0].force(last), steps[1].force(last))
-        assert np.array_equal(steps[0].remembered(last)[:count], steps[1].remembered(last))
+        assert np.array_equal(steps[0].updated_memory(last)[:count], steps[1].updated_memory(last))

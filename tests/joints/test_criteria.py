@@ -7,16 +7,16 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.summary import joint_table
+from archfem.cases.result_text import tabulate_joints
 from archfem.joints.criteria import (
     Criteria,
+    assessed_joints,
     envelope,
-    failed,
+    failed_joints,
     first_time,
-    flagged,
-    judged,
     longest_duration,
-    ratio_at_sliding,
+    sliding_ratio,
+    with_failure_flags,
 )
 
 
@@ -28,7 +28,7 @@ def test_flags(joints):
     assert joints["open"].sum() == 1
     assert joints["judged"].all()
     assert [joints[name].dtype for name in ("hinge", "slide", "open")] == [np.int8, bool, bool]
-    assert failed(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
+    assert failed_joints(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
 
 
 @pytest.mark.parametrize("share", [1.0 - 1e-9, 1.0, 1.0 + 1e-9])
@@ -72,7 +72,7 @@ def test_mechanism_needs_four_joints_at_once(joints):
 
 
 def test_table_says_when_and_how_long(joints):
-    lines = joint_table(joints).splitlines()
+    lines = tabulate_joints(joints).text.splitlines()
     assert len(lines) == 19
     assert lines[8].split()[8:12] == ["0.200", "s", "0.300", "s"]
     assert lines[1].split()[-6:] == ["-"] * 6
@@ -102,7 +102,7 @@ def joints_of(failing):
             "friction_limit": ("joint", np.full(20, 0.6)),
         },
     )
-    return flagged(joints)
+    return with_failure_flags(joints)
 
 
 def test_definitions_of_a_counted_mechanism():
@@ -132,11 +132,11 @@ def test_four_of_two_rings_and_a_pier_are_of_no_pair():
 
 def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():
     joints = joints_of([{0}])
-    assert judged(joints)["joint"].values.tolist() == list(range(14))
-    turned = judged(joints.isel(joint=slice(None, None, -1)))
+    assert assessed_joints(joints)["joint"].values.tolist() == list(range(14))
+    turned = assessed_joints(joints.isel(joint=slice(None, None, -1)))
     assert turned["joint"].values.tolist() == list(range(13, -1, -1))
-    soil = flagged(joints.isel(joint=slice(14, None)), Criteria())
-    assert judged(soil).identical(soil)  # there is nothing else to judge
+    soil = with_failure_flags(joints.isel(joint=slice(14, None)), Criteria())
+    assert assessed_joints(soil).identical(soil)  # there is nothing else to judge
 
 
 def test_a_wall_by_itself_is_counted():
@@ -147,13 +147,13 @@ def test_a_wall_by_itself_is_counted():
 
 def test_table_holds_judged_joints_only():
     joints = joints_of([{0}, {15}])
-    lines = joint_table(joints, joints.isel(time=0)).splitlines()
+    lines = tabulate_joints(joints, joints.isel(time=0)).text.splitlines()
     assert len(lines) == 15
     assert "joint 15" not in "".join(lines)
 
 
 def test_limits_are_those_of_the_criteria(joints):
-    wide = flagged(joints, Criteria(hinge=0.475))
+    wide = with_failure_flags(joints, Criteria(hinge=0.475))
     assert wide["hinge"][1, 3] == -1
     assert wide["hinge"][2, 14] == 0  # at 0.47
     assert af.limit.counted_mechanism(wide) is None
@@ -166,17 +166,19 @@ def test_limits_are_those_of_the_criteria(joints):
 
 
 def test_friction_of_the_criteria_stands_for_that_of_every_joint(joints):
-    assert flagged(joints, Criteria(friction=0.75))["slide"].sum() == 0
-    assert flagged(joints, Criteria(friction=0.7))["slide"].sum() == 3
-    assert flagged(joints, Criteria(friction=0.0))["slide"].sum() == 5 * 18 - 1  # one is open
+    assert with_failure_flags(joints, Criteria(friction=0.75))["slide"].sum() == 0
+    assert with_failure_flags(joints, Criteria(friction=0.7))["slide"].sum() == 3
+    assert (
+        with_failure_flags(joints, Criteria(friction=0.0))["slide"].sum() == 5 * 18 - 1
+    )  # one is open
 
 
 def test_joints_tell_by_which_criteria_they_were_judged(joints):
     ours = Criteria(hinge=0.4, failures=3, friction=0.5)
-    judged_so = flagged(joints, ours)
+    judged_so = with_failure_flags(joints, ours)
     assert Criteria.of(judged_so) == Criteria.of(judged_so.isel(time=2)) == ours
-    assert flagged(judged_so) is judged_so
-    again = flagged(judged_so, Criteria())
+    assert with_failure_flags(judged_so) is judged_so
+    again = with_failure_flags(judged_so, Criteria())
     assert again.identical(joints)
     assert "criteria_friction" not in again.attrs
 
@@ -210,7 +212,7 @@ def test_a_joint_hinges_from_46_hundredths_on(ring, e, face):
 def test_cohesion_holds_where_a_joint_is_closed(e, closed):
     """μ N + c A with A = 3 (1/2 - |e|) h w of the middle third on; 1 % of cohesion is left out."""
     normal, cohesion = np.array([2e3, 4e3, 0.0]), np.array([1e3, 0.0, 1e3])
-    found = ratio_at_sliding(normal, np.full(3, e), np.array([0.6, 0.5, 0.6]), cohesion)
+    found = sliding_ratio(normal, np.full(3, e), np.array([0.6, 0.5, 0.6]), cohesion)
     assert found[:2] == pytest.approx([0.6 + 0.99 * closed * 0.5, 0.5], rel=1e-12)
     assert np.isnan(found[2])
 

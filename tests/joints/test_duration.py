@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.joints.duration import Unbroken, first_lasting, step_lengths
+from archfem.joints.criteria import DurationCounter, find_lasting, step_lengths
 
 TIME = np.array([0.0, 1e-3, 1.2e-3, 1.5e-3, 5e-3, 6e-3])
 
@@ -27,28 +27,28 @@ def test_a_record_lasts_for_the_step_that_ends_with_it():
     ],
 )
 def test_the_first_of_what_lasts_is_found(up, least, expected):
-    assert first_lasting(up, TIME, least, lambda instant: instant) == expected
+    assert find_lasting(up, TIME, least, lambda instant: instant) == expected
     # the same where every record is looked at, and by a watch of each step
-    every = first_lasting(range(6), TIME, least, lambda k: k if k in up else None)
-    unbroken, lengths = Unbroken(least), step_lengths(TIME)
-    ends = [k for k in range(6) if unbroken.lasts(k in up, float(lengths[k]))]
+    every = find_lasting(range(6), TIME, least, lambda k: k if k in up else None)
+    unbroken, lengths = DurationCounter(least), step_lengths(TIME)
+    ends = [k for k in range(6) if unbroken.add_step(k in up, float(lengths[k]))]
     assert every == expected
     assert bool(ends) == (expected is not None)
 
 
 def test_it_adds_up_from_nothing():
-    unbroken = Unbroken(0.25)
+    unbroken = DurationCounter(0.25)
     told = [(True, 0.2), (True, 0.05), (False, 0.3), (True, 0.2), (True, 0.1)]
-    assert [unbroken.lasts(*each) for each in told] == [False, True, False, False, True]
+    assert [unbroken.add_step(*each) for each in told] == [False, True, False, False, True]
 
 
 def test_a_single_record_is_a_state_that_stays():
-    assert first_lasting([0], np.array([1.0]), 1e-3, lambda instant: instant) == 0
-    assert first_lasting([1], np.array([0.0, 1e-3]), 2e-3, lambda instant: instant) is None
+    assert find_lasting([0], np.array([1.0]), 1e-3, lambda instant: instant) == 0
+    assert find_lasting([1], np.array([0.0, 1e-3]), 2e-3, lambda instant: instant) is None
 
 
 def test_steps_as_long_as_the_least_count_whatever_the_round_off():
     time = 1e-3 * np.arange(3000)
     assert np.diff(time).min() < 1e-3
     for instant in range(1, 3000, 7):
-        assert first_lasting([instant], time, 1e-3, lambda number: number) == instant
+        assert find_lasting([instant], time, 1e-3, lambda number: number) == instant

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.passage import Passage
+from archfem.joints.step_average import StepForces
 
 RULES = ("lobatto", "exact")
 
@@ -52,15 +52,15 @@ def places(model, seed, size=1e-4):
     before, first, last = (
         dead.q + size * random.standard_normal(model.size) * scale for scale in (1.0, 1.0, 0.7)
     )
-    return dead.model.remembering(dead.model.remembered(before)), first, last
+    return dead.model.with_memory(dead.model.updated_memory(before)), first, last
 
 
 def slid_and_held(model, q):
     """Whether any points slide, hold and are open at q."""
     operator = model.operator
-    normal, shear = operator.tractions(q)
+    normal, shear = operator.point_forces(q)
     slides = np.isfinite(operator.points.friction)
-    held = np.isclose(shear, operator.elastic(q), rtol=1e-9, atol=1e-9)
+    held = np.isclose(shear, operator.trial_shear(q), rtol=1e-9, atol=1e-9)
     return (slides & ~held).any(), (slides & held & (normal < 0.0)).any(), (normal == 0.0).any()
 
 
@@ -85,7 +85,7 @@ def scalar(points, i, gap, slip, slid):
 def test_a_path_of_springs_is_that_of_scalar_return_mappings():
     """Many random motions one after another, each spring followed on its own."""
     model, random = mixed(), np.random.default_rng(1)
-    points, count = model.operator.points, len(model.operator.points.arm)
+    points, count = model.operator.points, len(model.operator.points.offset)
     slid, seen, rest = np.zeros(count), np.zeros(3, bool), dead_load(model).q
     for _ in range(60):
         q = rest + 1e-4 * random.standard_normal(model.size)
@@ -93,10 +93,10 @@ def test_a_path_of_springs_is_that_of_scalar_return_mappings():
         openings, slips = model.operator.openings(q), model.operator.slips(q)
         rows = [scalar(points, i, openings[i], slips[i], slid[i]) for i in range(count)]
         normal, shear, slid = np.array(rows).T
-        found = model.operator.tractions(q)
+        found = model.operator.point_forces(q)
         assert found[0] == pytest.approx(normal, rel=1e-12, abs=1e-6)
         assert found[1] == pytest.approx(shear, rel=1e-12, abs=1e-6)
-        model = model.remembering(model.remembered(q))
+        model = model.with_memory(model.updated_memory(q))
         assert model.memory == pytest.approx(slid, rel=1e-12, abs=1e-15)
     assert seen.all()
 
@@ -107,8 +107,8 @@ def test_no_point_bears_more_shear_than_friction_holds(rule):
     for seed in range(10):
         model, q, _ = places(mixed(rule=rule), seed)
         operator = model.operator
-        normal, shear = operator.tractions(q)
-        closed = operator.law.closed(operator.openings(q))
+        normal, shear = operator.point_forces(q)
+        closed = operator.law.closed_area(operator.openings(q))
         slides = np.isfinite(operator.points.friction)
         limit = operator.points.cohesion[slides] * closed[slides]
         limit -= operator.points.friction[slides] * normal[slides]
@@ -122,10 +122,10 @@ def test_what_is_remembered_holds_without_sliding_further():
     """Once its memory is taken in, the same place gives the same forces, and slides no more."""
     for rule in RULES:
         model, q, _ = places(mixed(rule=rule), 3)
-        after = model.remembering(model.remembered(q))
+        after = model.with_memory(model.updated_memory(q))
         force = model.force(q)
         assert after.force(q) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
-        assert after.remembered(q) == pytest.approx(after.memory, abs=1e-12 * 1e-4)
+        assert after.updated_memory(q) == pytest.approx(after.memory, abs=1e-12 * 1e-4)
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", "faces"])
@@ -167,7 +167,7 @@ def below(x):
 def test_a_step_of_springs_is_the_mean_along_its_path(late):
     """Written anew through integrals of <g>_- and of the stop; the area is the time closed."""
     model, first, last = places(ring(), 4)
-    operator, passage = model.operator, model.passage(first, late)
+    operator, passage = model.operator, model.begin_step(first, late)
     points = operator.points
     gaps = operator.openings(first), operator.openings(last)
     ahead = late * (gaps[1] - gaps[0])
@@ -175,15 +175,15 @@ def test_a_step_of_springs_is_the_mean_along_its_path(late):
     normal = points.weight * points.normal_stiffness * (below(end) - below(start)) / (end - start)
     closed = (np.minimum(end, 0.0) - np.minimum(start, 0.0)) / (end - start)
     limit = -points.friction * normal + points.cohesion * points.weight * closed
-    elastic = operator.elastic(first), operator.elastic(last)
+    elastic = operator.trial_shear(first), operator.trial_shear(last)
     change = elastic[1] - elastic[0]
     begin = np.clip(elastic[0], -limit, limit)
     shear = mean_held(begin, begin + change, limit) + late * change
     shear = np.clip(shear, -limit, limit)
-    slid = operator.slips(last) - np.clip(begin + change, -limit, limit) / points.shear
-    force = operator.pushed(normal, shear)
+    slid = operator.slips(last) - np.clip(begin + change, -limit, limit) / points.shear_spring
+    force = operator.generalised_force(normal, shear)
     assert passage.force(last) == pytest.approx(force, rel=1e-9, abs=1e-9 * np.abs(force).max())
-    assert passage.remembered(last) == pytest.approx(slid, abs=1e-9 * np.abs(slid).max())
+    assert passage.updated_memory(last) == pytest.approx(slid, abs=1e-9 * np.abs(slid).max())
     sliding = np.abs(begin + change) > limit
     assert sliding.any()
     assert (~sliding).any()
@@ -200,11 +200,11 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late, rule):
     """
     for seed in range(12):
         model, first, last = places(mixed(fidelity, rule), seed)
-        passage = model.passage(first, late)
-        moved, after = last - first, model.remembering(passage.remembered(last))
+        passage = model.begin_step(first, late)
+        moved, after = last - first, model.with_memory(passage.updated_memory(last))
         work = passage.force(last) @ moved
         stored = after.energy(last) - model.energy(first)
-        lost = passage.lost(last)
+        lost = passage.dissipation(last)
         scale = np.abs(passage.force(last) * moved).sum()
         assert work == pytest.approx(stored + lost, abs=1e-13 * scale)
         assert lost >= -1e-14 * scale
@@ -235,18 +235,18 @@ def test_the_rates_of_a_step_shorter_than_rounding_are_those_of_a_slide():
     for change in (0.0, 1e-320, 1e-13):
         step = SimpleNamespace(
             _before=(None, first),
-            _sheared=lambda q, change=change: np.full(2000, change),
-            _over=lambda q: (None, None, limit, None),
-            late=0.0,
+            _shear_change=lambda q, change=change: np.full(2000, change),
+            _means=lambda q: (None, None, limit, None),
+            damping_lag=0.0,
         )
-        by_change, by_limit = Passage._shear_rates(step, None)
+        by_change, by_limit = StepForces._shear_rates(step, None)
         assert ((by_change >= 0.0) & (by_change <= 0.5)).all()
         assert (np.abs(by_limit) <= 1.0).all()
 
 
 def misfit(model, first, last, late):
     """Of a step's tangent against a central difference, relative."""
-    passage = model.passage(first, late)
+    passage = model.begin_step(first, late)
     step = 1e-10 * np.random.default_rng(7).standard_normal(model.size)
     change = passage.force(last + step) - passage.force(last - step)
     expected = 2.0 * passage.tangent(last) @ step
@@ -259,11 +259,11 @@ def test_a_step_bears_no_more_shear_than_friction_holds():
         for seed in range(10):
             model, first, last = places(ring(rule=rule), seed)
             structure = model.structure
-            normal, shear, _ = model.passage(first, 0.2).resultants(last).T
+            normal, shear, _ = model.begin_step(first, 0.2).resultants(last).T
             most = 0.5 * normal + 20e3 * structure.depths * structure.width
             assert np.all(np.abs(shear) <= most * (1.0 + 1e-12))
             dry, first, last = places(ring(cohesion=0.0, rule=rule), seed)
-            normal, shear, _ = dry.passage(first, 0.2).resultants(last).T
+            normal, shear, _ = dry.begin_step(first, 0.2).resultants(last).T
             assert np.all(np.abs(shear) <= 0.5 * normal * (1.0 + 1e-12) + 1e-9)
 
 
@@ -288,16 +288,16 @@ def test_a_loop_of_even_slip_costs_what_its_area_is(rule, cohesion):
     dead = af.dead_load(model)
     limit, stiffness = 0.5 * 20e3 + cohesion, 4e8
     across = np.linspace(-size, size, 41)
-    model = dead.model.remembering(dead.model.memory)
+    model = dead.model.with_memory(dead.model.memory)
     lost, area = 0.0, 0.0
     for turn, path in enumerate([across[20:], across[::-1], across, across[::-1], across]):
         for start, end in pairwise(path):
             first, last = (dead.q + np.array([each, 0.0, 0.0]) for each in (start, end))
-            passage = model.passage(first, 0.0)
+            passage = model.begin_step(first, 0.0)
             if turn > 2:  # the loop closes from the second on
-                lost += passage.lost(last)
+                lost += passage.dissipation(last)
                 area += passage.force(last)[0] * (end - start)
-            model = model.remembering(passage.remembered(last))
+            model = model.with_memory(passage.updated_memory(last))
     expected = 4.0 * limit * (size - limit / stiffness)
     assert lost == pytest.approx(expected, rel=1e-11)
     assert area == pytest.approx(expected, rel=1e-11)

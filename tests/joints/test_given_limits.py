@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.given_limits import GivenLimits
+from archfem.statics.relaxation import TrescaJoints
 
 
 @pytest.fixture(scope="module")
@@ -19,16 +19,16 @@ def test_with_coulombs_limits_forces_are_coulombs(pushed):
     model, q = pushed
     joints = model.operator
     opening = joints.openings(q)
-    own = joints.limits(joints.law.forces(opening), joints.law.closed(opening))
-    given = GivenLimits.of(joints, own)
-    assert np.any(np.abs(joints.elastic(q)) > own)
+    own = joints.coulomb_limit(joints.law.forces(opening), joints.law.closed_area(opening))
+    given = TrescaJoints.of(joints, own)
+    assert np.any(np.abs(joints.trial_shear(q)) > own)
     assert np.array_equal(given.force(q), joints.force(q))
 
 
 def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
     model, q = pushed
-    half = GivenLimits.of(model.operator, 0.5 * np.abs(model.operator.elastic(q)))
-    held = model.between(half)
+    half = TrescaJoints.of(model.operator, 0.5 * np.abs(model.operator.trial_shear(q)))
+    held = model.with_joint_law(half)
     tangent = held.tangent(q).toarray()
     assert tangent == pytest.approx(tangent.T, abs=1e-12 * np.abs(tangent).max())
     step = 1e-9
@@ -42,9 +42,9 @@ def test_its_tangent_is_symmetric_and_the_derivative_of_its_force(pushed):
 @pytest.mark.parametrize(("share", "holds"), [(0.98, True), (1.02, False)])
 def test_it_holds_along_up_to_its_limit_and_not_at_all_beyond(pushed, share, holds):
     model, q = pushed
-    elastic = np.abs(model.operator.elastic(q))
-    held = GivenLimits.of(model.operator, elastic / share)
-    across = len(held.law.stiffness(held.felt(q)))
+    elastic = np.abs(model.operator.trial_shear(q))
+    held = TrescaJoints.of(model.operator, elastic / share)
+    across = len(held.law.stiffness(held.effective_gaps(q)))
     along = held.stiffness(q)[across : across + len(elastic)]
     assert np.all(elastic > 0.0)
-    assert np.array_equal(along, model.operator.points.shear * holds)
+    assert np.array_equal(along, model.operator.points.shear_spring * holds)

@@ -3,10 +3,21 @@
 import numpy as np
 import pytest
 
-from archfem.joints.moving import frames
-from archfem.joints.moving.moved import Moved, answer, joint_energy, pass_joints
-from archfem.joints.moving.overlap import Faces
-from archfem.joints.moving.poses import Sides, gather, pose, swing
+from archfem.joints.large import face_kinematics
+from archfem.joints.large.face_kinematics import (
+    FaceKinematics,
+    face_pose,
+    gather_face_forces,
+    step_poses,
+)
+from archfem.joints.large.forces import (
+    LargeDisplacementJoints,
+    allocate_step_forces,
+    compute_step_forces,
+    joint_energy,
+)
+from archfem.joints.large.overlap_law import FaceLaw
+from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
 
 SEEDS = range(12)
 
@@ -21,7 +32,7 @@ def random_poses(seed):
 
 
 def measured(poses, angle):
-    return np.array(frames.measures(tuple(poses[0]), tuple(poses[1]), angle))
+    return np.array(face_kinematics.joint_measures(tuple(poses[0]), tuple(poses[1]), angle))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -29,22 +40,24 @@ def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
     lower, higher = (tuple(map(tuple, each)) for each in np.stack([before, after], axis=1))
-    start, end, rates, *_ = frames.follow(lower, higher, angle)
+    start, end, rates, *_ = face_kinematics.step_measures(lower, higher, angle)
     for found, poses in ((start, before), (end, after)):
         assert found == pytest.approx(measured(poses, angle), abs=2e-15)
     low, high = after - before
     moved = np.array([*(high - low)[:2], low[2], high[2]])
     for row, change in zip(np.eye(3), np.subtract(end, start), strict=True):
-        assert abs(frames.pushed(rates, tuple(row)) @ moved - change) < 4e-15
+        assert abs(face_kinematics.face_forces(rates, tuple(row)) @ moved - change) < 4e-15
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
 def test_small_turns(x):
     """Against NumPy, and the derivative of sin x / x against differences of it."""
-    assert frames.small_turn(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
-    assert frames.both(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
-    there, back = (frames.small_turn(x + d)[1] for d in (1e-4, -1e-4))
-    assert frames.small_turn(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
+    assert face_kinematics.rotation_series(x)[:2] == pytest.approx(
+        (np.cos(x), np.sinc(x / np.pi)), abs=2e-16
+    )
+    assert face_kinematics.cosine_sine(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
+    there, back = (face_kinematics.rotation_series(x + d)[1] for d in (1e-4, -1e-4))
+    assert face_kinematics.rotation_series(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
 
 
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
@@ -70,14 +83,17 @@ def two_joints(shapes, friction, facets, rng, fill=False):
         for joint, side in ((0, 1), (1, 0)):
             moves[joint, side, :, :3] = rng.normal(size=(3, 3))
             stretch[joint, side, :3] = 0.1 * rng.normal(size=3)
-    sides = Sides(
-        np.array([[0, size], [size, 0]])[..., None] + np.arange(size),
-        np.array([[size, size], [size, 0]]),
+    index = np.array([[0, size], [size, 0]])[..., None] + np.arange(size)
+    sizes = np.array([[size, size], [size, 0]])
+    sides = FaceKinematics(
+        index,
+        sizes,
         np.array([[True, not fill], [not fill, False]]),
         rng.normal(size=(2, 2, 2)),
         moves,
         stretch if shapes else stretch[..., :0],
         np.zeros((2, 2, 3)),
+        find_block_starts(index, sizes),
     )
     edges = np.linspace(-0.5, 0.5, count + 1)
     if facets:
@@ -85,7 +101,7 @@ def two_joints(shapes, friction, facets, rng, fill=False):
     else:
         place = np.tile(0.5 * (edges[:-1] + edges[1:]), 2)
     points = len(place) // 2
-    faces = Faces(
+    faces = FaceLaw(
         np.array([1.0, 0.8]),
         np.array([1e6, 2e6]),
         np.array([friction, friction]),
@@ -99,23 +115,21 @@ def two_joints(shapes, friction, facets, rng, fill=False):
     )
     whole = np.arange(2)
     angles, built = rng.uniform(-3, 3, 2), 0.03 * rng.normal(size=(2, 4))
-    return Moved(sides, faces, angles, np.ones(2), whole, np.zeros(2), 2, built)
+    return LargeDisplacementJoints(sides, faces, angles, np.ones(2), whole, np.zeros(2), 2, built)
 
 
 def gathered(joints, before, after, late, slid):
     """Force (n,), its derivative (n, n), and all that joints do."""
-    found, size = answer(joints), len(before)
-    pass_joints(joints, before, after, late, slid, found)
+    found, size = allocate_step_forces(joints), len(before)
+    compute_step_forces(joints, before, after, late, slid, found)
     force, rate = np.zeros(size), np.zeros((size, size))
-    index, sizes = joints.sides.index, joints.sides.size
+    index, sizes = joints.kinematics.index, joints.kinematics.size
     for joint in range(2):
         for side in range(2):
             own = index[joint, side, : sizes[joint, side]]
             force[own] += found.force[joint, side, : len(own)]
-            for other in range(2):
-                theirs = index[joint, other, : sizes[joint, other]]
-                block = found.rate[joint, side, : len(own), other, : len(theirs)]
-                rate[np.ix_(own, theirs)] += block
+    assemble_rates(joints.kinematics, found, np.empty((2, 2, 4, joints.kinematics.shapes.shape[3])))
+    np.add.at(rate, tuple(find_rate_pairs(joints.kinematics)), found.rate)
     return force, rate, found
 
 
@@ -132,13 +146,16 @@ def test_work_is_the_change_of_energy_and_a_loss_that_is_never_negative(
         size = 2 * (3 + shapes)
         before = 0.05 * rng.normal(size=size)
         after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-4, -0.5)
-        slid = 0.01 * rng.normal(size=len(joints.faces.place))
+        slid = 0.01 * rng.normal(size=len(joints.face_law.place))
         force, _, found = gathered(joints, before, after, 0.3 * (trial % 2), slid)
-        stored = [joint_energy(joints, *each) for each in ((before, slid), (after, found.slid))]
+        stored = [
+            joint_energy(joints, *each)
+            for each in ((before, slid), (after, found.irreversible_slip))
+        ]
         scale = max(*stored, np.abs(force * (after - before)).sum())
         work = force @ (after - before)
-        assert abs(work - stored[1] + stored[0] - found.lost.sum()) < 1e-13 * scale
-        assert found.lost.min() > -1e-14 * scale
+        assert abs(work - stored[1] + stored[0] - found.dissipation.sum()) < 1e-13 * scale
+        assert found.dissipation.min() > -1e-14 * scale
 
 
 @pytest.mark.parametrize("facets", [True, False])
@@ -152,7 +169,7 @@ def test_the_derivative_is_that_of_the_force(shapes, fill, friction, facets):
         size = 2 * (3 + shapes)
         before = 0.05 * rng.normal(size=size)
         after = before + rng.normal(size=size) * 10.0 ** rng.uniform(-3, -1)
-        slid = 0.01 * rng.normal(size=len(joints.faces.place))
+        slid = 0.01 * rng.normal(size=len(joints.face_law.place))
         late = 0.3 * (trial % 2)
         rate = gathered(joints, before, after, late, slid)[1]
         steps = 1e-7 * np.eye(size)
@@ -169,14 +186,14 @@ def test_the_derivative_is_that_of_the_force(shapes, fill, friction, facets):
 def test_the_pose_follows_its_discrete_derivative(seed, turns):
     """P Δq = Δp, of a block with modes that turns by radians, and of one without a frame."""
     rng = np.random.default_rng(seed)
-    sides = two_joints(3, 0.5, True, rng, fill=not turns).sides
+    sides = two_joints(3, 0.5, True, rng, fill=not turns).kinematics
     before, after = rng.normal(size=(2, 12))
-    ends, _, (mean, _) = swing(sides, 0, 1, before, after)
+    ends, _, (mean, _) = step_poses(sides, 0, 1, before, after)
     for found, q in zip(ends, (before, after), strict=True):
-        assert found == pytest.approx(pose(sides, 0, 1, q), abs=4e-15)
+        assert found == pytest.approx(face_pose(sides, 0, 1, q), abs=4e-15)
     moves = np.zeros((3, 6))
     for way, row in zip(np.eye(3), moves, strict=True):
-        gather(sides, 0, 1, mean, tuple(way), row)
+        gather_face_forces(sides, 0, 1, mean, tuple(way), row)
     change = np.subtract(ends[1], ends[0])
     assert np.abs(moves @ (after - before)[6:] - change).max() < 1e-14
 
@@ -187,21 +204,29 @@ def test_what_has_turned_round_is_to_hold_as_if_nothing_slid(shapes, fill, facet
     """Force and what it lacks, and the rate, are then those of joints that never slide."""
     rng = np.random.default_rng(shapes + 7)
     joints, size = two_joints(shapes, 0.3, facets, rng, fill), 2 * (3 + shapes)
-    still = joints._replace(faces=joints.faces._replace(friction=np.full(2, np.inf)))
+    still = joints._replace(face_law=joints.face_law._replace(friction=np.full(2, np.inf)))
     before = 0.05 * rng.normal(size=size)
     after = before + 0.01 * rng.normal(size=size)
-    slid = 0.01 * rng.normal(size=len(joints.faces.place))
-    sliding, holding, late = answer(joints), answer(joints), 0.3
-    pass_joints(joints, before, after, late, slid, sliding)
-    slides, force, lost = sliding.ways != 0.0, sliding.force.copy(), sliding.lost.copy()
+    slid = 0.01 * rng.normal(size=len(joints.face_law.place))
+    sliding, holding, late = allocate_step_forces(joints), allocate_step_forces(joints), 0.3
+    compute_step_forces(joints, before, after, late, slid, sliding)
+    slides, force, lost = (
+        sliding.slip_direction != 0.0,
+        sliding.force.copy(),
+        sliding.dissipation.copy(),
+    )
     assert slides.any()
-    assert not sliding.held.any()
-    sliding.ways[:] = -sliding.ways
-    pass_joints(joints, before, after, late, slid, sliding)
-    pass_joints(still, before, after, late, slid, holding)
+    assert not sliding.missing_force.any()
+    sliding.slip_direction[:] = -sliding.slip_direction
+    compute_step_forces(joints, before, after, late, slid, sliding)
+    compute_step_forces(still, before, after, late, slid, holding)
     assert np.array_equal(sliding.force, force)
-    assert np.array_equal(sliding.lost, lost)
-    assert not sliding.ways[slides].any()
+    assert np.array_equal(sliding.dissipation, lost)
+    assert not sliding.slip_direction[slides].any()
     scale = abs(holding.force).max()
-    assert sliding.force + sliding.held == pytest.approx(holding.force, abs=1e-12 * scale)
+    assert sliding.force + sliding.missing_force == pytest.approx(holding.force, abs=1e-12 * scale)
+    for each in (sliding, holding):
+        assemble_rates(
+            joints.kinematics, each, np.empty((2, 2, 4, joints.kinematics.shapes.shape[3]))
+        )
     assert sliding.rate == pytest.approx(holding.rate, abs=1e-12 * abs(holding.rate).max())

@@ -23,7 +23,7 @@ def operator(model):
 def q(operator):
     """Small motions of the stones, by which some points are open and some closed."""
     q = 1e-4 * np.random.default_rng(5).standard_normal(operator.opening.shape[1])
-    assert 0 < operator.status(q).sum() < len(operator.status(q))
+    assert 0 < operator.closed_points(q).sum() < len(operator.closed_points(q))
     return q
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.integration import law_of
-from archfem.joints.points import JointPoints
+from archfem.joints.contact_law import choose_law
+from archfem.joints.quadrature import JointPoints
 
 
 def facet(rule, cells=1):
@@ -13,7 +13,9 @@ def facet(rule, cells=1):
     contact = af.Contact(3e9, 2e9)
     block = af.column(breadth=1.0, heights=[1.0], width=2.0, contact=contact)
     rule = af.joints.Quadrature(rule)
-    return law_of(rule, JointPoints.on(block, [rule.on_joint(np.linspace(-0.5, 0.5, cells + 1))]))
+    return choose_law(
+        rule, JointPoints.on(block, [rule.on_joint(np.linspace(-0.5, 0.5, cells + 1))])
+    )
 
 
 def test_a_facet_partly_open_bears_as_a_triangle():
@@ -35,9 +37,9 @@ def test_facets_that_do_not_change_are_springs_of_their_whole_depth(opening):
 @pytest.mark.parametrize("rule", ["lobatto", "gauss", "nodal", "exact"])
 def test_a_joint_closed_and_slipped_evenly_bears_on_its_whole_area(rule):
     law = facet(rule, cells=3)
-    count = len(law.points.arm)
+    count = len(law.points.offset)
     assert law.forces(np.full(count, -1e-3)).sum() == pytest.approx(-6e9 * 1e-3)
-    assert law.points.shear @ np.full(count, 1e-3) == pytest.approx(4e9 * 1e-3)
+    assert law.points.shear_spring @ np.full(count, 1e-3) == pytest.approx(4e9 * 1e-3)
     assert np.all(law.forces(np.full(count, 1e-3)) == 0.0)
 
 

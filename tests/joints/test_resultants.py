@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.resultants import ratios
+from archfem.joints.resultants import eccentricity_and_friction
 
 DEPTH = 0.55
 
@@ -33,7 +33,7 @@ def test_a_joint_pressed_by_the_least_of_numbers_has_no_eccentricity():
     """Its N times a depth below one half rounds to nothing, which nothing is divided by."""
     resultants = np.array([[5e-324, 0.0, 1e-3], [1e3, 100.0, 50.0]])
     with np.errstate(divide="raise", over="raise", invalid="raise"):
-        eccentricity, friction = ratios(resultants, np.array([0.4, 0.5]))
+        eccentricity, friction = eccentricity_and_friction(resultants, np.array([0.4, 0.5]))
     assert np.isnan([eccentricity[0], friction[0]]).all()
     assert (eccentricity[1], friction[1]) == (0.1, 0.1)
 
@@ -41,7 +41,7 @@ def test_a_joint_pressed_by_the_least_of_numbers_has_no_eccentricity():
 def test_the_ratios_are_the_same_however_narrow_a_structure_is():
     resultants = np.array([[1e3, 100.0, 50.0]])
     for width in (1.0, 1e-6):
-        found = ratios(width * resultants, np.array([0.5]))
+        found = eccentricity_and_friction(width * resultants, np.array([0.5]))
         assert np.ravel(found) == pytest.approx([0.1, 0.1], rel=1e-12)
 
 

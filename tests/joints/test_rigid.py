@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.joints.rigid import facets_of, gaps_of, rigid_joints
+from archfem.joints.rigid_kinematics import block_motion_gaps, facet_ends, rigid_joint_operator
 
 SMALL = 1e-6
 """A turn [rad]; its square is what small motions leave out."""
@@ -13,7 +13,7 @@ SMALL = 1e-6
 def gap_by_hand(structure, points, motion, k):
     """Jump across a point of a joint, after both blocks have been turned and moved."""
     joint = structure.joints[points.joint[k]]
-    place = joint.middle + points.arm[k] * joint.tangent
+    place = joint.middle + points.offset[k] * joint.tangent
     moved = []
     for number in (joint.lower, joint.higher):
         (x, y, turn), centroid = motion[number], structure.blocks[number].centroid
@@ -26,22 +26,22 @@ def gap_by_hand(structure, points, motion, k):
 @pytest.mark.parametrize("rule", ["lobatto", "exact", "gauss"])
 def test_gaps_follow_motions_of_both_blocks(ring, rule):
     """Of all blocks, and of those that are free by the operator: the fixed ones stay then."""
-    operator = rigid_joints(ring, 3, af.joints.Quadrature(rule))
+    operator = rigid_joint_operator(ring, 3, af.joints.Quadrature(rule))
     points, rng = operator.points, np.random.default_rng(4)
     motion = SMALL * rng.normal(size=(len(ring.blocks), 3))
-    found = gaps_of(ring, points, motion)
-    known = np.array([gap_by_hand(ring, points, motion, k) for k in range(len(points.arm))]).T
+    found = block_motion_gaps(ring, points, motion)
+    known = np.array([gap_by_hand(ring, points, motion, k) for k in range(len(points.offset))]).T
     assert found == pytest.approx(known, abs=10.0 * SMALL**2)
     motion[[b.fixed for b in ring.blocks]] = 0.0
     q = motion[list(ring.free)].ravel()
-    still = gaps_of(ring, points, motion)
+    still = block_motion_gaps(ring, points, motion)
     assert operator.openings(q) == pytest.approx(still[0], abs=1e-18)
     assert operator.slips(q) == pytest.approx(still[1], abs=1e-18)
 
 
 def test_points_cover_their_joints():
-    assert facets_of(0.6, 3) == pytest.approx([-0.3, -0.1, 0.1, 0.3])
+    assert facet_ends(0.6, 3) == pytest.approx([-0.3, -0.1, 0.1, 0.3])
     stack = af.column(breadth=0.6, heights=[1.0, 1.0])
-    points = rigid_joints(stack, 3, af.joints.Quadrature("lobatto")).points
+    points = rigid_joint_operator(stack, 3, af.joints.Quadrature("lobatto")).points
     assert points.weight.sum() == pytest.approx(2 * 0.6)
-    assert points.arm[points.joint == 1] == pytest.approx(np.linspace(-0.3, 0.3, 7))
+    assert points.offset[points.joint == 1] == pytest.approx(np.linspace(-0.3, 0.3, 7))

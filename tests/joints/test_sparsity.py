@@ -17,7 +17,7 @@ def test_sums_are_sums_of_data(pair):
     pattern = Pattern.of(*pair)
     first, second = (pattern.spread(matrix) for matrix in pair)
     assert (first - pair[0]).nnz == 0
-    both = pattern.matrix(2.0 * first.data + second.data)
+    both = pattern.with_data(2.0 * first.data + second.data)
     assert both.toarray() == pytest.approx((2.0 * pair[0] + pair[1]).toarray())
 
 
@@ -25,7 +25,7 @@ def test_outer_products_are_summed_by_a_map(pair):
     left, right = pair[0][:4], pair[1][:4]
     pattern = Pattern.of((left.T @ right + sparse.identity(7)).tocsr())
     factors = np.array([2.0, -1.0, 0.5, 3.0])
-    found = pattern.matrix(pattern.outer(left, right) @ factors)
+    found = pattern.with_data(pattern.outer_product_map(left, right) @ factors)
     expected = (left.T @ sparse.diags(factors) @ right).toarray()
     assert found.toarray() == pytest.approx(expected)
 

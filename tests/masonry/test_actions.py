@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.actions import loads
+from archfem.masonry.loads import list_loads
 
 
 @pytest.mark.parametrize("x", [-2.9, -1.4, 0.0, 0.4, 2.2])
@@ -58,7 +58,7 @@ def test_only_supports_settle(stack, block):
 
 def test_one_load_or_several():
     push, weight = af.BodyForce(0.1), af.PointLoad(0.0, (0.0, -1.0))
-    assert loads(push) == [push]
-    assert loads((push, weight)) == [push, weight]
+    assert list_loads(push) == [push]
+    assert list_loads((push, weight)) == [push, weight]
     with pytest.raises(af.errors.InvalidInput, match="a Settlement comes alone"):
-        loads([push, af.Settlement(0, (0.0, 0.0, 0.0))])
+        list_loads([push, af.Settlement(0, (0.0, 0.0, 0.0))])

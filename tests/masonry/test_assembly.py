@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.assembly import _turned, assembled, by_materials, touching
+from archfem.masonry.assembly import _orient_line, assembled, by_materials, touching
 
 EXACT = 1e-12
 """Ends are corners of the blocks, to round-off of coordinates of a few metres."""
@@ -231,8 +231,8 @@ def test_contacts_by_materials():
 def test_a_line_begins_on_the_left_or_where_it_stands_at_its_foot(step, first):
     """It stands up to a tenth off the vertical."""
     line = np.array([[2.0, 3.0], [2.0 + step[0], 3.0 + step[1]]])
-    assert _turned(line)[0].tolist() == line[first].tolist()
-    assert _turned(line[::-1])[0].tolist() == line[first].tolist()
+    assert _orient_line(line)[0].tolist() == line[first].tolist()
+    assert _orient_line(line[::-1])[0].tolist() == line[first].tolist()
 
 
 @pytest.mark.parametrize(("share", "touch"), [(0.98, True), (1.02, False)])

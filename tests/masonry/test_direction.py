@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.direction import Direction, _through, directions_of
+from archfem.masonry.parts import Direction, _fit_direction, find_directions
 
 
 def lines(structure):
@@ -12,12 +12,12 @@ def lines(structure):
 
 
 def test_the_centre_of_a_ring_is_found(ring):
-    directions = directions_of(ring.blocks, lines(ring))
+    directions = find_directions(ring.blocks, lines(ring))
     assert directions["arch"].centre == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_joints_of_a_ring_lie_across_it_and_follow_one_another(ring):
-    way = directions_of(ring.blocks, lines(ring))["arch"]
+    way = find_directions(ring.blocks, lines(ring))["arch"]
     assert all(way.separates(joint.ends) for joint in ring.joints)
     assert not way.separates(np.array([[-0.1, 2.7], [0.1, 2.7]]))
     assert np.all(np.diff([way.along(joint.middle) for joint in ring.joints]) > 0.0)
@@ -26,10 +26,10 @@ def test_joints_of_a_ring_lie_across_it_and_follow_one_another(ring):
 
 
 def test_a_pier_stands_whatever_its_stones(stack):
-    way = directions_of(stack.blocks, lines(stack))["column"]
+    way = find_directions(stack.blocks, lines(stack))["column"]
     assert (way.centre, way.upright) == (None, True)
     flat = af.column(breadth=5.0, heights=[0.1, 0.1])
-    assert directions_of(flat.blocks, lines(flat))["column"].upright
+    assert find_directions(flat.blocks, lines(flat))["column"].upright
 
 
 def test_what_lies_straight_runs_to_the_right_and_points_upwards():
@@ -45,16 +45,16 @@ def test_a_row_is_straight_up_to_a_spread_of_five_thousandths(spread, straight, 
     """Four stones on a cross, whose spread is that of its arms; a pier is straight whatever."""
     places = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, spread], [0.0, -spread]])
     places = places[:, ::-1] if upright else places
-    way = _through(places, "ring")
+    way = _fit_direction(places, "ring")
     assert (way.centre is None) is straight
     assert way.upright is upright
-    assert _through(places, "pier").centre is None
+    assert _fit_direction(places, "pier").centre is None
 
 
 def test_a_ring_of_few_stones_is_found_from_them_too():
     """Of two stones one joint lies between: a circle through its middle and both centroids."""
     ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=90.0, voussoirs=2)
-    way = directions_of(ring.blocks, lines(ring))["arch"]
+    way = find_directions(ring.blocks, lines(ring))["arch"]
     x, y = max((block.centroid for block in ring.blocks if not block.fixed), key=lambda c: c[0])
     assert way.centre == pytest.approx([0.0, 0.5 * (4.0 - y**2 - x**2) / (2.0 - y)], abs=1e-9)
     assert way.middle == pytest.approx([0.0, (2.0 + 2.0 * y) / 3.0])

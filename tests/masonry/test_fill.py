@@ -7,9 +7,16 @@ import pytest
 import shapely
 
 import archfem as af
-from archfem.masonry.fill import RADIUS, SLIVER, _incentre, _merged, _Piece, _tiling, jointed_fill
+from archfem.masonry.backfill import (
+    INCIRCLE_RATIO,
+    _incentre,
+    _merge_slivers,
+    _Piece,
+    _tile_box,
+    jointed_fill,
+)
 from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE
-from archfem.masonry.softness import soft_blocks, yielding_blocks
+from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
 from archfem.statics.pushover import Stop
 
 HEIGHT = 1.5
@@ -218,10 +225,10 @@ def test_pieces_fill_the_body_and_are_soil_still():
         arches=[af.shapes.Arch(name="arch", **ring)], backfill=af.shapes.Backfill(cover=0.5)
     )
     fill = jointed_fill(whole, 0.4, angle=35.0, cohesion=5e3)
-    soil = yielding_blocks(fill)
+    soil = find_yielding_blocks(fill)
     assert sum(fill.blocks[n].area for n in soil) == pytest.approx(whole.blocks[-1].area)
     assert {fill.blocks[n].part for n in soil} == {"backfill"}
-    assert soft_blocks(fill) == ()  # no rung is too low for them
+    assert find_soft_blocks(fill) == ()  # no rung is too low for them
     assert [j.name for j in fill.joints if j.role == "ring"] == [
         j.name for j in whole.joints if j.role == "ring"
     ]
@@ -263,14 +270,14 @@ def test_fill_is_cut_once():
 def test_pieces_are_halves_of_equilateral_triangles():
     """Sides of 1, √3/2 and 1/2 of the longest; the circle in one touches all three."""
     size = 0.8
-    pieces = list(_tiling(np.zeros(2), np.array([3.0, 1.2]), 1.5, size))
+    pieces = list(_tile_box(np.zeros(2), np.array([3.0, 1.2]), 1.5, size))
     for corners in pieces:
         sides = np.roll(corners, -1, axis=0) - corners
         lengths = np.linalg.norm(sides, axis=1)
         assert sorted(lengths) == pytest.approx([0.4, 0.4 * sqrt(3.0), 0.8])
         arm = np.array(_incentre(corners)) - corners
         away = (sides[:, 0] * arm[:, 1] - sides[:, 1] * arm[:, 0]) / lengths
-        assert away == pytest.approx(RADIUS * size)
+        assert away == pytest.approx(INCIRCLE_RATIO * size)
     whole = np.concatenate(pieces)
     assert whole[:, 1].min() == 0.0
     assert whole[:, 1].max() == pytest.approx(1.2)
@@ -282,10 +289,10 @@ def test_pieces_are_halves_of_equilateral_triangles():
 @pytest.mark.parametrize(("part", "pieces"), [(0.29, 1), (0.31, 2)])
 def test_slivers_are_joined_to_their_neighbour(part, pieces):
     """Of three tenths of a whole piece on."""
-    least = SLIVER * 1.0
+    least = 0.3 * 1.0
     whole = shapely.box(0.0, 0.0, 1.0, 1.0)
     rest = shapely.box(1.0, 0.0, 1.0 + part, 1.0)
-    found = _merged([_Piece(whole, (0.5, 0.5)), _Piece(rest, (1.5, 0.5))], least, 1e-9)
+    found = _merge_slivers([_Piece(whole, (0.5, 0.5)), _Piece(rest, (1.5, 0.5))], least, 1e-9)
     assert len(found) == pieces
     assert sum(each.polygon.area for each in found) == pytest.approx(1.0 + part)
 

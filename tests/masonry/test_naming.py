@@ -5,15 +5,15 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.masonry.naming import listed, listed_joints, number_of
+from archfem.masonry.structure import find_number, join_joint_names, join_names
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
 
 
 def test_by_name_and_by_number():
-    assert number_of("joint", NAMES, "main arch, joint 5") == 2
-    assert number_of("joint", NAMES, 2) == 2
+    assert find_number("joint", NAMES, "main arch, joint 5") == 2
+    assert find_number("joint", NAMES, 2) == 2
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_by_name_and_by_number():
 )
 def test_near_misses(joint, says):
     with pytest.raises(af.errors.InvalidInput, match=says):
-        number_of("joint", NAMES, joint)
+        find_number("joint", NAMES, joint)
 
 
 def test_a_case_names_joints_or_numbers_them():
@@ -61,9 +61,9 @@ def test_a_case_refuses_joints_that_are_not_there(joints, says):
     ],
 )
 def test_joints_in_a_list(names, words):
-    assert listed_joints(names) == words
+    assert join_joint_names(names) == words
 
 
 def test_a_long_list_loses_its_middle():
-    assert listed(["a", "b"]) == "a, b"
-    assert listed([*"abcdefghi"], "; ") == "a; b; c; d; …; f; g; h; i (9 in all)"
+    assert join_names(["a", "b"]) == "a, b"
+    assert join_names([*"abcdefghi"], "; ") == "a; b; c; d; …; f; g; h; i (9 in all)"

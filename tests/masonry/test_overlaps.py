@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.overlaps import check_apart, check_simple
+from archfem.masonry.block import check_overlaps, check_simple
 
 NAMES = ["a", "b"]
 
@@ -19,10 +19,10 @@ def test_an_overlap_is_none_up_to_a_millionth_of_all_outlines(share, apart):
     deep = share * 1e-6 * np.hypot(2.0, 1.0)
     outlines = [box(0.0, 0.0), box(1.0 - deep, 0.0)]
     if apart:
-        check_apart(outlines, NAMES)
+        check_overlaps(outlines, NAMES)
     else:
         with pytest.raises(af.errors.InvalidStructure, match="'a' and 'b' overlap by"):
-            check_apart(outlines, NAMES)
+            check_overlaps(outlines, NAMES)
 
 
 def test_an_overlap_is_told_by_its_depth_and_its_place():
@@ -30,7 +30,7 @@ def test_an_overlap_is_told_by_its_depth_and_its_place():
     outlines = [box(0.0, 0.0), box(0.98, 0.0), box(5.0, 0.0)]
     for slight, remedy in ((0.0195, False), (0.0197, True)):
         with pytest.raises(af.errors.InvalidStructure) as caught:
-            check_apart(outlines, [*NAMES, "c"], slight)
+            check_overlaps(outlines, [*NAMES, "c"], slight)
         words = str(caught.value)
         assert "overlap by 200 cm², about 19.6 mm deep at (0.990, 0.500)" in words
         assert ("raise snap above that" in words) is remedy
@@ -39,14 +39,14 @@ def test_an_overlap_is_told_by_its_depth_and_its_place():
 def test_of_small_blocks_too():
     """Centimetres of one and a half: what they share is 1 mm by 1 cm, 2 A / P = 0.909 mm deep."""
     with pytest.raises(af.errors.InvalidStructure, match=r"by 0.1 cm², about 0.909 mm deep"):
-        check_apart([box(0.0, 0.0, 0.015, 0.01), box(0.014, 0.0, 0.015, 0.01)], NAMES)
+        check_overlaps([box(0.0, 0.0, 0.015, 0.01), box(0.014, 0.0, 0.015, 0.01)], NAMES)
 
 
 @pytest.mark.parametrize(("share", "same"), [(1.0 - 0.5e-6, True), (1.0 - 2e-6, False)])
 def test_outlines_are_the_same_to_a_millionth_of_their_area(share, same):
     words = "are the same: leave one out" if same else "overlap by"
     with pytest.raises(af.errors.InvalidStructure, match=words):
-        check_apart([box(0.0, 0.0), box(0.0, 0.0, share)], NAMES)
+        check_overlaps([box(0.0, 0.0), box(0.0, 0.0, share)], NAMES)
 
 
 @pytest.mark.parametrize(
@@ -56,9 +56,9 @@ def test_it_does_not_matter_between_supports(fixed, refused):
     outlines = [box(0.0, 0.0), box(0.5, 0.0)]
     if refused:
         with pytest.raises(af.errors.InvalidStructure, match="overlap"):
-            check_apart(outlines, NAMES, fixed=fixed)
+            check_overlaps(outlines, NAMES, fixed=fixed)
     else:
-        check_apart(outlines, NAMES, fixed=fixed)
+        check_overlaps(outlines, NAMES, fixed=fixed)
 
 
 def test_outlines_that_cross_themselves_are_refused_either_way_round():

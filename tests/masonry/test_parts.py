@@ -26,7 +26,7 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
         (lambda: af.shapes.Pier(gap=1.0, height=-2.0), "'pier': height -2 m"),
         (
             lambda: af.shapes.Sidewall(**WALL, state="loose"),
-            "'sidewall': state 'loose' is not known",
+            "'sidewall': state 'loose' is unknown",
         ),
         (
             lambda: af.shapes.Sidewall(**WALL | {"above": -0.1}),

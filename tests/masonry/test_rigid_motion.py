@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archfem.masonry.rigid_motion import first_coordinate, motion_of
+from archfem.masonry.structure import first_coordinates, rigid_motion_matrix
 
 
 def test_a_small_turn_moves_points_as_a_rotation_does():
@@ -11,17 +11,17 @@ def test_a_small_turn_moves_points_as_a_rotation_does():
     turn = 1e-4
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     moved = (points - centroid) @ rotation.T + centroid + [0.2, 0.3] - points
-    found = motion_of(points, centroid) @ [0.2, 0.3, turn]
+    found = rigid_motion_matrix(points, centroid) @ [0.2, 0.3, turn]
     assert found == pytest.approx(moved, abs=2.0 * turn**2)  # what small motions leave out
 
 
 def test_each_point_may_have_a_centroid_of_its_own():
     points, centroids = np.array([[2.0, 1.0], [0.0, 3.0]]), np.array([[1.0, 1.0], [0.0, 0.0]])
-    found = motion_of(points, centroids)
+    found = rigid_motion_matrix(points, centroids)
     for k in range(2):
-        assert found[k].tolist() == motion_of(points[[k]], centroids[k])[0].tolist()
+        assert found[k].tolist() == rigid_motion_matrix(points[[k]], centroids[k])[0].tolist()
 
 
 def test_blocks_that_move_have_three_coordinates_each(stack, ring):
-    assert first_coordinate(stack) == {1: 0, 2: 3}
-    assert len(first_coordinate(ring)) == 17
+    assert first_coordinates(stack) == {1: 0, 2: 3}
+    assert len(first_coordinates(ring)) == 17

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.roles import judged_parts, part_role
+from archfem.masonry.parts import infer_role, select_assessed_parts
 from archfem.studies.comparison import of_run
-from archfem.view.marks import joint_marks
+from archfem.view.joint_marks import joint_marks
 
 RING = {"span": 4.0, "rise": 1.6, "thickness": 0.3, "voussoirs": 13}
 FILL = af.shapes.Backfill(cover=0.5)
@@ -125,7 +125,7 @@ def test_events_go_by_roles(event):
     endings = []
     for names in NAMES.values():
         made = viaduct(*names)
-        watch = event().watch(made, af.Criteria())
+        watch = event().start_monitor(made, af.Criteria())
         ends = [watch(resultants, 0.005) is not None for resultants in quake(made)]
         endings.append(ends.index(True))
     assert len(set(endings)) == 1
@@ -158,10 +158,10 @@ def test_an_unknown_name_is_warned_of_once_and_told_how_to_set_it(told):
     for name in NAMES["English"]:
         (said,) = (each for each in told() if f"'{name}'" in each)
         assert f"part '{name}' is taken for neither ring nor pier" in said
-        assert "its name has no word that says what it is" in said
+        assert "its name has no word of a known role" in said
         assert 'Block(role="ring")' in said
         assert "[structure.layers]" in said
-    assert set(af.joints.roles_of(af.joints.joint_dataset(made, quake(made)[0])).values()) == {
+    assert set(af.joints.part_roles(af.joints.joint_dataset(made, quake(made)[0])).values()) == {
         "other"
     }
     assert verdicts(untold(viaduct(*NAMES["arches"]))) == verdicts(viaduct(*NAMES["arches"]))
@@ -201,30 +201,30 @@ def test_what_one_block_tells_goes_for_all_of_its_part(told):
     ],
 )
 def test_names_that_tell_a_role(part, role, told):
-    assert part_role(part) == role
+    assert infer_role(part) == role
     assert told() == []
 
 
 @pytest.mark.parametrize(
     ("part", "role", "why"),
     [
-        ("spring line", "other", "has no word that says what it is"),
-        ("mainarch", "other", "has no word that says what it is"),
-        ("3", "other", "has no word that says what it is"),
-        ("fill over the arch", "ring", "speaks of ring and other"),
-        ("pier foundation", "pier", "speaks of pier and other"),
+        ("spring line", "other", "has no word of a known role"),
+        ("mainarch", "other", "has no word of a known role"),
+        ("3", "other", "has no word of a known role"),
+        ("fill over the arch", "ring", "has words of ring and other"),
+        ("pier foundation", "pier", "has words of pier and other"),
     ],
 )
 def test_names_that_leave_a_role_open(part, role, why, told):
-    assert part_role(part) == role
+    assert infer_role(part) == role
     (said,) = told()
     assert f"part '{part}' is taken for" in said
     assert why in said
 
 
 def test_rings_and_piers_are_judged_or_all_where_there_is_neither():
-    assert judged_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
-    assert judged_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
+    assert select_assessed_parts({"wall": "other", "pier": "pier", "": "ring"}) == ("pier", "")
+    assert select_assessed_parts({"wall": "other", "fill": "other"}) == ("wall", "fill")
 
 
 def test_roles_that_contradict_one_another_are_refused():
@@ -317,8 +317,10 @@ def test_a_saved_history_keeps_roles(tmp_path):
     dataset = af.joints.joint_dataset(made, quake(made), np.arange(6.0))
     path = af.History(dataset, made).save(tmp_path / "run.nc")
     again = af.History.read(path)
-    assert af.joints.roles_of(again.joints) == af.joints.roles_of(dataset)
-    assert af.joints.judged(again.joints)["joint"].equals(af.joints.judged(dataset)["joint"])
+    assert af.joints.part_roles(again.joints) == af.joints.part_roles(dataset)
+    assert af.joints.assessed_joints(again.joints)["joint"].equals(
+        af.joints.assessed_joints(dataset)["joint"]
+    )
     assert again.mechanism == af.limit.counted_mechanisms(dataset)["any four joints"]
 
 
@@ -331,4 +333,4 @@ def test_a_file_without_roles_is_read_with_its_structure(tmp_path):
     ):
         af.History.read(path)
     found = af.History.read(path, made)
-    assert af.joints.roles_of(found.joints)["west vault"] == "ring"
+    assert af.joints.part_roles(found.joints)["west vault"] == "ring"

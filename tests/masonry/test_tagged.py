@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.survey import survey
-from archfem.masonry.survey.tagged import part_of, physical_surfaces
+from archfem.masonry.survey import outlines
+from archfem.masonry.survey.drawings import part_of, physical_surfaces
 
 gmsh = pytest.importorskip("gmsh")
 pytest.importorskip("meshio")
@@ -74,7 +74,7 @@ def test_a_model_on_that_mesh(tmp_path, curve):
     (tmp_path / "case.toml").write_text(
         '[structure]\nshape = "outlines"\nfile = "own.msh"\n'
         "[structure.layers]\nground = { fixed = true }\npier = {}\n"
-        '[model]\nfile = "own.msh"\n'
+        '[model]\nmesh_file = "own.msh"\n'
     )
     case = af.Case.read(tmp_path / "case.toml")
     assert af.build(case.structure, file=case.discretisation.file).size == model.size
@@ -129,6 +129,6 @@ def test_edges_of_a_mesh_follow_an_arc(tmp_path):
 def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, ends, off, named):
     """Told by the middles of its edges: all between the joint's ends, and none beside it."""
     middles = np.array([[x, 1.0 + off] for x in ends])
-    monkeypatch.setattr(survey, "physical_curves", lambda path, factor: [("mine", middles)])
-    found = survey._named_by_curves(stack, Path("any.msh"), None)
+    monkeypatch.setattr(outlines, "physical_curves", lambda path, factor: [("mine", middles)])
+    found = outlines._named_by_curves(stack, Path("any.msh"), None)
     assert [joint.name == "mine" for joint in found.joints] == [False, named]

@@ -5,16 +5,16 @@ import pytest
 from scipy.sparse.linalg import lsqr
 
 import archfem as af
-from archfem.masonry.geometry import area_of_polygon
-from archfem.masonry.rigid_motion import motion_of
+from archfem.masonry.block import measure_polygon
+from archfem.masonry.structure import rigid_motion_matrix
 
 
 def test_rims_run_once_around_each_block(ring_model):
     cells = ring_model.cells
-    start, end = cells.places[cells.rims].transpose(1, 0, 2)
+    start, end = cells.places[cells.outline_edges].transpose(1, 0, 2)
     twice = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     for number in ring_model.structure.free:
-        own = cells.block[cells.rims[:, 0]] == number
+        own = cells.block[cells.outline_edges[:, 0]] == number
         block_ = ring_model.structure.blocks[number]
         # The mesh has four chords where the block has arcs: 0.02 % of its area.
         assert abs(twice[own].sum()) / 2.0 == pytest.approx(block_.area, rel=5e-4)
@@ -26,10 +26,10 @@ def test_an_inclined_load_has_the_arm_of_the_arc(rung):
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
     model = af.build(ring, fidelity=rung, cells=(2, 2))
     push = af.PointLoad(-0.7, (2e3, -1.5e3))
-    turned = motion_of(model.cells.places, np.zeros(2)) @ [0.0, 0.0, 1.0]
+    turned = rigid_motion_matrix(model.cells.places, np.zeros(2)) @ [0.0, 0.0, 1.0]
     of_free = np.isin(model.cells.block, ring.free)
     rows = np.repeat(of_free, 2)
-    q = lsqr(model.cells.lift[rows], turned[of_free].ravel(), atol=1e-14, btol=1e-14)[0]
+    q = lsqr(model.cells.shape_functions[rows], turned[of_free].ravel(), atol=1e-14, btol=1e-14)[0]
     height = np.sqrt((2.95 + 0.275) ** 2 - 0.7**2)
     assert model.load(push) @ q == pytest.approx(-0.7 * -1.5e3 - height * 2e3, rel=1e-8)
 
@@ -41,5 +41,5 @@ def test_cells_of_all_nodes_cover_the_blocks_once(cell, corners, degree):
     stack = af.column(breadth=1.0, heights=[1.0, 2.0])
     cells = af.build(stack, cells=(2, 2), cell=cell, degree=degree).cells
     assert {len(polygon) for polygon in cells.polygons} == {corners}
-    area = sum(area_of_polygon(cells.places[polygon])[0] for polygon in cells.polygons)
+    area = sum(measure_polygon(cells.places[polygon])[0] for polygon in cells.polygons)
     assert area == pytest.approx(3.0, rel=1e-12)

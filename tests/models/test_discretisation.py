@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.discretisation import FIDELITIES, RUNGS, Discretisation
+from archfem.models.discretisation import BLOCK_FIDELITIES, MODEL_FIDELITIES, Discretisation
 
 BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
 
@@ -17,10 +17,10 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
         ({"fidelity": "exact"}, "fidelity 'exact' is not known: use one of .*'rigid'.*'auto'"),
         ({"fidelity": 3}, "fidelity 3 is not known"),
         ({"fidelity": ["full"]}, "is not known"),
-        ({"fidelity": {"rest": np.zeros(3)}}, r"rungs \['\[0. 0. 0.\]'\] are not known"),
-        ({"fidelity": "modal"}, "'modal' is no longer known, for 'faces' is faster.*'rigid'"),
-        ({"fidelity": {"rest": "modal"}}, r"rungs \['modal'\] are not known: use some of"),
-        ({"fidelity": {"rest": "monolithic"}}, r"rungs \['monolithic'\] are not known"),
+        ({"fidelity": {"rest": np.zeros(3)}}, r"fidelities \['\[0. 0. 0.\]'\] are not known"),
+        ({"fidelity": "modal"}, "fidelity 'modal' is not known: use one of .*'rigid'"),
+        ({"fidelity": {"rest": "modal"}}, r"fidelities \['modal'\] are not known: use some of"),
+        ({"fidelity": {"rest": "monolithic"}}, r"fidelities \['monolithic'\] are not known"),
         ({"cells": 4}, "cells through the thickness and along each block = 4 is not a row"),
         ({"cells": (4, 4, 4)}, r"= \(4, 4, 4\) has 3 values"),
         ({"cells": "44"}, "= '44' is not a row of values"),
@@ -29,16 +29,23 @@ BRIDGE = Path(__file__).parents[2] / "meshes" / "prusias.toml"
         ({"cells": (4, 2.5)}, "cells along = 2.5"),
         ({"cells": (4, 1001)}, "cells along = 1001"),
         ({"cell": "hexagon"}, "cell 'hexagon' is not known"),
-        ({"coarse": 0.0}, "coarse = 0.0 m: give a length above 0"),
+        ({"coarse": 0.0}, "coarse = 0.0 m: give a largest cell size above 0"),
         ({"coarse": float("nan")}, "coarse \\[m\\] = nan"),
         ({"degree": 3}, "degree 3: elements are of degree 1 or 2"),
         ({"quadrature": "simpson"}, "quadrature 'simpson' is not known"),
         ({"quadrature": "gauss", "points": 0}, "quadrature points = 0 is not a whole number"),
         ({"quadrature": "nodal", "points": 3}, "nodal quadrature has points of its own"),
+        (
+            {"quadrature": "trapezoidal", "points": 3, "fidelity": "monolithic"},
+            "trapezoidal quadrature with 3 points is not written in UFL",
+        ),
         ({"quadrature": "exact", "degree": 2}, "linear along a facet"),
         ({"quadrature": "exact", "fidelity": "monolithic"}, "linear along a facet"),
         ({"displacements": "huge"}, "displacements 'huge' are not known: use one of"),
-        ({"displacements": "large", "fidelity": "monolithic"}, "does not know: use 'full'"),
+        (
+            {"displacements": "large", "fidelity": "monolithic"},
+            "do not exist with fidelity 'monolithic': use 'full'",
+        ),
     ],
 )
 def test_refusals(ring, given, says):
@@ -54,14 +61,18 @@ def test_what_is_asked_is_kept():
     assert asked.cells == (asked.through, asked.along) == (2, 3)
     assert asked.rule == af.joints.Quadrature("gauss", 2)
     assert asked == Discretisation("faces", (2, 3), quadrature="gauss", points=2)
-    assert [Discretisation(fidelity).name for fidelity in FIDELITIES] == list(FIDELITIES)
+    assert [Discretisation(fidelity).name for fidelity in MODEL_FIDELITIES] == list(
+        MODEL_FIDELITIES
+    )
     mixed = Discretisation({"backfill": "full", "rest": "faces"})
     assert mixed.name == "backfill: full, rest: faces"
-    assert set(RUNGS) < set(FIDELITIES)
+    assert set(BLOCK_FIDELITIES) < set(MODEL_FIDELITIES)
 
 
 def test_a_case_says_it():
-    changes = ["model={ fidelity = 'faces', cells = [2, 3], coarse = '50 cm', tolerance = 0.01 }"]
+    changes = [
+        "model={ fidelity = 'faces', cells = [2, 3], max_cell_size = '50 cm', tolerance = 0.01 }"
+    ]
     asked = af.Case.read(BRIDGE, changes).discretisation
     assert asked == Discretisation("faces", (2, 3), coarse=0.5)
 

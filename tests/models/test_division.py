@@ -8,8 +8,14 @@ import pytest
 from scipy.integrate import quad
 
 import archfem as af
-from archfem.models.fem.division import Sizes, _check_room, _graded, _wanted, divided
-from archfem.models.fem.edges import edges_of
+from archfem.models.fem.edge_division import (
+    CellSizes,
+    _check_cell_count,
+    _grade_edges,
+    _side_cells,
+    divide_edges,
+    find_edges,
+)
 
 
 def one_arch(**parts):
@@ -20,7 +26,7 @@ def one_arch(**parts):
 
 def cells_on_edges(structure, meshing):
     """Middles of the edges of blocks that can move (m, 2), and the cells on each (m,)."""
-    division = divided(structure, meshing)
+    division = divide_edges(structure, meshing)
     own = np.unique(np.concatenate([division.edges.around[k] for k in structure.free]))
     middles = division.edges.points[division.edges.ends[own]].mean(axis=1)
     return middles, np.array([len(division.stations[edge]) - 1 for edge in own])
@@ -48,7 +54,7 @@ def test_mirror_images_are_cut_alike(make, cell, cells):
 def test_cells_forced_by_another_side_are_dealt_evenly():
     """Fill asks an even number of each of three chords, six in all: the intrados has two each."""
     made = one_arch(chords=3)
-    division = divided(made, af.models.Discretisation(cells=(2, 2)))
+    division = divide_edges(made, af.models.Discretisation(cells=(2, 2)))
     keystone = next(k for k, each in enumerate(made.blocks) if each.name == "arch, voussoir 7")
     faces = division.edges.sides[keystone]
     found = [[len(division.stations[edge]) - 1 for edge in side] for side in faces]
@@ -74,45 +80,45 @@ def test_cells_are_twice_as_long_as_a_stone_is_thick_at_most(length, along):
 
     Where it is less than half a metre long, it is its height that is cut: at 0.24 m by three.
     """
-    edges = edges_of(slab(length), [1, 1])
+    edges = find_edges(slab(length), [1, 1])
     asked = af.models.Discretisation(cells=(1, 1))
-    wanted = _wanted(edges, 1, asked)
+    wanted = _side_cells(edges, 1, asked)
     assert sorted(wanted) == sorted([along, 1] if length > 0.5 else [1, 3])
-    assert _wanted(edges, 0, asked) == [1, 1]  # a support does not deform
-    assert sorted(_wanted(edges, 1, af.models.Discretisation(cells=(5, 7)))) == [5, 7]
+    assert _side_cells(edges, 0, asked) == [1, 1]  # a support does not deform
+    assert sorted(_side_cells(edges, 1, af.models.Discretisation(cells=(5, 7)))) == [5, 7]
 
 
 def test_a_mesh_has_a_million_cells_at_most():
     """Those of the slab, and of its support, which has one along; free ones by their size."""
-    edges = edges_of(slab(2.0), [1, 1])
-    _check_room(edges, af.models.Discretisation(cells=(1000, 999)))
+    edges = find_edges(slab(2.0), [1, 1])
+    _check_cell_count(edges, af.models.Discretisation(cells=(1000, 999)))
     with pytest.raises(af.errors.MeshError, match=r"a mesh of 1e.06 cells, and there is room for"):
-        _check_room(edges, af.models.Discretisation(cells=(1000, 1000)))
-    free = edges_of(slab(2.0, corners=None), [1, 1])
+        _check_cell_count(edges, af.models.Discretisation(cells=(1000, 1000)))
+    free = find_edges(slab(2.0, corners=None), [1, 1])
     for size, fits in ((0.0014144, True), (0.0014140, False)):
         asked = af.models.Discretisation(cells=(1, 1), coarse=size)
         if fits:
-            _check_room(free, asked)
+            _check_cell_count(free, asked)
         else:
             with pytest.raises(af.errors.MeshError, match="a mesh of 1e"):
-                _check_room(free, asked)
+                _check_cell_count(free, asked)
 
 
 def test_cells_grow_with_the_distance_from_fine_ones():
     """By 0.35 of the distance from the end of the nearest, up to the largest size."""
-    sizes = Sizes(np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.2, 0.4]), 1.0)
+    sizes = CellSizes(np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.2, 0.4]), 1.0)
     places = np.array([[0.05, 0.0], [0.1, 0.0], [1.1, 0.0], [9.0, 0.0], [5.0, 0.0], [0.0, -1.1]])
     known = [0.2, 0.2, 0.2 + 0.35, 0.4 + 0.35 * 0.8, 1.0, 0.2 + 0.35]
-    assert sizes.at(places) == pytest.approx(known)
+    assert sizes.evaluate(places) == pytest.approx(known)
 
 
 def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
     """∫ ds over the size, by SciPy; the largest is half of the mean thickness, A / P."""
     structure = slab(3.0, 2.0, corners=None)
     asked = af.models.Discretisation(cells=(8, 1), cell="triangle")
-    made = divided(structure, asked)
+    made = divide_edges(structure, asked)
     edges, size = made.edges, made.sizes[1]
-    assert size.coarse == pytest.approx(6.0 / 10.0)
+    assert size.max_size == pytest.approx(6.0 / 10.0)
     assert size.lengths == pytest.approx(3.0 / 8.0)
     assert sorted(size.middles[:, 0]) == pytest.approx(3.0 * (np.arange(8) + 0.5) / 8.0)
     for edge in edges.around[1]:
@@ -122,7 +128,7 @@ def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
         length = np.linalg.norm(ends[1] - ends[0])
 
         def density(s, ends=ends, length=length):
-            return length / float(size.at(ends[0] + s * (ends[1] - ends[0])))
+            return length / float(size.evaluate(ends[0] + s * (ends[1] - ends[0])))
 
         fit = quad(density, 0.0, 1.0, limit=200)[0]
         stations = made.stations[edge]
@@ -144,11 +150,11 @@ def test_an_edge_between_blocks_has_the_cells_of_the_finer(order):
     )
     sizes = {
         number: SimpleNamespace(
-            at=lambda places, size=(0.5, 0.2)[number]: np.full(len(places), size)
+            evaluate=lambda places, size=(0.5, 0.2)[number]: np.full(len(places), size)
         )
         for number in order
     }
-    found = _graded(edges, sizes)
+    found = _grade_edges(edges, sizes)
     assert {edge: through[-1] for edge, through in found.items()} == pytest.approx(
         {0: 1.0 / 0.5, 1: 3.0 / 0.2}
     )

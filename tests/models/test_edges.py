@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.fem.edges import _with_points_on_edges, edges_of
+from archfem.models.fem.edge_division import _insert_points_on_edges, find_edges
 
 NEAR = 1e-6
 
@@ -22,7 +22,7 @@ def test_points_on_an_edge_are_inserted_in_order(size, turn):
     points = np.concatenate([square, on, beside, ends, inner])
     cosine, sine = np.cos(turn), np.sin(turn)
     points = points @ np.array([[cosine, sine], [-sine, cosine]])
-    found = _with_points_on_edges(np.arange(4), points, NEAR).tolist()
+    found = _insert_points_on_edges(np.arange(4), points, NEAR).tolist()
     low = [0, 13, 5, 7, 8, 4, 14, 1, 6, 2, 3]
     assert found == low or found == [0, 13, 5, 8, 7, 4, 14, 1, 6, 2, 3]
 
@@ -36,7 +36,7 @@ def test_a_joint_has_the_edges_that_both_blocks_have_between_its_ends():
     bed = af.Joint((1, 2), (-0.1, 0.5), (0.3, 0.5), contact, "bed", "column", "pier")
     blocks = (*wide.blocks, upper)
     structure = af.Structure(blocks, (*wide.joints, bed))
-    found = edges_of(structure, [1] * 3)
+    found = find_edges(structure, [1] * 3)
     lengths = [found.lengths[edges].sum() for edges in found.joints]
     assert lengths == pytest.approx([1.0, 0.4])
     assert [len(edges) for edges in found.joints] == [1, 1]
@@ -59,5 +59,5 @@ def test_corners_are_one_up_to_a_millionth_of_the_structure(size, off, points):
     ]
     contact = af.masonry.STONE_TO_STONE
     bed = af.Joint((0, 1), (shift, size), (size, size), contact, "bed", "pier", "pier")
-    found = edges_of(af.Structure(tuple(blocks), (bed,)), [1, 1])
+    found = find_edges(af.Structure(tuple(blocks), (bed,)), [1, 1])
     assert len(found.points) == points

@@ -45,11 +45,11 @@ def test_the_work_of_a_step_on_joints_that_hold_is_what_they_and_the_stones_stor
     model = af.build(stack, fidelity="faces", cells=(1, 1))
     first, last = 1e-5 * np.random.default_rng(3).normal(size=(2, model.size))
     first, last = (each + af.dead_load(model).q for each in (first, last))
-    passage, way = model.passage(first, late), last - first
+    passage, way = model.begin_step(first, late), last - first
     stored = model.energy(last) - model.energy(first)
-    lost = passage.lost(last)
+    lost = passage.dissipation(last)
     assert passage.force(last) @ way == pytest.approx(stored + lost, rel=1e-9)
-    assert lost >= late * float(way @ model.blocks @ way) * (1.0 - 1e-9)
+    assert lost >= late * float(way @ model.block_stiffness @ way) * (1.0 - 1e-9)
     if not late:
         assert lost == pytest.approx(0.0, abs=1e-9 * abs(stored))
 
@@ -59,5 +59,8 @@ def test_before_anything_opens_the_tangent_is_that_of_closed_joints():
     stack = glued(af.column(breadth=1.0, heights=[1.0, 1.0], material=soft))
     for fidelity in ("rigid", "faces"):
         dead = af.dead_load(af.build(stack, fidelity=fidelity, cells=(1, 1)))
-        closed, tangent = dead.model.closed().toarray(), dead.model.tangent(dead.q).toarray()
+        closed, tangent = (
+            dead.model.closed_tangent().toarray(),
+            dead.model.tangent(dead.q).toarray(),
+        )
         assert closed == pytest.approx(tangent, abs=1e-9 * np.abs(tangent).max())

@@ -21,17 +21,22 @@ def test_every_rung_answers_all_that_a_model_answers(model):
 
 def test_copies_leave_the_model_as_it_was(model):
     promise = Prediction(
-        error=0.01, in_time=0.001, tolerance=0.02, dt=0.005, pace=None, considered=()
+        error=0.01,
+        time_step_error=0.001,
+        tolerance=0.02,
+        dt=0.005,
+        step_tolerance=None,
+        candidates=(),
     )
-    assert model.predicted(promise).prediction is promise
+    assert model.with_prediction(promise).prediction is promise
     down = af.Settlement("base", (0.0, -0.1, 0.0))
     twice = model.settled(down).settled(down)
-    assert twice.supports[0].tolist() == [0.0, -0.2, 0.0]
+    assert twice.support_motion[0].tolist() == [0.0, -0.2, 0.0]
     assert model.prediction is None
-    assert not model.supports.any()
+    assert not model.support_motion.any()
 
 
-@pytest.mark.parametrize("given", [None, SimpleNamespace(tangent=None, supports=None)])
+@pytest.mark.parametrize("given", [None, SimpleNamespace(tangent=None, support_motion=None)])
 def test_what_is_no_model_is_refused(stack, given):
     for each in (given, stack):
         with pytest.raises(af.InvalidInput, match=f"model is a {type(each).__name__}: build one"):
@@ -40,15 +45,21 @@ def test_what_is_no_model_is_refused(stack, given):
 
 def test_a_prediction_in_words():
     told = Prediction(
-        **{"error": 0.0049, "in_time": 0.001, "tolerance": 0.005, "dt": 0.0025, "pace": None},
-        **{"considered": (("rigid", 0.02), ("faces", 0.0049)), "of_small": 0.003},
-        of_chance=0.0021,
+        **{
+            "error": 0.0049,
+            "time_step_error": 0.001,
+            "tolerance": 0.005,
+            "dt": 0.0025,
+            "step_tolerance": None,
+        },
+        **{"candidates": (("rigid", 0.02), ("faces", 0.0049)), "small_displacement_error": 0.003},
+        chaotic_spread=0.0021,
     )
-    assert told.met
-    assert not replace(told, error=0.0051).met
+    assert told.is_met
+    assert not replace(told, error=0.0051).is_met
     assert told.text == (
-        "predicted to err by 0.0049 in the largest |e|, of which 0.001 by steps of 2.5 ms, and by "
-        "0.003 because displacements are taken as small; 0.005 was asked for (tried: rigid: 0.02; "
-        "faces: 0.0049); impacts leave 0.0021 to chance"
+        "predicted error 0.0049 in the largest |e|, of which 0.001 by steps of 2.5 ms, and 0.003 "
+        "by the assumption of small displacements; tolerance 0.005 (tried: rigid: 0.02; faces: "
+        "0.0049); impacts spread it by 0.0021"
     )
-    assert "by steps of a length for 0.004 in |e|" in replace(told, dt=None, pace=0.004).text
+    assert "by steps of tolerance 0.004 in |e|" in replace(told, dt=None, step_tolerance=0.004).text

@@ -13,8 +13,8 @@ import archfem as af
 from archfem.masonry.assembly import assembled
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.joint_facets import JointFacets
-from archfem.models.fem.mesh import mesh
-from archfem.models.fem.space import broken_space
+from archfem.models.fem.mesh import generate_mesh
+from archfem.models.fem.space import build_broken_space
 
 SAME = 1e-12
 """Two ways to the same numbers at one state, relative to the largest: rounding of sums."""
@@ -75,7 +75,7 @@ def both(request):
     random = np.random.default_rng(3)
     memory = 1e-4 * random.standard_normal(len(full.memory))
     start, q = 1e-4 * random.standard_normal((2, full.size))
-    return [each.remembering(memory) for each in (full, slow)], start, q
+    return [each.with_memory(memory) for each in (full, slow)], start, q
 
 
 def differ(found, expected):
@@ -86,11 +86,11 @@ def differ(found, expected):
 def test_an_instant_is_that_of_the_joint_operator(both):
     (full, slow), direction, q = both
     assert slow.operator is None
-    for name in ("force", "energy", "resultants", "remembered"):
+    for name in ("force", "energy", "resultants", "updated_memory"):
         assert differ(getattr(slow, name)(q), getattr(full, name)(q)) < SAME, name
     assert differ(slow.tangent(q) @ direction, full.tangent(q) @ direction) < SAME
-    slid = full.remembered(q) - full.memory
-    status = full.operator.status(q)
+    slid = full.updated_memory(q) - full.memory
+    status = full.operator.closed_points(q)
     assert 0.2 < status.mean() < 0.8
     assert 0.0 < np.mean(slid[status] != 0.0) < 1.0  # of the closed points some hold
 
@@ -98,8 +98,8 @@ def test_an_instant_is_that_of_the_joint_operator(both):
 @pytest.mark.parametrize("late", [0.0, 0.3])
 def test_a_step_is_that_of_the_joint_operator(both, late):
     (full, slow), start, q = both
-    by_matrices, by_forms = full.passage(start, late), slow.passage(start, late)
-    for name in ("force", "resultants", "remembered", "lost"):
+    by_matrices, by_forms = full.begin_step(start, late), slow.begin_step(start, late)
+    for name in ("force", "resultants", "updated_memory", "dissipation"):
         assert differ(getattr(by_forms, name)(q), getattr(by_matrices, name)(q)) < SAME, name
     direction = q - start
     tangents = [passage.tangent(q) @ direction for passage in (by_forms, by_matrices)]
@@ -109,21 +109,24 @@ def test_a_step_is_that_of_the_joint_operator(both, late):
 def test_joints_that_just_touch_are_closed_and_hold():
     full, slow = rungs()
     rest = np.zeros(full.size)
-    assert abs(slow.tangent(rest) - full.closed()).max() < SAME * abs(full.closed()).max()
-    tangents = [each.passage(rest, 0.3).tangent(rest) for each in (slow, full)]
+    assert (
+        abs(slow.tangent(rest) - full.closed_tangent()).max()
+        < SAME * abs(full.closed_tangent()).max()
+    )
+    tangents = [each.begin_step(rest, 0.3).tangent(rest) for each in (slow, full)]
     assert abs(tangents[0] - tangents[1]).max() < SAME * abs(tangents[1]).max()
 
 
 def test_a_support_that_has_moved_moves_the_joints():
     full, slow = (
-        each.settled(af.Settlement("base", (1e-4, -2e-4, 1e-5))).remembering(
+        each.settled(af.Settlement("base", (1e-4, -2e-4, 1e-5))).with_memory(
             1e-5 * np.arange(len(each.memory))
         )
         for each in rungs()
     )
     start, q = 1e-4 * np.random.default_rng(4).standard_normal((2, full.size))
     assert differ(slow.resultants(q), full.resultants(q)) < SAME
-    means = [each.passage(start, 0.0).resultants(q) for each in (slow, full)]
+    means = [each.begin_step(start, 0.0).resultants(q) for each in (slow, full)]
     assert differ(*means) < SAME
 
 
@@ -131,18 +134,20 @@ def test_memory_of_a_copy_is_its_own():
     _, slow = rungs()
     q = 1e-4 * np.random.default_rng(5).standard_normal(slow.size)
     force = slow.force(q)
-    passage = slow.passage(np.zeros(slow.size), 0.0)
+    passage = slow.begin_step(np.zeros(slow.size), 0.0)
     mean = passage.force(q)
-    slid = slow.remembering(np.full(len(slow.memory), 1e-4))
+    slid = slow.with_memory(np.full(len(slow.memory), 1e-4))
     assert differ(slid.force(q), force) > 1e-6
-    assert differ(slid.passage(q, 0.1).force(-q), mean) > 1e-6
+    assert differ(slid.begin_step(q, 0.1).force(-q), mean) > 1e-6
     assert np.array_equal(slow.force(q), force)
     assert np.array_equal(passage.force(q), mean)
 
 
 def test_no_cell_has_two_facets_of_one_colour():
-    facets = JointFacets(broken_space(mesh(wall(), af.models.Discretisation(cells=(1, 1)))), RULE)
-    cells_at = _fenicsx.connect(facets.space.mesh.grid, 1, 2)
+    facets = JointFacets(
+        build_broken_space(generate_mesh(wall(), af.models.Discretisation(cells=(1, 1)))), RULE
+    )
+    cells_at = _fenicsx.find_connectivity(facets.space.mesh.grid, 1, 2)
     pairs = [
         (cell, colour)
         for facet, colour in zip(facets.numbers, facets.colours, strict=True)
@@ -182,5 +187,5 @@ def test_history_in_which_joints_open_and_slide():
         assert differ(slow.dataset[key], full.dataset[key]) < SOLVED
     of_beds = full.joints["friction"].isel(joint=slice(2)).max("time")
     assert of_beds.values == pytest.approx(BED.friction, rel=1e-9)  # all of their points slide
-    open_ = ~rungs()[0].operator.status(full.dataset["last_q"].values)
+    open_ = ~rungs()[0].operator.closed_points(full.dataset["last_q"].values)
     assert 0.0 < open_.mean() < 1.0

@@ -29,9 +29,9 @@ def test_the_work_of_a_step_is_stored_or_lost(fidelity, late):
     """F·Δq = ΔE + lost, of joints and of stones that strain; friction gives nothing back."""
     for seed in range(4):
         model, first, last = moved(fidelity, seed)
-        passage = model.passage(first, late)
-        after = model.remembering(passage.remembered(last))
-        work, lost = passage.force(last) * (last - first), passage.lost(last)
+        passage = model.begin_step(first, late)
+        after = model.with_memory(passage.updated_memory(last))
+        work, lost = passage.force(last) * (last - first), passage.dissipation(last)
         scale = np.abs(work).sum()
         stored = after.energy(last) - model.energy(first)
         assert work.sum() == pytest.approx(stored + lost, abs=ROUND_OFF * scale)
@@ -46,7 +46,7 @@ def test_the_tangent_of_a_step_is_the_derivative_of_its_force(fidelity, left):
     which a mesh has its nodes.
     """
     model, first, last = moved(fidelity, 1, friction=None)
-    passage, way = model.passage(first, 0.4), last - first
+    passage, way = model.begin_step(first, 0.4), last - first
     slope = (passage.force(last + 1e-5 * way) - passage.force(last - 1e-5 * way)) / 2e-5
     known = passage.tangent(last) @ way
     assert known == pytest.approx(slope, abs=left * np.abs(slope).max())
@@ -63,5 +63,5 @@ def test_at_an_instant_energy_gives_the_force_and_that_the_tangent(fidelity):
     bent = (model.force(ends[0]) - model.force(ends[1])) / (2.0 * step)
     known = model.tangent(first) @ way
     assert known == pytest.approx(bent, abs=1e-4 * np.abs(bent).max())
-    assert model.remembered(first) == pytest.approx(model.memory, abs=0.0)
-    assert model.mismatch(last) == (0.0, "")  # all faces are plane
+    assert model.updated_memory(first) == pytest.approx(model.memory, abs=0.0)
+    assert model.face_mismatch(last) == (0.0, "")  # all faces are plane

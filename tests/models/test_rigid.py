@@ -5,7 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.joints.quadrature import Quadrature
-from archfem.models.rigid import rigid
+from archfem.models.rigid import build_rigid_model
 
 
 @pytest.mark.parametrize(
@@ -16,23 +16,25 @@ from archfem.models.rigid import rigid
         ((None, 5e4), None, 8),
         ((None, 0.0), Quadrature("lobatto"), 9),
         ((None, 0.0), Quadrature("gauss", 2), 8),
+        ((0.6, 0.0), Quadrature("trapezoidal"), 5),
+        ((0.6, 0.0), Quadrature("trapezoidal", 3), 3),  # of the whole joint
     ],
 )
 def test_joints_have_as_many_points_as_their_law_needs(contact, rule, points):
     friction, tension = contact
     law = af.Contact(1e9, 4e8, friction, cohesion=1e5, tension=tension)
-    model = rigid(af.column(breadth=0.6, heights=[2.4], contact=law), 4, rule)
-    assert len(model.operator.points.arm) == points
+    model = build_rigid_model(af.column(breadth=0.6, heights=[2.4], contact=law), 4, rule)
+    assert len(model.operator.points.offset) == points
 
 
 def test_masses_are_those_of_boxes():
     """m = γ w b h / g, and m (b² + h²) / 12 about the centroid."""
     tower = af.column(breadth=0.6, heights=[2.4, 1.2], width=2.5, gravity=5.0)
-    model, mass = rigid(tower), 20e3 / 5.0 * 2.5 * 0.6 * np.array([2.4, 1.2])
+    model, mass = build_rigid_model(tower), 20e3 / 5.0 * 2.5 * 0.6 * np.array([2.4, 1.2])
     inertia = mass * (0.6**2 + np.array([2.4, 1.2]) ** 2) / 12.0
     known = np.column_stack([mass, mass, inertia]).ravel()
     assert model.mass.toarray() == pytest.approx(np.diag(known))
     body = np.zeros((6, 2))
     body[[0, 3], 0] = body[[1, 4], 1] = mass
-    assert model.body == pytest.approx(body)
-    assert model.blocks.nnz == 0 or not model.blocks.data.any()
+    assert model.mass_influence == pytest.approx(body)
+    assert model.block_stiffness.nnz == 0 or not model.block_stiffness.data.any()

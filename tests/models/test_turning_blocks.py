@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.turning_blocks import OwnCoordinates
+from archfem.models.large.blocks import CorotationalCoordinates
 
 SOFT = af.Material(young=1e8, poisson=0.2, unit_weight=25e3)
 """Stones that bend by as much as joints give."""
@@ -57,7 +57,7 @@ def test_own_coordinates_are_about_centres_of_mass(fidelity):
     """
     ring = af.circular_arch(radius=2.0, thickness=0.6, embrace=120.0, voussoirs=3)
     small = af.build(ring, fidelity=fidelity, cells=(2, 2))
-    own = OwnCoordinates.of(small)
+    own = CorotationalCoordinates.of(small)
     mass = (own.basis.T @ small.mass @ own.basis).toarray()
     assert mass == pytest.approx(np.diag(np.diag(mass)), abs=1e-9 * np.abs(mass).max())
     for span, turns in own.blocks.values():
@@ -76,4 +76,4 @@ def test_a_fill_turns_where_it_is_rigid_or_in_grains(fidelity, grain, turns):
     (joint,) = (replace(each, role="other") for each in plain.joints)
     blocks = (base, replace(block, grain=grain))
     small = af.build(replace(plain, blocks=blocks, joints=(joint,)), fidelity=fidelity)
-    assert [each for _, each in OwnCoordinates.of(small).blocks.values()] == [turns]
+    assert [each for _, each in CorotationalCoordinates.of(small).blocks.values()] == [turns]

@@ -5,8 +5,8 @@ import pytest
 from scipy import sparse
 
 import archfem as af
-from archfem.models.turning_joints import Pieces
-from archfem.models.turning_places import StillPoint, TurningPoint
+from archfem.models.large.blocks import FramelessPoint, RotatingPoint
+from archfem.models.large.joints import JointSegments
 
 STEP = 1e-6
 """Of central differences: they err by STEP², and by rounding of 1e-16 / STEP."""
@@ -18,7 +18,7 @@ NEAR = 1e-8
 def point():
     """On a block with two modes, whose coordinates are 2 to 6 of eight."""
     shapes = np.array([[0.3, -0.2], [0.5, 0.4]])
-    return TurningPoint(2, np.array([0.7, -0.4]), shapes), np.random.default_rng(1).normal(size=8)
+    return RotatingPoint(2, np.array([0.7, -0.4]), shapes), np.random.default_rng(1).normal(size=8)
 
 
 def slopes(function, q):
@@ -42,19 +42,19 @@ def test_rates_of_a_point_are_its_derivatives(point):
     assert gradient == pytest.approx(slopes(made.displacement, q), abs=NEAR)
     force = np.array([2.0, -3.0])
     bent = slopes(lambda q: made.gradient(q, 8).T @ force, q)
-    assert made.bend(q, force, 8).toarray() == pytest.approx(bent, abs=NEAR)
+    assert made.force_rate(q, force, 8).toarray() == pytest.approx(bent, abs=NEAR)
 
 
 def test_a_point_of_what_does_not_turn_is_linear():
     rows = sparse.csr_matrix([[1.0, 0.5, 0.0], [0.0, 2.0, -1.0]])
-    still, q = StillPoint(rows), np.array([0.1, 0.2, 0.3])
+    still, q = FramelessPoint(rows), np.array([0.1, 0.2, 0.3])
     assert still.displacement(q) == pytest.approx(rows @ q)
     assert still.gradient(q, 3).toarray() == pytest.approx(slopes(still.displacement, q), abs=NEAR)
-    assert still.bend(q, np.ones(2), 3).nnz == 0
+    assert still.force_rate(q, np.ones(2), 3).nnz == 0
 
 
 def test_points_of_stones_turn_and_strain_as_their_frames_do():
-    """Of a stone meshed inside: its corners by `TurningPoint`, all of its places at once."""
+    """Of a stone meshed inside: its corners by `RotatingPoint`, all of its places at once."""
     structure = af.column(breadth=0.4, heights=[0.8, 0.8])
     model = af.build(structure, fidelity="faces", cells=(2, 2), displacements="large")
     cells, rng = model.cells, np.random.default_rng(2)
@@ -67,9 +67,11 @@ def test_points_of_stones_turn_and_strain_as_their_frames_do():
         arms = cells.places[own] - structure.blocks[number].centroid
         later = [b for b in structure.free if int(cells.turns[cells.block == b][0]) - 2 > first]
         end = min((int(cells.turns[cells.block == b][0]) - 2 for b in later), default=model.size)
-        lift = cells.lift.toarray().reshape(len(cells.places), 2, -1)[own][:, :, first + 3 : end]
+        lift = cells.shape_functions.toarray().reshape(len(cells.places), 2, -1)[own][
+            :, :, first + 3 : end
+        ]
         for k in range(len(own)):
-            made = TurningPoint(first, arms[k], lift[k])
+            made = RotatingPoint(first, arms[k], lift[k])
             assert moved[own[k]] == pytest.approx(made.displacement(q), abs=1e-12)
     middle = cells.middles(len(structure.blocks)).displacement(q)
     far = [middle[b] for b in structure.free]
@@ -82,9 +84,9 @@ def test_faces_of_supports_turn_about_their_centroids():
     arch = af.circular_arch(radius=3.0, thickness=0.5, embrace=140.0, voussoirs=3, chords=1)
     joint = np.array([0, 0, 1, 2, 3])
     aside = np.array([-0.125, 0.125, 0.0, 0.1, 0.0])
-    pieces = Pieces(arch, joint, np.arange(6), aside, np.full(5, 0.25))
+    pieces = JointSegments(arch, joint, np.arange(6), aside, np.full(5, 0.25))
     poses = np.random.default_rng(3).normal(size=(len(arch.blocks), 3))
-    found = pieces.held(poses)
+    found = pieces.fixed_poses(poses)
     for k, number in enumerate(joint):
         section = arch.joints[number]
         place = (section.middle + aside[k] * section.tangent) @ [1, 1j]

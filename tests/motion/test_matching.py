@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion import oscillator
-from archfem.motion.matching import _memory, _wavelet, matched, misfit
+from archfem.motion import response_spectra
+from archfem.motion.matching import _build_wavelet, _impulse_response, matched, spectral_misfit
 
 RECORDS = Path(__file__).parents[2].parent / "shared" / "records"
 CASE_STUDY = af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
@@ -34,7 +34,7 @@ def test_matched_motion_follows_the_target(match, component, verified):
     peak = np.abs(match.motion.component(component)).max() / af.units.STANDARD_GRAVITY
     # The rounds stop within 10 % of the target's peak, or at the best they found.
     assert peak == pytest.approx(float(getattr(CASE_STUDY, component)(0.0)), rel=0.15)
-    assert match.misfit[component] == misfit(match.motion, CASE_STUDY, component=component)
+    assert match.misfit[component] == spectral_misfit(match.motion, CASE_STUDY, component=component)
     case = f"motion matched to TBEC-2018, {component}, 0.05 to 2 s: rms misfit"
     verified(case, "below 0.05", "the target", f"{match.misfit[component]:.3f}", difference=None)
 
@@ -65,7 +65,7 @@ def test_other_spectra_and_bands(shaking):
     target = af.Eurocode8(ag=0.25, ground="B")
     level = shaking.with_vertical(None)
     match = matched(level, target, band=(0.1, 1.0), tolerance=0.04)
-    assert misfit(match.motion, target, band=(0.1, 1.0)) < 0.04
+    assert spectral_misfit(match.motion, target, band=(0.1, 1.0)) < 0.04
     assert match.motion.components == ("horizontal",)
 
 
@@ -84,7 +84,7 @@ def test_what_cannot_be_matched_is_refused(shaking):
         matched(shaking, CASE_STUDY, band=(1.0, 0.5))
     for band in ((0.0, 1.0), (0.1, np.inf)):
         with pytest.raises(af.errors.InvalidInput, match="0 < first < second"):
-            misfit(shaking, CASE_STUDY, band=band)
+            spectral_misfit(shaking, CASE_STUDY, band=band)
     spike = af.motion.TableSpectrum([0.01, 0.5, 0.51, 0.52, 5.0], [1e-3, 1e-3, 1.0, 1e-3, 1e-3])
     with pytest.raises(af.errors.DidNotConverge, match="misfit") as caught:
         matched(shaking.with_vertical(None), spike, tolerance=0.02)
@@ -108,13 +108,13 @@ def test_what_each_sample_adds_to_a_response_is_the_response(period, damping):
     """Of a smooth motion, against the exact oscillator; the sum of rectangles errs by (ω Δt)²."""
     dt, times = 0.002, 0.002 * np.arange(600)
     samples = np.sin(5.0 * times) * times * np.exp(-times)
-    moved = oscillator.displacement(samples, dt, period, damping)
+    moved = response_spectra.oscillator_displacement(samples, dt, period, damping)
     for at in (150, 599):
-        memory = _memory(period, at * dt, damping, dt=dt, count=600)
+        memory = _impulse_response(period, at * dt, damping, dt=dt, count=600)
         expected = -((2.0 * np.pi / period) ** 2) * moved[at]
         assert memory @ samples == pytest.approx(expected, rel=5e-3)
         assert not memory[at + 1 :].any()
-    assert _memory(0.0, 0.2, damping, dt=dt, count=600) @ samples == samples[100]
+    assert _impulse_response(0.0, 0.2, damping, dt=dt, count=600) @ samples == samples[100]
 
 
 @pytest.mark.parametrize("centre", [5.0, 0.3, 9.8])
@@ -124,7 +124,7 @@ def test_a_wavelet_moves_the_ground_by_a_cosine_under_a_bell(centre):
     Where it is brought to zero far from its middle it has faded to 1e-7.
     """
     period, dt, count = 0.5, 0.01, 1001
-    wave = _wavelet(period, centre, dt, count)
+    wave = _build_wavelet(period, centre, dt, count)
     assert np.abs(wave).max() == pytest.approx(1.0)
     assert np.abs(np.cumsum(wave)).max() > 0.1
     assert np.abs([np.cumsum(wave)[-1], np.cumsum(np.cumsum(wave))[-1]]).max() < 1e-10
@@ -140,7 +140,7 @@ def test_a_wavelet_moves_the_ground_by_a_cosine_under_a_bell(centre):
 def test_wavelets_that_reach_an_end_are_brought_to_zero_within_a_period():
     """The ramp 3 x² - 2 x³ on the displacement, at the first sample and from a period on."""
     period, dt, count = 0.5, 0.01, 1001
-    moved = np.cumsum(np.cumsum(_wavelet(period, 0.2, dt, count)))
+    moved = np.cumsum(np.cumsum(_build_wavelet(period, 0.2, dt, count)))
     time = dt * np.arange(1, 100) - 0.2
     bell = np.exp(-((time / (1.178 * period**0.93)) ** 2)) * np.cos(2.0 * np.pi * time / period)
     share = np.clip((np.arange(1, 100) - 1.0) / (period / dt), 0.0, 1.0)
@@ -160,4 +160,4 @@ def test_the_misfit_is_taken_evenly_in_log_period():
             found = np.interp(periods, np.geomspace(0.05, 2.0, 400), own)
             return np.where(periods < 0.05 * 40.0**0.25, 0.5 * found, found)
 
-    assert misfit(motion, Target) == pytest.approx(0.5, abs=0.01)  # a quarter errs by 1
+    assert spectral_misfit(motion, Target) == pytest.approx(0.5, abs=0.01)  # a quarter errs by 1

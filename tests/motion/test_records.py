@@ -8,8 +8,8 @@ import pytest
 
 import archfem as af
 from archfem.motion.records import afad, cosmos, csmip, esm, knet, peer, smc
-from archfem.motion.records.read import read_channels, read_components
-from archfem.motion.records.text import RecordText
+from archfem.motion.records.reader import read_channels, read_components
+from archfem.motion.records.record_file import RecordText
 
 DAMAGE = runpy.run_path(str(Path(__file__).parents[1] / "fuzz" / "damaged_records.py"))
 SAMPLES, mutants = DAMAGE["SAMPLES"], DAMAGE["mutants"]
@@ -220,8 +220,8 @@ def test_downward_words(write, direction):
         (TITLE + "NPTS= 2, DT= .01 SEC\n" + VALUES, "line 5: the header states 2 samples"),
         (TITLE + "NPTS= 4, DT= .00 SEC\n" + VALUES, "line 4: sampling interval 0 s"),
         (TITLE + "NPTS= 4, DT= 5.0 SEC\n" + VALUES, "line 4: sampling interval 5 s"),
-        (TITLE + "NPTS= 4, DT=    SEC\n" + VALUES, "no line tells"),
-        (TITLE + "NPTS= **, DT= .01 SEC\n" + VALUES, "no line tells"),
+        (TITLE + "NPTS= 4, DT=    SEC\n" + VALUES, "no line has"),
+        (TITLE + "NPTS= **, DT= .01 SEC\n" + VALUES, "no line has"),
         (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES[:-3], "'.0500000E+' is cut off|not a number"),
         (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("-.2", "-x2"), "line 5: numbers exp"),
         (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace(".3", ".3.3"), "line 5: not a number"),
@@ -232,21 +232,21 @@ def test_downward_words(write, direction):
         ),
         (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("+00", "+03", 1), "wrong unit"),
         (TITLE + "NPTS= 4, DT= .01 SEC\n" + VALUES.replace("E+00", "E999", 1), "too large"),
-        (TITLE.replace("OF G", "") + "NPTS= 4, DT= .01 SEC\n" + VALUES, "does not tell one unit"),
+        (TITLE.replace("OF G", "") + "NPTS= 4, DT= .01 SEC\n" + VALUES, "does not state one unit"),
         (
             TITLE.replace("ACCELERATION", "VELOCITY") + "NPTS= 4, DT= .01 SEC\n" + VALUES,
-            "does not tell of an acceleration",
+            "does not state an acceleration",
         ),
-        (TITLE + f"NPTS= {'9' * 5000}, DT= .01 SEC\n" + VALUES, "no line tells"),
+        (TITLE + f"NPTS= {'9' * 5000}, DT= .01 SEC\n" + VALUES, "no line has"),
         (SAMPLES["knet"].replace("100Hz", "1e999Hz"), "are positive numbers"),
         (SAMPLES["knet"].replace("(gal)   5", "(gal)   9"), "states a peak of"),
         (SAMPLES["esm"].replace("s^2\nPGA", "s\nPGA"), "UNITS is not a unit"),
         (SAMPLES["esm"].replace("0.40", "0.80"), "do not last 0.80 s"),
         (SAMPLES["esm"].replace("ACCEL", "VEL"), "DATA_TYPE is 'VELERATION'"),
-        (SAMPLES["csmip"].replace("END OF DATA FOR CHANNEL  3", ""), "no line tells"),
+        (SAMPLES["csmip"].replace("END OF DATA FOR CHANNEL  3", ""), "no line has"),
         (SAMPLES["smc"].replace("|made", "made"), "comment lines expected"),
         (SAMPLES["cosmos"].replace("units=cm/sec2", "units=counts"), "no single unit"),
-        (SAMPLES["afad"].replace("(gal)", ""), "unit of the peaks|no line tells"),
+        (SAMPLES["afad"].replace("(gal)", ""), "unit of the peaks|no line has"),
         ("", "is empty"),
         ("\0\1", "not a text file"),
         ("just words\nand more\n", "no line of numbers"),
@@ -303,7 +303,7 @@ def test_rounded_times_still_tell_the_step(write):
         ("1\n2\n3\n", {"units": "gal"}, "give dt="),
         ("1\n2\n3\n", {"units": "furlong", "dt": 0.01}, "units 'furlong' are unknown"),
         ("# in g\n1\n2\n", {"units": "gal", "dt": 0.01}, "contradicts the unit"),
-        ("# dt = 0.02 s\n1\n2\n", {"units": "gal", "dt": 0.01}, "told twice"),
+        ("# dt = 0.02 s\n1\n2\n", {"units": "gal", "dt": 0.01}, "stated twice"),
         ("0 1\n.01 2\n.02 3\n.04 2\n.05 1\n.06 0\n", {"units": "gal"}, "line 4: .*0.02 to 0.04 s"),
         ("1 2\n3 4\n1 5\n", {"units": "gal", "dt": 0.01}, "2 columns could be"),
         ("0.00 1 2\n0.01 4 1\n0.02 5 1\n", {"units": "gal"}, "2 columns could be"),
@@ -442,7 +442,7 @@ def test_a_step_that_is_told_twice_is_the_same_to_a_hundredth(write):
         if same:
             assert read_channels(path, dt=0.01)[0].dt == 0.01
         else:
-            with pytest.raises(af.InvalidInput, match="told twice"):
+            with pytest.raises(af.InvalidInput, match="stated twice"):
                 read_channels(path, dt=0.01)
 
 

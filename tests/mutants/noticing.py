@@ -23,7 +23,7 @@ BEFOREHAND = (
 )
 """Packages that tests need, imported once: each run of tests is a fork of this process."""
 
-KEEPS = "archfem.compiled"
+KEEPS = "archfem._numba"
 """Module of archfem whose caches are of no physics: it chooses a place on disk once."""
 
 Reached = dict[str, tuple[float, list[list[str | int]]]]

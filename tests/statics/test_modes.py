@@ -12,7 +12,7 @@ from glued import glued
 from scipy.linalg import eigh
 
 import archfem as af
-from archfem.statics.modes import _sense, modes
+from archfem.statics.modes import _shape_signs, modes
 
 GRAVITY = 9.81
 DENSITY = 2000.0
@@ -204,5 +204,5 @@ def test_modes_in_a_line():
 def test_shapes_have_the_sense_in_which_they_follow_the_ground(along, sense):
     """From a thousandth of the mass on, along x before y."""
     shape = np.array([[0.49], [-0.51], [1.0]])
-    assert _sense(shape, np.array([along]), np.ones(2)).tolist() == [sense]
-    assert _sense(-shape, np.array([[0.0, 0.0]]), np.ones(2)).tolist() == [1.0]
+    assert _shape_signs(shape, np.array([along]), np.ones(2)).tolist() == [sense]
+    assert _shape_signs(-shape, np.array([[0.0, 0.0]]), np.ones(2)).tolist() == [1.0]

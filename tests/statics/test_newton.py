@@ -6,13 +6,13 @@ from glued import glued
 from scipy import sparse
 
 import archfem as af
-from archfem.statics.newton import Newton, Solver
+from archfem.statics.newton import EquilibriumSolver, Newton
 
 
 def test_a_kink_is_solved_exactly():
     """k <x>_- = -1 from an open start: one step back to closed, one onto the answer."""
     matrices = {closed: sparse.csr_matrix([[2.0 if closed else 1e-3]]) for closed in (True, False)}
-    solver = Solver(1)
+    solver = EquilibriumSolver(1)
     solved = solver.solve(
         lambda x: np.where(x < 0.0, 2.0, 1e-3) * x + 1.0,
         lambda x: matrices[bool(x[0] < 0.0)],
@@ -52,7 +52,7 @@ def test_an_error_within_a_solve_is_not_swallowed(error):
         return q + 1.0
 
     with pytest.raises(type(error)):
-        Solver(1).solve(residual, lambda q: sparse.csr_matrix([[1.0]]), np.zeros(1), 1.0)
+        EquilibriumSolver(1).solve(residual, lambda q: sparse.csr_matrix([[1.0]]), np.zeros(1), 1.0)
 
 
 def test_rounding_is_that_of_the_stiffest_coordinate():
@@ -63,7 +63,10 @@ def test_rounding_is_that_of_the_stiffest_coordinate():
     load = np.array([1.0, 1e-3])
     for stiff, found in ((1e-3, True), (1e3, True), (1e12, False)):
         matrix = sparse.diags([1e-3, stiff]).tocsr()
-        solver, given = Solver(2), (lambda q, m=matrix: m @ q - load, lambda q, m=matrix: m)
+        solver, given = (
+            EquilibriumSolver(2),
+            (lambda q, m=matrix: m @ q - load, lambda q, m=matrix: m),
+        )
         if found:
             solved = solver.solve(*given, np.zeros(2), 1.0)
             assert solved.q == pytest.approx([1e3, 1e-3 / stiff])

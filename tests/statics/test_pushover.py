@@ -10,10 +10,15 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.limit.blocks import RigidBlocks
-from archfem.statics.ends import finished
-from archfem.statics.following import follow
-from archfem.statics.pushover import CONTROLS, Stop, _extrapolated, pushover
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.statics.pushover import (
+    PUSHOVER_CONTROLS,
+    Stop,
+    _extrapolate_limit,
+    follow,
+    pushover,
+    stop_reason,
+)
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 KEYSTONE = abs(RING.joints[8].extrados[0]) * (1.0 - 1e-9)
@@ -64,7 +69,7 @@ QUICK = [("force", "sideways"), ("displacement", "eccentric"), ("arc length", "t
     ("control", "load"),
     [
         pytest.param(*each, marks=() if each in QUICK else pytest.mark.slow)
-        for each in product(CONTROLS, LOADS)
+        for each in product(PUSHOVER_CONTROLS, LOADS)
     ],
 )
 def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
@@ -322,18 +327,18 @@ def test_a_limit_is_extrapolated_from_the_last_doubling():
     """Of a curve that is λ - C d^-1/2: exact; flat to a millionth, or too steep, by hand."""
     moved = np.concatenate([[0.0], np.geomspace(1e-6, 1e-3, 40)])
     factors = np.concatenate([[0.0], 0.3 - 1e-5 * moved[1:] ** -0.5])
-    found, off = _extrapolated(moved, factors)
+    found, off = _extrapolate_limit(moved, factors)
     assert found == pytest.approx(0.3, rel=1e-9)
     assert off == pytest.approx(0.3 - factors[-1])
     for growth, flat in ((0.95e-6, True), (1.05e-6, False)):
         last = np.array([0.0, 0.1, 0.2, 0.2 / (1.0 - growth)])
-        found, off = _extrapolated(np.array([0.0, 1.0, 2.0, 4.0]), last)
+        found, off = _extrapolate_limit(np.array([0.0, 1.0, 2.0, 4.0]), last)
         assert bool(found == last[-1]) is flat
         assert off == pytest.approx(1e-6 * last[-1]) or not flat
     for share, known in ((0.19, True), (0.21, False)):
         root = 2.0**-0.5  # of the displacement half as large, which the last one lies beyond
         rise = share * (1.0 - root) / root
-        found, off = _extrapolated(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0 - rise, 1.0]))
+        found, off = _extrapolate_limit(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0 - rise, 1.0]))
         assert np.isfinite(found) == known
         assert off == pytest.approx(share) or not known
 
@@ -349,7 +354,7 @@ class Steps:
         self.unit, self.states, self.iterations = (1.0, 1.0), [0], [0]
         self.displacements, self.factors = np.zeros(1), [0.0]
         self.model = SimpleNamespace(structure=SimpleNamespace(size=1e9))
-        self.resisted = []
+        self.joint_forces = []
 
     def advance(self, border, distance):
         self.asked.append(distance)
@@ -386,18 +391,20 @@ def test_rules_end_a_path_where_they_are_met():
     path.model.structure.size = 5.0
     path.states = [0, 0]  # that of the dead load, and one step
     even = np.array([1.0, 1.0])
-    assert finished(path, Stop(displacement=0.101), criteria, even) is None
-    assert finished(path, Stop(displacement=0.099), criteria, even) == "the load moved by 0.5 m"
+    assert stop_reason(path, Stop(displacement=0.101), criteria, even) is None
+    assert stop_reason(path, Stop(displacement=0.099), criteria, even) == "the load moved by 0.5 m"
     for slope, ends in ((0.98e-6, True), (-0.98e-6, True), (1.02e-6, False)):
-        said = finished(path, Stop(displacement=1.0), criteria, np.array([1.0, slope]))
+        said = stop_reason(path, Stop(displacement=1.0), criteria, np.array([1.0, slope]))
         assert (said is not None) is ends
-    assert finished(path, Stop(displacement=1.0, steps=2), criteria, even) is None
+    assert stop_reason(path, Stop(displacement=1.0, steps=2), criteria, even) is None
     path.states.append(0)
-    assert finished(path, Stop(displacement=1.0, steps=2), criteria, even) == "2 steps were taken"
+    assert (
+        stop_reason(path, Stop(displacement=1.0, steps=2), criteria, even) == "2 steps were taken"
+    )
     path.factors = [0.0, -1e-9]
-    assert finished(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
+    assert stop_reason(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
     path.units = "N m"
-    assert finished(path, Stop(displacement=1.0), criteria, even) is None
+    assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None
 
 
 def test_arc_length_goes_on_in_the_direction_of_the_last_step():

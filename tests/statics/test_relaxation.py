@@ -1,4 +1,6 @@
-"""Structures that creep to rest, and soil joints that slide under dead load."""
+"""Relaxation to equilibrium, soil joints that slide under dead load, and irreversible joints."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,10 +8,11 @@ from scipy import sparse
 
 import archfem as af
 from archfem.joints.resultants import joint_dataset
+from archfem.statics import relaxation
+from archfem.statics.continuation import LoadPath
 from archfem.statics.equilibrium import self_weight
-from archfem.statics.newton import Solved, Solver
-from archfem.statics.path import LoadPath
-from archfem.statics.relaxation import _crept, relaxed
+from archfem.statics.newton import EquilibriumSolver, Solution
+from archfem.statics.relaxation import _solve_creep_step, relax
 
 REST = 1e-10
 """Out of balance relative to the load, to which equilibria are found."""
@@ -41,7 +44,7 @@ def at_most_coulomb(structure, joints, cohesion=0.0):
 def test_where_nothing_slides_creep_ends_where_newton_does(stack):
     model = af.build(stack, fidelity="rigid")
     weight = self_weight(model)
-    after, solved = relaxed(Solver(model.size), model, weight, np.zeros(model.size))
+    after, solved = relax(EquilibriumSolver(model.size), model, weight, np.zeros(model.size))
     direct = af.dead_load(model)
     assert solved.q == pytest.approx(direct.q, rel=1e-6, abs=1e-15)
     assert not after.memory.any()
@@ -62,7 +65,7 @@ def test_a_block_that_flows_down_a_plane_is_given_up_soon():
     bed = af.Joint((0, 1), *block.outline[:2], af.Contact(1e10, 4e9, 0.2), "bed", role="pier")
     model = af.build(af.Structure((plane, block), (bed,)), fidelity="rigid")
     with pytest.raises(af.DidNotConverge, match=r"in 13 steps of creep: 1\.08e\+03 of 1\.00e\+04"):
-        relaxed(Solver(model.size), model, self_weight(model), np.zeros(model.size))
+        relax(EquilibriumSolver(model.size), model, self_weight(model), np.zeros(model.size))
 
 
 @pytest.mark.parametrize("fidelity", ["faces", "full"])
@@ -118,32 +121,34 @@ def test_a_load_on_fill_in_pieces_goes_on_by_creep(bridge):
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=35.0, cohesion=10e3)
     dead = af.dead_load(af.build(fill, fidelity="rigid", cells=(2, 1)))
     path = LoadPath.of(dead.model, [af.BodyForce(1.0)], dead)
-    assert path.creep(0.1, farthest=0.5)
+    assert path.advance_by_relaxation(0.1, farthest=0.5)
     rest = path.dead + 0.1 * path.load.first - path.model.force(path.states[-1])
     assert np.linalg.norm(rest) <= REST * np.abs(path.dead).sum()
-    joints = joint_dataset(fill, path.resisted[-1])
+    joints = joint_dataset(fill, path.joint_forces[-1])
     assert at_most_coulomb(fill, joints, 10e3)
-    assert not path.creep(0.01, farthest=1e-6)  # it moves farther than that
+    assert not path.advance_by_relaxation(0.01, farthest=1e-6)  # it moves farther than that
     assert path.factors == [0.0, 0.1]
 
 
 def counting(monkeypatch):
     """How many iterations each solve has made, as a list that grows."""
-    made, solve = [], Solver.solve
+    made, solve = [], EquilibriumSolver.solve
 
     def counted(solver, *given, **more):
         solved = solve(solver, *given, **more)
         made.append(solved.iterations)
         return solved
 
-    monkeypatch.setattr(Solver, "solve", counted)
+    monkeypatch.setattr(EquilibriumSolver, "solve", counted)
     return made
 
 
 def test_iterations_that_are_told_are_those_made(stack, ring, monkeypatch):
     """By creep, under dead load at once and in stages, on a support that moves, and by a push."""
     model, made = af.build(stack, fidelity="rigid"), counting(monkeypatch)
-    _, solved = relaxed(Solver(model.size), model, self_weight(model), np.zeros(model.size))
+    _, solved = relax(
+        EquilibriumSolver(model.size), model, self_weight(model), np.zeros(model.size)
+    )
     assert solved.iterations == sum(made) > 0
     for stages in (None, af.masonry.usual_stages(stack)):
         made.clear()
@@ -163,12 +168,14 @@ def test_where_newton_fails_a_step_of_creep_is_made_with_given_limits(stack, mon
         asked.append((starts, searches, getattr(model, "operator", model)))
         if len(asked) == 1:
             raise af.DidNotConverge("made to fail")
-        return Solved(starts[1] + 1.0, len(asked), 0.5)
+        return Solution(starts[1] + 1.0, len(asked), 0.5)
 
-    monkeypatch.setattr("archfem.statics.relaxation._dragged", dragged)
+    monkeypatch.setattr("archfem.statics.relaxation._solve_with_drag", dragged)
     model = af.build(stack, fidelity="rigid")
     load, start = self_weight(model), np.zeros(model.size)
-    solved = _crept(Solver(model.size), model, load, start, model.closed())
+    solved = _solve_creep_step(
+        EquilibriumSolver(model.size), model, load, start, model.closed_tangent()
+    )
     assert solved.iterations == sum(range(2, 8))
     assert [float(guess[0]) for (_, guess), _, _ in asked] == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     assert all(not first.any() for (first, _), _, _ in asked)
@@ -184,16 +191,16 @@ class Creeping:
     def __init__(self, part, left=1.0):
         self.part, self.left = part, left
 
-    def closed(self):
+    def closed_tangent(self):
         return sparse.csr_matrix([[1.0]])
 
     def tangent(self, q):
         return sparse.csr_matrix([[0.0]])
 
-    def remembered(self, q):
+    def updated_memory(self, q):
         return self.left * (1.0 - self.part)
 
-    def remembering(self, left):
+    def with_memory(self, left):
         return Creeping(self.part, left)
 
     def force(self, q):
@@ -210,14 +217,14 @@ def drags(monkeypatch):
         taken = iterations.pop(0) if len(iterations) > 1 else iterations[0]
         if taken is None:
             raise af.DidNotConverge("made to fail")
-        return Solved(start, taken, 0.0)
+        return Solution(start, taken, 0.0)
 
-    monkeypatch.setattr("archfem.statics.relaxation._crept", crept)
+    monkeypatch.setattr("archfem.statics.relaxation._solve_creep_step", crept)
     return asked, iterations
 
 
 def creep(part):
-    return relaxed(Solver(1), Creeping(part), np.ones(1), np.zeros(1))
+    return relax(EquilibriumSolver(1), Creeping(part), np.ones(1), np.zeros(1))
 
 
 def test_drag_falls_after_easy_steps_and_grows_after_failed_ones(drags):
@@ -243,3 +250,79 @@ def test_creep_goes_on_while_what_is_left_halves_in_twelve_steps(drags, part, st
         creep(part)
     assert len(asked) == steps
     assert f"{(1.0 - part) ** steps:.2e} of 1.00e+00 stays" in str(caught.value)
+
+
+UPSET = SimpleNamespace(points=SimpleNamespace(is_plain=False), bonds=None)
+"""Joints that dilate."""
+
+
+class Toothed:
+    """A model whose joints slide on by so much at each equilibrium."""
+
+    force = tangent = None
+
+    def __init__(self, further, memory=0.0, operator=UPSET):
+        self.further, self.memory, self.operator = further, np.array([memory, 0.0]), operator
+
+    def updated_memory(self, q):
+        return float(self.memory[0]) + self.further
+
+    def with_memory(self, memory):
+        return Toothed(self.further, memory, self.operator)
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """Numbers of iterations by which equilibria are found, one after the other."""
+    made = []
+
+    def balanced(solver, model, load, start, searches):
+        return Solution(start + 1.0, made.pop(0), 0.25)
+
+    monkeypatch.setattr(relaxation, "_solve_balance", balanced)
+    return made
+
+
+def test_an_equilibrium_is_sought_until_it_is_in_balance_as_it_was_left(found):
+    found += [3, 2, 0, 7]
+    model, solved = relaxation.solve_irreversible(None, Toothed(-0.1), np.zeros(2), np.zeros(2))
+    assert (solved.iterations, solved.residual) == (5, 0.25)
+    assert solved.q.tolist() == [3.0, 3.0]
+    assert model.memory[0] == pytest.approx(-0.2)
+    assert found == [7]
+
+
+def test_the_first_may_be_in_balance_by_chance(found):
+    """What its joints then remember is looked at all the same."""
+    found += [0, 0]
+    _, solved = relaxation.solve_irreversible(None, Toothed(0.0), np.zeros(2), np.zeros(2))
+    assert solved.q.tolist() == [2.0, 2.0]
+
+
+def test_joints_that_only_slide_are_in_balance_at_once(found):
+    found += [4]
+    plain = SimpleNamespace(points=SimpleNamespace(is_plain=True))
+    model, solved = relaxation.solve_irreversible(
+        None, Toothed(0.5, 0.0, plain), np.zeros(2), np.zeros(2)
+    )
+    assert (solved.iterations, model.memory[0]) == (4, 0.5)
+
+
+def test_joints_that_never_stop_are_given_up(found, monkeypatch):
+    monkeypatch.setattr(relaxation, "MAX_IRREVERSIBLE_ITERATIONS", 3)
+    found += [1] * 3
+    with pytest.raises(
+        af.DidNotConverge, match=r"in 3 rounds under the same load, by 0\.3 m in the"
+    ):
+        relaxation.solve_irreversible(None, Toothed(-0.3), np.zeros(2), np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("felt", "iterations", "stays"), [(0.1, 0, False), (-0.1, 0, True), (-0.1, 1, False)]
+)
+def test_a_bond_that_is_torn_does_not_last(felt, iterations, stays):
+    bonds = SimpleNamespace(exceeded=lambda gaps: gaps > 0.0)
+    joints = SimpleNamespace(bonds=bonds, effective_gaps=lambda q: np.array([-1.0, felt]))
+    assert (
+        relaxation.is_stationary(SimpleNamespace(operator=joints), np.zeros(2), iterations) is stays
+    )

@@ -4,16 +4,21 @@ import pytest
 
 PETSc = pytest.importorskip("petsc4py.PETSc")
 
-from archfem.statics.attempts import NO_NUMBER, NO_WAY_DOWN, SINGULAR, TOO_MANY  # noqa: E402
-from archfem.statics.snes import _REASONS  # noqa: E402
+from archfem.statics.newton_iteration import (  # noqa: E402
+    LINE_SEARCH_FAILED,
+    NOT_A_NUMBER,
+    SINGULAR_TANGENT,
+    TOO_MANY_ITERATIONS,
+)
+from archfem.statics.snes import _FAILURE_MESSAGES  # noqa: E402
 
 
 def test_reasons_are_those_of_petsc():
     """Its own names for the numbers that it gives."""
     known = PETSc.SNES.ConvergedReason
-    assert _REASONS == {
-        known.DIVERGED_LINEAR_SOLVE: SINGULAR,
-        known.DIVERGED_FNORM_NAN: NO_NUMBER,
-        known.DIVERGED_MAX_IT: TOO_MANY,
-        known.DIVERGED_LINE_SEARCH: NO_WAY_DOWN,
+    assert _FAILURE_MESSAGES == {
+        known.DIVERGED_LINEAR_SOLVE: SINGULAR_TANGENT,
+        known.DIVERGED_FNORM_NAN: NOT_A_NUMBER,
+        known.DIVERGED_MAX_IT: TOO_MANY_ITERATIONS,
+        known.DIVERGED_LINE_SEARCH: LINE_SEARCH_FAILED,
     }

@@ -114,8 +114,8 @@ def study_file(ring_file, finders):
     """A study of six points, one of which fails."""
     path = ring_file.with_name("study.toml")
     path.write_text(
-        'title = "six rings"\ncase = "ring.toml"\nfind = "finders_of_tests:lengths"\n'
-        "[over]\nstructure.thickness = [0.5, 0.6, 1.0]\nmotion.scale = [1.0, 2.0]\n"
+        'title = "six rings"\ncase = "ring.toml"\ncompute = "finders_of_tests:lengths"\n'
+        "[vary]\nstructure.thickness = [0.5, 0.6, 1.0]\nmotion.scale = [1.0, 2.0]\n"
     )
     return path
 

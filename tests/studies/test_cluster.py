@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 import archfem as af
-from archfem.studies.store import Store
+from archfem.studies.result_store import Store
 
 distributed = pytest.importorskip("distributed")
 
@@ -69,7 +69,7 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
 
 
 def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
-    monkeypatch.setattr("archfem.studies.cluster.package_version", lambda: "9.9.9")
+    monkeypatch.setattr("archfem.studies.cluster.describe_version", lambda: "9.9.9")
     with pytest.raises(
         af.InvalidInput, match=r"a worker runs archfem .*, this is 9\.9\.9: install"
     ):
@@ -119,11 +119,11 @@ def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp
             if processes[0].poll() is None and len(self.digests()) >= 3:
                 processes[0].kill()
 
-        monkeypatch.setattr(Store, "keep", keep)
+        monkeypatch.setattr(Store, "store_impulses", keep)
         with pytest.raises(af.errors.StudyStopped, match="scheduler was lost"):
             study.run(folder, client=address)
     assert 3 <= len(Store(folder).digests()) < 12
-    monkeypatch.setattr(Store, "keep", original)
+    monkeypatch.setattr(Store, "store_impulses", original)
     assert study.run(folder, workers=1).identical(study.run(workers=1))
 
 

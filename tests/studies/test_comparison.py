@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.compared import compared
+from archfem.studies.comparison_run import compared
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -27,7 +27,7 @@ def study(tmp_path):
     """Two rings, one of them thin, under one short motion."""
     path = tmp_path / "study.toml"
     path.write_text(
-        'title = "two rings"\nscales = { precision = 0.2, between = [0.3, 2.0] }\n'
+        'title = "two rings"\nscales = { precision = 0.2, range = [0.3, 2.0] }\n'
         'pairs = ["pair-1"]\n[cases]\n'
         f'"thick" = {{ case = "{MESHES}/ring_suite.toml" }}\n'
         f'"thin" = {{ case = "{MESHES}/ring_suite.toml", set = ["structure.thickness=0.4"] }}\n'
@@ -45,9 +45,9 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
     asked = af.studies.Comparison.read(study, QUICK)
     found = dict(compared(asked, tmp_path / "out"))
     case = af.Case.read(MESHES / "ring_suite.toml", QUICK)
-    dead = af.cases.at_rest(case)
+    dead = af.cases.dead_load_of_case(case)
     (motion,) = (m for m in case.ground_suite().motions if m.name == "pair-1")
-    run = af.cases.shaken(case, motion, dead)
+    run = af.cases.run_time_history(case, motion, dead)
     largest = float(abs(run.joints["eccentricity"]).max())
     assert found["thick"].runs["pair-1"]["eccentricity"]["arch"] == pytest.approx(largest)
     assert found["thick"].dead["arch"] == pytest.approx(
@@ -76,7 +76,7 @@ def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
         ('set = "analysis.dt=0.01"', "study.set = .* is not a list"),
         ('[cases."a"]\ncase = "a.toml"\nsets = []', "unknown key 'cases.a.sets'"),
         (f'pairs = ["pair-1", "pair-9"]\n{CASE}', r"no case has the pairs \['pair-9'\]"),
-        (f"scales = {{ between = [1.0] }}\n{CASE}", "scales.between = .* least and the largest"),
+        (f"scales = {{ range = [1.0] }}\n{CASE}", "scales.range = .* least and the largest"),
         (f"scales = {{ precisions = 0.1 }}\n{CASE}", "unknown key 'scales.precisions'"),
         (f"{CASE}\n{CASE.replace('a b', 'a/b')}", "'a b' names a file of results too"),
     ],
@@ -90,7 +90,7 @@ def test_studies_that_cannot_be_meant(text, says, tmp_path):
 
 
 def interrupted_run(*given, **options):
-    history = af.cases.shaken(*given, **options)
+    history = af.cases.run_time_history(*given, **options)
     history.dataset.attrs["ended"] = "interrupted"
     return history
 
@@ -101,10 +101,11 @@ def interrupted_search(*given, **options):
 
 
 @pytest.mark.parametrize(
-    ("name", "instead"), [("shaken", interrupted_run), ("mechanism_scales", interrupted_search)]
+    ("name", "instead"),
+    [("run_time_history", interrupted_run), ("mechanism_scales", interrupted_search)],
 )
 def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, name, instead):
-    monkeypatch.setattr(f"archfem.studies.finders.{name}", instead)
+    monkeypatch.setattr(f"archfem.studies.evaluators.{name}", instead)
     folder = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         dict(compared(af.studies.Comparison.read(study, QUICK), folder))

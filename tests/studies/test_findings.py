@@ -2,7 +2,7 @@
 
 import json
 
-from archfem.studies.findings import Finding, study_table, write
+from archfem.studies.comparison import Finding, study_table, write
 
 DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
 

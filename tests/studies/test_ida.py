@@ -5,8 +5,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.studies.ida import ida
-from archfem.studies.intensity import intensities
+from archfem.studies.ida import ida, intensities
 
 
 def made(count):
@@ -42,11 +41,11 @@ def test_brackets_hold_what_runs_at_their_ends_do(small_ida):
     case, _, found = small_ida
     assert found.limits == ("first hinge", "four failures", "verified")
     motion = af.Motion.synthetic(seed=2, duration=0.6, pga=9.0)
-    dead = af.cases.at_rest(case)
+    dead = af.cases.dead_load_of_case(case)
     for limit, key in (("four failures", "any four joints"), ("verified", "verified")):
         for end, met in ((f"{limit}, survives", False), (limit, True)):
             scale = float(found.table[end].sel(motion="seed 2"))
-            run = af.cases.shaken(case, motion.scaled(scale), dead)
+            run = af.cases.run_time_history(case, motion.scaled(scale), dead)
             assert (af.first_mechanisms(run)[key] is not None) == met
     for limit in found.limits:
         low, high = found.capacities(limit)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.inputs import inputs_digest
-from archfem.cases.structures import structure_of
-from archfem.dynamics.scales import mechanism_scales
+from archfem.cases.provenance import hash_inputs
+from archfem.cases.structure_keys import cached_structure
+from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.schemes import StiffnessDamping
-from archfem.dynamics.stepping import loop
-from archfem.dynamics.stepping.equation import Equation
+from archfem.dynamics.solvers import base
+from archfem.dynamics.solvers.equation import Equation
 from archfem.models.discretisation import Discretisation
-from archfem.studies import memory
-from archfem.studies.steppers import Ready
+from archfem.studies import cache
+from archfem.studies.cache import Ready
 
 DT = 0.005
 
@@ -39,7 +39,7 @@ def case(**changes):
 
 @pytest.fixture(scope="module")
 def rest():
-    return memory.resting(case())
+    return cache.dead_load_of(case())
 
 
 def same(first, second):
@@ -53,47 +53,46 @@ def same(first, second):
 def test_a_stepper_of_shared_matrices_gives_the_run_of_one_of_its_own_whatever_ran_before(rest):
     dead, damping = rest.dead, StiffnessDamping(0.05, 9.0)
     weak, strong = (af.Motion.synthetic(duration=1.5, pga=pga, seed=2) for pga in (2.0, 7.0))
-    equation = Equation(dead.continued(dead.model), weak, damping)
-    start = equation.at_rest(dead.q, memory=dead.model.memory)
+    equation = Equation(dead.transfer_memory(dead.model), weak, damping)
 
     def run(motion, method):
         return af.time_history(
             dead.model, motion, dt=DT, start=dead, damping=damping, method=method
         )
 
-    alone = [run(motion, "compliance") for motion in (weak, strong)]
-    compiled = len(loop.advance.signatures)
-    ready = Ready.of(equation, start, DT)
+    alone = [run(motion, "auto") for motion in (weak, strong)]
+    compiled = len(base.advance.signatures)
+    ready = Ready.of(equation)
     for order in ((0, 1), (1, 0), (1, 1)):
         for number in order:
             found = run((weak, strong)[number], ready.under((weak, strong)[number]))
             assert same(found, alone[number])
     assert not same(*alone)
-    assert len(loop.advance.signatures) == compiled  # copies are of the types of what was made
+    assert len(base.advance.signatures) == compiled  # copies are of the types of what was made
 
 
 def test_a_search_by_shared_matrices_finds_what_one_by_fresh_ones_does(rest):
     motion = af.Motion.synthetic(duration=1.5, pga=3.0, seed=2)
     given = {"start": rest.dead, "damping": rest.damping[0], "dt": DT, "precision": 0.3}
     given["between"] = (0.5, 2.0)
-    alone = mechanism_scales(rest.dead.model, motion, method="compliance", **given)
-    shared = partial(memory.stepper_of, rest)
+    alone = mechanism_scales(rest.dead.model, motion, **given)
+    shared = partial(cache.stepper_of, rest)
     assert mechanism_scales(rest.dead.model, motion, method=shared, **given).runs == alone.runs
 
 
 def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatch):
     made, synthetic = [], af.Motion.synthetic
-    monkeypatch.setattr(memory, "_kept", {})
+    monkeypatch.setattr(cache, "_kept", {})
     monkeypatch.setattr(
         af.Motion, "synthetic", lambda **given: made.append(given) or synthetic(**given)
     )
     cases = [case(motion__scale=scale) for scale in (0.3, 1.7)]
-    found = [memory.ground_motion(each) for each in cases]
+    found = [cache.ground_motion(each) for each in cases]
     assert len(made) == 1
     for each, motion in zip(cases, found, strict=True):
         assert motion.horizontal.tobytes() == each.ground_motion().horizontal.tobytes()
         assert motion.vertical.tobytes() == each.ground_motion().vertical.tobytes()
-    turned = memory.ground_motion(case(motion__reversed=True))
+    turned = cache.ground_motion(case(motion__reversed=True))
     assert np.array_equal(turned.horizontal, -synthetic(**made[0]).horizontal)
 
 
@@ -117,13 +116,13 @@ def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
 
     monkeypatch.setattr(af.Suite, "matched", matched)
     own = [each.ground_suite().motions[0] for each in cases]
-    monkeypatch.setattr(memory, "_kept", {})
+    monkeypatch.setattr(cache, "_kept", {})
     met.clear()
     for each, motion in zip(cases, own, strict=True):
-        assert memory.ground_motion(each).horizontal.tobytes() == motion.horizontal.tobytes()
+        assert cache.ground_motion(each).horizontal.tobytes() == motion.horizontal.tobytes()
     assert len(met) == 1
     settings["suite"]["target"]["ss"] = 1.2
-    memory.ground_motion(af.Case.of(settings))
+    cache.ground_motion(af.Case.of(settings))
     assert len(met) == 2
 
 
@@ -137,32 +136,32 @@ def test_a_structure_is_made_once_and_again_where_anything_of_it_differs(tmp_pat
     for height in (1.0, 1.5):
         drawing = af.column(breadth=0.6, heights=[height])
         af.masonry.write_outlines(drawing, path)
-        assert structure_of(settings, tmp_path).weight == pytest.approx(drawing.weight)
+        assert cached_structure(settings, tmp_path).weight == pytest.approx(drawing.weight)
 
 
 def test_cases_differ_where_their_arches_stand_in_another_order():
     piers = {"first": {"height": "1 m"}, "second": {"height": "2 m"}}
     turned = dict(reversed(piers.items()))
     digests = {
-        inputs_digest({"structure": {"piers": each, "width": 1.0}}) for each in (piers, turned)
+        hash_inputs({"structure": {"piers": each, "width": 1.0}}) for each in (piers, turned)
     }
     assert len(digests) == 2
     same = {"structure": {"width": 1.0, "piers": piers}}
-    assert inputs_digest(same) in digests  # where a number stands says nothing
+    assert hash_inputs(same) in digests  # where a number stands says nothing
 
 
 def test_a_mesh_serves_other_materials_and_no_other_shape():
     pytest.importorskip("dolfinx")
-    from archfem.models.fem.meshes import mesh_of
+    from archfem.models.fem.mesh import cached_mesh
 
     asked = Discretisation("full", (2, 2))
     stiff, soft = (
         af.column(breadth=0.6, heights=[1.0], contact=af.Contact(stiffness, 3e8, 0.6, "joint"))
         for stiffness in (1e9, 2e9)
     )
-    first, again = mesh_of(stiff, asked), mesh_of(soft, asked)
+    first, again = cached_mesh(stiff, asked), cached_mesh(soft, asked)
     assert first.grid is again.grid
     assert again.structure is soft
     wider = af.column(breadth=0.7, heights=[1.0])
-    assert mesh_of(wider, asked).grid is not first.grid
-    assert mesh_of(stiff, Discretisation("full", (3, 2))).grid is not first.grid
+    assert cached_mesh(wider, asked).grid is not first.grid
+    assert cached_mesh(stiff, Discretisation("full", (3, 2))).grid is not first.grid

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.studies import nursery, processes
+from archfem.studies import process_pool
 
 
 def lives(process):
@@ -43,7 +43,7 @@ def study_of(case, find, thicknesses, folder):
 def test_how_workers_end_is_told_and_nothing_is_inherited(
     small_ring, tmp_path, finders, monkeypatch
 ):
-    monkeypatch.setattr(processes, "ATTEMPTS", 2)
+    monkeypatch.setattr(process_pool, "ATTEMPTS", 2)
     thicknesses = [0.5, 0.6, 0.7, 0.8, 0.81, 0.82, 0.83]
     study = study_of(small_ring, "ending", thicknesses, tmp_path)
     found = study.run(tmp_path / "out", workers=2)
@@ -64,8 +64,8 @@ def test_how_workers_end_is_told_and_nothing_is_inherited(
 
 
 def test_a_study_outlives_its_nursery(small_ring, tmp_path, finders, monkeypatch):
-    cold = "from archfem.studies import nursery as n; n.warm = lambda: None; n.tend({})"
-    monkeypatch.setattr(nursery, "TEND", cold)  # these points need nothing that is compiled
+    cold = "from archfem.studies import process_pool as n; n.preload = lambda: None; n.tend({})"
+    monkeypatch.setattr(process_pool, "TEND", cold)  # these points need nothing that is compiled
     thicknesses = [0.5, 0.6, 0.7, 0.8]
     found = study_of(small_ring, "orphaned", thicknesses, tmp_path).run(workers=2)
     assert found["error"].values.tolist() == 4 * [""]
@@ -76,8 +76,8 @@ def test_a_study_outlives_its_nursery(small_ring, tmp_path, finders, monkeypatch
 
 
 def test_what_cannot_be_begun_fails_in_the_end(small_ring, tmp_path, finders, monkeypatch):
-    monkeypatch.setattr(processes, "NURSERIES", 2)
-    monkeypatch.setattr(nursery, "TEND", "raise SystemExit({})")
+    monkeypatch.setattr(process_pool, "NURSERIES", 2)
+    monkeypatch.setattr(process_pool, "TEND", "raise SystemExit({})")
     usual = signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as gmsh leaves it
     try:
         found = study_of(small_ring, "ending", [0.5, 0.6, 0.7], tmp_path).run(workers=2)

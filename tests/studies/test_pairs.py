@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.pairs import run_pairs
+from archfem.studies.comparison_run import run_pairs
 
 
 def histories(case, folder):
     """Runs of a case by pair."""
-    found = af.cases.carried_out(case, folder)
+    found = af.cases.run_case(case, folder)
     return {run.motion.name: run for run in found if isinstance(run, af.cases.Run)}
 
 
@@ -18,7 +18,7 @@ def test_pairs_are_kept_where_they_are_looked_for(small, tmp_path, workers):
     case = af.Case.read(small)
     assert run_pairs(case, tmp_path / "out", workers=workers) == ["finished", "finished"]
     there, alone = histories(case, tmp_path / "out"), histories(case, tmp_path / "alone")
-    assert [run.kept for run in there.values()] == [True, True]
+    assert [run.reused for run in there.values()] == [True, True]
     for name, run in alone.items():
         ours, theirs = (each.history.joints["N"].values for each in (there[name], run))
         assert np.abs(ours - theirs).max() <= 1e-6 * np.abs(theirs).max()

@@ -3,7 +3,7 @@
 import pytest
 
 import archfem as af
-from archfem.studies.stiffness import _normal
+from archfem.studies.joint_stiffness import _normal
 from archfem.units import MPa, mm
 
 

@@ -12,12 +12,11 @@ import xarray as xr
 from scipy import stats
 
 import archfem as af
-from archfem.cases import inputs
-from archfem.studies.asking import Asked
-from archfem.studies.over import axes_over
-from archfem.studies.points import by_model
-from archfem.studies.processes import Tasks
-from archfem.studies.store import Store
+from archfem.cases import provenance
+from archfem.studies.evaluators import Evaluator
+from archfem.studies.parameter_space import by_model, parameter_axes
+from archfem.studies.process_pool import TaskQueue
+from archfem.studies.result_store import Store
 
 
 @pytest.fixture
@@ -34,7 +33,7 @@ def test_a_study_finds_of_each_point_what_its_case_does_alone(small_ring, tmp_pa
     changes = ["structure.thickness=0.5", "motion.scale=2.0"]
     case = af.Case.read(small_ring.folder / "ring.toml", changes)
     alone = af.studies.of_history(
-        af.cases.shaken(case, case.ground_motion(), af.cases.at_rest(case))
+        af.cases.run_time_history(case, case.ground_motion(), af.cases.dead_load_of_case(case))
     )
     there = found.sel({"structure.thickness": 0.5, "motion.scale": 2.0})
     for name in ("eccentricity", "rotation", "verified", "largest_displacement"):
@@ -126,7 +125,7 @@ def test_a_changed_case_is_told_apart(
         module.write_text(source.replace("0.9", "0.8"))
         undo.callback(module.write_text, source)
     elif what == "program":
-        monkeypatch.setattr(inputs, "_modules_digest", lambda: "another")
+        monkeypatch.setattr(provenance, "_hash_modules", lambda: "another")
     elif what == "option":
         study_file.write_text(study_file.read_text().replace("tests:lengths", "tests:slowly"))
     else:
@@ -203,7 +202,7 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
         "motion.scale": [1.0, 2.0],
     }
     told = {"count": 256, "method": method, "seed": 4}
-    axes = axes_over(over, told)
+    axes = parameter_axes(over, told)
     assert [axis.name for axis in axes] == ["motion.scale", "sample"]
     assert axes[1].keys == ("structure.thickness", "analysis.damping.ratio")
     thickness, ratio = np.array(axes[1].rows).T
@@ -211,8 +210,8 @@ def test_samples_have_their_distribution_and_their_seed(small_ring, method):
     assert np.median(ratio) == pytest.approx(0.05, rel=0.01)
     assert np.log(ratio).std() == pytest.approx(0.3, rel=0.02)
     assert abs(np.corrcoef(thickness, ratio)[0, 1]) < 0.1
-    assert axes_over(over, told)[1].rows == axes[1].rows
-    assert axes_over(over, told | {"seed": 5})[1].rows != axes[1].rows
+    assert parameter_axes(over, told)[1].rows == axes[1].rows
+    assert parameter_axes(over, told | {"seed": 5})[1].rows != axes[1].rows
     study = af.Study.of(small_ring, over, "dead load", samples=told)
     assert len(study.points) == 512
 
@@ -229,36 +228,36 @@ def test_points_may_be_listed(small_ring):
 def test_a_study_goes_over_pairs_of_a_suite(small):
     case = af.Case.read(small)
     found = af.Study.of(case, {"suite.pair": ["first", "second"]}).run(workers=1)
-    run = af.cases.shaken(
-        case, case.alone("second").ground_suite().motions[0], af.cases.at_rest(case)
+    run = af.cases.run_time_history(
+        case, case.alone("second").ground_suite().motions[0], af.cases.dead_load_of_case(case)
     )
     alone = af.studies.of_history(run)["eccentricity"]
     assert float(found["eccentricity"].sel({"suite.pair": "second"})) == pytest.approx(
         alone, rel=1e-6
     )
     assert (
-        af.Study.of(case, {"model.points": [3]})
+        af.Study.of(case, {"model.quadrature_points": [3]})
         .run()["error"]
         .item()
         .startswith("InvalidInput: the suite has 2 pairs")
     )
 
 
-GOOD = 'case = "ring.toml"\nfind = "dead load"\n'
-RANDOM = "over.structure.thickness = { distribution = 'norm', loc = 0.5, scale = 0.01 }\n"
+GOOD = 'case = "ring.toml"\ncompute = "dead load"\n'
+RANDOM = "vary.structure.thickness = { distribution = 'norm', loc = 0.5, scale = 0.01 }\n"
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (GOOD, "says nothing of over"),
-        ("over.structure.thickness = [0.5]", "says nothing of case"),
-        (f"{GOOD}over.structure.thicknes = [0.5]", "did you mean 'thickness'"),
-        (f"{GOOD}over.structure.thickness = []", "thickness is empty: a product"),
-        (f"{GOOD}over = []", "lists no points"),
-        (f"{GOOD}over = {{}}", "give a table of keys"),
-        (f"{GOOD}over.structure.thickness = 0.5", "give a list of values, or a distribution"),
-        (f"{GOOD}over.structure.thickness = [0.5, -0.5]", "thickness = -0.5 is no case"),
+        (GOOD, "says nothing of vary"),
+        ("vary.structure.thickness = [0.5]", "says nothing of case"),
+        (f"{GOOD}vary.structure.thicknes = [0.5]", "did you mean 'thickness'"),
+        (f"{GOOD}vary.structure.thickness = []", "thickness is empty: a product"),
+        (f"{GOOD}vary = []", "list of points is empty"),
+        (f"{GOOD}vary = {{}}", "varies nothing: give a table of keys"),
+        (f"{GOOD}vary.structure.thickness = 0.5", "give a list of values, or a distribution"),
+        (f"{GOOD}vary.structure.thickness = [0.5, -0.5]", "thickness = -0.5 is no case"),
         (f"{GOOD}{RANDOM}", "say how they are sampled"),
         (f"{GOOD}{RANDOM}samples = {{ count = 12, method = 'sobol' }}", "powers of 2 alone"),
         (f"{GOOD}{RANDOM}samples = {{ count = 8, method = 'halton' }}", "use one of"),
@@ -266,21 +265,21 @@ RANDOM = "over.structure.thickness = { distribution = 'norm', loc = 0.5, scale =
         (f"{GOOD}{RANDOM.replace('norm', 'nrm')}samples.count = 8", "no distribution 'nrm'"),
         (f"{GOOD}{RANDOM.replace('loc', 'mean')}samples.count = 8", "does not take"),
         (f"{GOOD}{RANDOM.replace('0.01', '-1.0')}samples.count = 8", "that are no numbers"),
-        (f"{GOOD}samples.count = 8\n[over]\nstructure.thickness = [0.5]", "over has none"),
+        (f"{GOOD}samples.count = 8\n[vary]\nstructure.thickness = [0.5]", "there are none"),
         (
-            f"{GOOD}samples.count = 16\n[over.contacts.'stone to stone']\nnormal_stiffness = "
+            f"{GOOD}samples.count = 16\n[vary.contacts.'stone to stone']\nnormal_stiffness = "
             "{ distribution = 'norm', loc = 1e9, scale = 1e9 }",
             "normal_stiffness = -.* is no case",
         ),
-        (f"{GOOD}over.suite.pair = ['a']", "has no \\[suite\\]"),
-        (f"{GOOD.replace('dead load', 'ded load')}over.title = ['a']", "did you mean 'dead load'"),
+        (f"{GOOD}vary.suite.pair = ['a']", "has no \\[suite\\]"),
+        (f"{GOOD.replace('dead load', 'ded load')}vary.title = ['a']", "did you mean 'dead load'"),
         (
-            f"{GOOD.replace('dead load', 'no_module:f')}over.title = ['a']",
+            f"{GOOD.replace('dead load', 'no_module:f')}vary.title = ['a']",
             "is code, which no file runs by itself",
         ),
         (
             f"{GOOD.replace(chr(34) + 'dead load' + chr(34), '{ name = chr, x = 1 }')}"
-            "over.title = ['a']",
+            "vary.title = ['a']",
             "is not TOML",
         ),
     ],
@@ -351,7 +350,7 @@ def test_points_of_one_model_are_taken_together(small_ring):
 def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
-    tasks = Tasks(points, Asked.of("dead load"))
+    tasks = TaskQueue(points, Evaluator.of("dead load"))
     first = tasks.next(None, set())
     other = tasks.next(None, {first.model})
     assert other.model != first.model

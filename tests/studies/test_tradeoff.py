@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.shipped import shipped
-from archfem.dynamics import tradeoff
-from archfem.dynamics.tradeoff import references_of, settings_of
+from archfem.cases.examples import list_examples
+from archfem.dynamics import accuracy
+from archfem.dynamics.accuracy import candidate_settings, reference_settings
 from archfem.models import Discretisation
 from archfem.studies import case_accuracy
 
 COARSE = Discretisation("faces", (2, 2), quadrature="exact")
-REFERENCES = tradeoff.Setting(COARSE, 0.005), tradeoff.Setting(COARSE, 0.01)
+REFERENCES = accuracy.Setting(COARSE, 0.005), accuracy.Setting(COARSE, 0.01)
 GIVEN = {"rungs": ("rigid",), "cells": ((2, 2),), "rules": (("gauss", 3), ("exact", None))}
 STEPS = (0.01, 0.005)
 
@@ -19,18 +19,18 @@ STEPS = (0.01, 0.005)
 @pytest.fixture
 def case(monkeypatch):
     """A ring under half a second of motion; few settings, and a coarse reference."""
-    for module in ("archfem.dynamics.tradeoff", "archfem.studies.tradeoff"):
-        monkeypatch.setattr(f"{module}.references_of", lambda structure: REFERENCES)
+    for module in ("archfem.dynamics.accuracy", "archfem.studies.convergence"):
+        monkeypatch.setattr(f"{module}.reference_settings", lambda structure: REFERENCES)
     monkeypatch.setattr(
-        "archfem.studies.tradeoff.settings_of",
-        lambda structure: settings_of(structure, **GIVEN, steps=STEPS),
+        "archfem.studies.convergence.candidate_settings",
+        lambda structure: candidate_settings(structure, **GIVEN, steps=STEPS),
     )
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     motion = {"synthetic": {"duration": 0.5, "pga": 2.0, "seed": 1}}
     return af.Case.of(
         {
             "structure": {**ring, "voussoirs": 5},
-            "model": {"fidelity": "condensed", "points": 4, "quadrature": "gauss"},
+            "model": {"fidelity": "condensed", "quadrature_points": 4, "quadrature": "gauss"},
             "motion": motion,
             "analysis": {"dt": 0.002, "damping": {"ratio": 0.05, "frequency": "20 Hz"}},
         }
@@ -46,12 +46,12 @@ def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
     errors = [[trial.error for trial in each.trials] for each in (found, known)]
     assert np.allclose(*errors, rtol=0.0, atol=1e-9)
     assert max(errors[0]) > 1e-3
-    assert found.doubt == pytest.approx(known.doubt, abs=1e-9)
+    assert found.reference_error == pytest.approx(known.reference_error, abs=1e-9)
 
 
 def test_settings_that_ran_are_not_run_again(case, tmp_path, monkeypatch):
     first = case_accuracy(case, tmp_path)
-    monkeypatch.setattr("archfem.studies.tradeoff.timed", None)
+    monkeypatch.setattr("archfem.studies.convergence.timed", None)
     again = case_accuracy(case, tmp_path)
     assert again == first
 
@@ -62,15 +62,15 @@ def test_a_reference_that_fails_is_named(case, monkeypatch):
             raise af.DidNotConverge("no equilibrium")
         return af.time_history(model, motion, **options)
 
-    monkeypatch.setattr("archfem.dynamics.tradeoff.time_history", failing)
+    monkeypatch.setattr("archfem.dynamics.accuracy.time_history", failing)
     with pytest.raises(af.DidNotConverge, match="the reference, faces 2×2 exact 5 ms, did not"):
         case_accuracy(case)
 
 
 def test_soil_keeps_its_nodes():
     """A stone's rung is not that of soft blocks, in the references and in all other settings."""
-    bridge = af.Case.read(shipped()["prusias"]).structure
+    bridge = af.Case.read(list_examples()["prusias"]).structure
     assert all(
         setting.discretisation.fidelity["backfill"] == "full"
-        for setting in (*references_of(bridge), *settings_of(bridge))
+        for setting in (*reference_settings(bridge), *candidate_settings(bridge))
     )

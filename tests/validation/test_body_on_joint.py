@@ -114,7 +114,7 @@ def test_a_joint_that_never_slides_is_judged_by_the_criteria(factor, slides):
     found = pushed(factor, replace(JOINT, friction=None))
     assert float(found["friction"][0]) == pytest.approx(factor, rel=1e-9)
     assert not found["slide"][0]
-    judged = af.joints.criteria.flagged(found, af.Criteria(friction=0.6))
+    judged = af.joints.criteria.with_failure_flags(found, af.Criteria(friction=0.6))
     assert bool(judged["slide"][0]) == slides
 
 
@@ -130,7 +130,7 @@ def test_rocking_period(verified):
     start = equation.at_rest(np.array([1.2 * theta, 0.3 * theta, -theta]))
     start = equation.released(replace(start))
     dt = 2e-4
-    states = [step.state for step in af.dynamics.Exact(equation).steps(start, dt, 0.25)]
+    states = [step.state for step in af.dynamics.SnesSolver(equation).steps(start, dt, 0.25)]
     angles = np.array([-state.q[2] for state in states])
     landed = np.interp(
         0.0,

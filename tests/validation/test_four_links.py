@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import newton
 
 import archfem as af
-from archfem.models.build import build
+from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 
 

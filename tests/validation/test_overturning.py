@@ -35,7 +35,7 @@ def tips(ratio, peak):
     motion = af.Motion(np.concatenate([motion.horizontal, still]), motion.dt)
     run = af.time_history(block(), motion, dt=1e-3)
     assert abs(run.dataset.attrs["energy_drift"]) < 1e-6
-    return run.ended == "parted"
+    return run.ending == "parted"
 
 
 @pytest.mark.parametrize(("ratio", "least"), HALF_SINES)
@@ -75,7 +75,10 @@ def _giving():
 
 def falls_by_stones(duration, peak):
     stones, motion = arch(1e9, 5.0), pulse(duration, peak)
-    falling, start = af.dynamics.Falling(stones, dt=1e-3), af.dynamics.Loose.built(stones)
+    falling, start = (
+        af.dynamics.RigidBlockSimulation(stones, dt=1e-3),
+        af.dynamics.LooseBlocks.built(stones),
+    )
     frames = falling.frames(start, motion.duration, motion, spacing=0.05)
     return any(np.abs(frame.poses[:, :2]).max() > 2.0 for frame in frames)
 

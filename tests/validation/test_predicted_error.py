@@ -7,13 +7,24 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.dynamics.candidates import LEVELS, best
-from archfem.dynamics.ladder import FINEST, choose
-from archfem.dynamics.probe import largest_difference, peaks, strongest, usual_damping
-from archfem.dynamics.tradeoff import Setting
-from archfem.dynamics.yardstick import SAFETY, Steps, Yardstick
-from archfem.models.build import build as plain
-from archfem.models.rigid import rigid
+from archfem.dynamics.accuracy import Setting
+from archfem.dynamics.error_estimation import (
+    ERROR_SAFETY_FACTOR,
+    ErrorEstimator,
+    StepSettings,
+    default_damping,
+    largest_difference,
+    run_peaks,
+    strongest_window,
+)
+from archfem.dynamics.model_selection import (
+    MIN_STEP_TOLERANCE,
+    MODEL_LEVELS,
+    reference_discretisation,
+    select_model,
+)
+from archfem.models.builder import build as plain
+from archfem.models.rigid import build_rigid_model
 
 STIFF = af.Contact(1.48e10, 0.3e10)
 SCENES = {
@@ -43,7 +54,7 @@ def quick(structure, discretisation):
 
 
 def damping_of(structure):
-    return usual_damping(rigid(structure, rule=af.joints.Quadrature("exact")))
+    return default_damping(build_rigid_model(structure, rule=af.joints.Quadrature("exact")))
 
 
 @pytest.fixture(
@@ -63,7 +74,7 @@ def scene(request):
     motion = af.Motion.synthetic(duration=12.0, pga=pga, seed=seed)
     damping = damping_of(structure)
     finest = af.build(structure, fidelity="condensed", cells=(12, 12), quadrature="exact")
-    return structure, motion, damping, peaks(finest, motion, damping, 0.00125)
+    return structure, motion, damping, run_peaks(finest, motion, damping, 0.00125)
 
 
 @pytest.mark.parametrize("tolerance", [0.02, pytest.param(0.005, marks=pytest.mark.slow)])
@@ -79,16 +90,18 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
         structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping
     )
     predicted = model.prediction
-    found = peaks(model, motion, damping, predicted.dt, tolerance=predicted.pace)
-    in_short_steps = peaks(model, motion, damping, 0.00125)
+    found = run_peaks(model, motion, damping, predicted.dt, tolerance=predicted.step_tolerance)
+    in_short_steps = run_peaks(model, motion, damping, 0.00125)
     actual = largest_difference(found, reference)
     of_steps = largest_difference(found, in_short_steps)
     of_model = largest_difference(in_short_steps, reference)
-    assert actual <= tolerance or not predicted.met
+    assert actual <= tolerance or not predicted.is_met
     assert predicted.error > actual / 2.0
-    assert predicted.error < 3.0 * max(of_steps + of_model, predicted.of_chance)
-    said = any("impacts decide" in words for words in model.doubts)
-    assert said or predicted.of_chance <= max(tolerance - predicted.in_time, tolerance / 2.0)
+    assert predicted.error < 3.0 * max(of_steps + of_model, predicted.chaotic_spread)
+    said = any("impacts decide" in words for words in model.warnings)
+    assert said or predicted.chaotic_spread <= max(
+        tolerance - predicted.time_step_error, tolerance / 2.0
+    )
 
 
 @pytest.mark.slow
@@ -96,7 +109,7 @@ def test_choice_climbs_as_the_tolerance_falls():
     structure, pga, _ = SCENES["ring"]
     motion = af.Motion.synthetic(duration=1.5, pga=pga, seed=1)
     tried = [
-        len(af.build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.considered)
+        len(af.build(structure, fidelity="auto", tolerance=t, motion=motion).prediction.candidates)
         for t in (0.15, 0.02)
     ]
     assert tried[0] == 2 < tried[1]  # the steps, and the first model
@@ -117,10 +130,10 @@ def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_da
         return af.Rayleigh(0.05, (8.0, 24.0))
 
     motion = af.Motion.synthetic(duration=0.25, pga=1.0, seed=1)
-    choose(ring, 1e-9, motion, damping, dt, builder=builder)
+    select_model(ring, 1e-9, motion, damping, dt, builder=builder)
     orders = [each for each, _ in built]
-    assert [orders.count(best(ring, level)) for level in LEVELS] == [1, 1]
-    assert orders[0] == best(ring, LEVELS[0])
+    assert [orders.count(reference_discretisation(ring, level)) for level in MODEL_LEVELS] == [1, 1]
+    assert orders[0] == reference_discretisation(ring, MODEL_LEVELS[0])
     assert asked == [built[0][1]]
 
 
@@ -128,7 +141,7 @@ def test_models_to_compare_with_are_built_once_and_the_first_is_asked_for_the_da
 def test_damping_found_of_the_finest_model_is_that_of_the_choice(ring):
     """A function of the model, and what it gives, are the same to the last digit."""
     motion = af.Motion.synthetic(duration=1.0, pga=1.0, seed=1)
-    finest = plain(ring, best(ring, LEVELS[0]))
+    finest = plain(ring, reference_discretisation(ring, MODEL_LEVELS[0]))
     given = af.dynamics.effective_damping(finest, about=af.dead_load(finest))
     found = [
         af.build(ring, fidelity="auto", tolerance=0.02, motion=motion, damping=damping).prediction
@@ -159,7 +172,7 @@ def test_a_soft_block_keeps_its_nodes():
     motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
     model = af.build(stack, fidelity="auto", tolerance=0.05, motion=motion)
     assert "block 1: full" in model.fidelity
-    assert model.prediction.met
+    assert model.prediction.is_met
 
 
 @pytest.mark.slow
@@ -177,47 +190,47 @@ def test_a_ring_under_fill_goes_down_the_ladder_and_the_fill_does_not(law):
     assert model.fidelity == "backfill: full, rest: faces"
     assert told.dt == 0.005
     finest = af.build(structure, fidelity=FILLED, cells=(12, 12))
-    runs = [peaks(model, motion, damping, 0.005), peaks(finest, motion, damping, 0.00125)]
+    runs = [run_peaks(model, motion, damping, 0.005), run_peaks(finest, motion, damping, 0.00125)]
     actual = largest_difference(*runs)
-    assert actual <= 0.03 or not told.met
+    assert actual <= 0.03 or not told.is_met
     assert 1.0 / 2.0 < told.error / actual < 5.0
 
 
 @pytest.mark.slow
 def test_without_a_motion_a_severe_one_is_assumed(ring):
     model = af.build(ring, fidelity="auto", tolerance=0.02)
-    assert model.prediction.met
+    assert model.prediction.is_met
     run = af.time_history(model, af.Motion.synthetic(duration=1.0, pga=1.0, seed=1))
     assert run.dataset.attrs["predicted_error"] == model.prediction.error
-    assert run.dataset.attrs["tolerance"] == model.prediction.pace
+    assert run.dataset.attrs["tolerance"] == model.prediction.step_tolerance
 
 
 @pytest.mark.slow
 def test_a_tolerance_out_of_reach_is_said_to_be(ring, caplog):
     motion = af.Motion.synthetic(duration=0.25, pga=2.0, seed=3)
-    model = choose(ring, 1e-9, motion, builder=quick)
+    model = select_model(ring, 1e-9, motion, builder=quick)
     told = model.prediction
-    assert not told.met
-    assert told.pace == FINEST
+    assert not told.is_met
+    assert told.step_tolerance == MIN_STEP_TOLERANCE
     assert "no setting meets the tolerance" in caplog.text
     assert told.text in caplog.text
-    tried = [name for name, _ in told.considered]
-    assert len(tried) == 1 + sum(len(level.rungs) for level in LEVELS)
+    tried = [name for name, _ in told.candidates]
+    assert len(tried) == 1 + sum(len(level.candidates) for level in MODEL_LEVELS)
     assert all(name in told.text for name in tried)
-    assert min(error for _, error in told.considered[1:]) <= told.error
+    assert min(error for _, error in told.candidates[1:]) <= told.error
 
 
 @pytest.mark.slow
 def test_steps_alone_are_refined_where_they_err(ring):
     """No finer mesh is tried for what steps of 20 ms err by; steps of any length do better."""
     motion = af.Motion.synthetic(duration=1.5, pga=2.5, seed=5)
-    coarse = choose(ring, 0.04, motion, dt=0.02, builder=quick).prediction
-    assert not coarse.met
-    assert coarse.in_time > 0.04
-    assert len(coarse.considered) <= 3
-    free = choose(ring, 0.04, motion, builder=quick).prediction
-    assert free.met
-    assert free.in_time <= 0.02
+    coarse = select_model(ring, 0.04, motion, dt=0.02, builder=quick).prediction
+    assert not coarse.is_met
+    assert coarse.time_step_error > 0.04
+    assert len(coarse.candidates) <= 3
+    free = select_model(ring, 0.04, motion, builder=quick).prediction
+    assert free.is_met
+    assert free.time_step_error <= 0.02
 
 
 @pytest.mark.slow
@@ -225,19 +238,19 @@ def test_error_in_time_is_that_against_very_short_steps(ring):
     """By steps half as long alone, against 0.16 ms; the yardstick's margin taken off."""
     motion = af.Motion.synthetic(duration=2.0, pga=2.5, seed=5)
     model, damping = af.build(ring, fidelity="rigid"), damping_of(ring)
-    yardstick = Yardstick(model, motion, damping)
-    true = peaks(model, motion, damping, 1.5625e-4)
-    for steps in (Steps(0.005, None), Steps(0.0025, None), Steps(None, 0.005)):
-        found = yardstick.in_time(steps) / SAFETY
+    yardstick = ErrorEstimator(model, motion, damping)
+    true = run_peaks(model, motion, damping, 1.5625e-4)
+    for steps in (StepSettings(0.005, None), StepSettings(0.0025, None), StepSettings(None, 0.005)):
+        found = yardstick.time_step_error(steps) / ERROR_SAFETY_FACTOR
         actual = largest_difference(
-            peaks(model, motion, damping, steps.dt, tolerance=steps.pace), true
+            run_peaks(model, motion, damping, steps.dt, tolerance=steps.step_tolerance), true
         )
         assert 0.5 < found / actual < 2.0
 
 
 def test_the_strongest_part_holds_the_peak():
     motion = af.Motion.synthetic(duration=30.0, pga=2.0, seed=4)
-    part = strongest(motion)
+    part = strongest_window(motion)
     assert part.duration == pytest.approx(8.0)
     assert part.pga == pytest.approx(motion.pga)
 
@@ -264,9 +277,9 @@ def test_study_of_speed_against_error(ring):
     assert len(error) == 8
     assert error["faces 4×4 exact 2.5 ms"] < 0.5 * error["faces 4×4 nodal 2.5 ms"]
     assert error["faces 4×4 exact 2.5 ms"] < error["rigid 1×1 exact 2.5 ms"]
-    assert found.chosen.error <= 0.01
+    assert found.choice.error <= 0.01
     assert all(
-        trial.error > 0.01 or trial.seconds >= found.chosen.seconds for trial in found.trials
+        trial.error > 0.01 or trial.seconds >= found.choice.seconds for trial in found.trials
     )
     errors = [trial.error for trial in found.front]
     assert errors == sorted(errors, reverse=True)
@@ -281,7 +294,7 @@ def test_a_setting_that_fails_is_reported_as_such(ring, monkeypatch):
             raise af.DidNotConverge("no equilibrium")
         return af.time_history(model, motion, **options)
 
-    monkeypatch.setattr("archfem.dynamics.tradeoff.time_history", failing)
+    monkeypatch.setattr("archfem.dynamics.accuracy.time_history", failing)
     motion = af.Motion.synthetic(duration=1.0, pga=1.7, seed=1)
     given = {"rungs": ("rigid",), "cells": ((4, 4),), "rules": (("nodal", None),)}
     found = af.accuracy(ring, motion, **given, steps=(0.01, 0.005))

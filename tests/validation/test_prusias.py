@@ -34,11 +34,11 @@ def case(name, *changes):
 
 @pytest.fixture(scope="module")
 def dead():
-    return af.cases.at_rest(case("prusias"))
+    return af.cases.dead_load_of_case(case("prusias"))
 
 
 def test_no_criterion_is_exceeded_under_dead_load(dead):
-    joints = af.joints.judged(dead.joints)
+    joints = af.joints.assessed_joints(dead.joints)
     assert float(abs(joints["eccentricity"]).max()) < 0.25
     assert float(joints["friction"].max()) < 0.25 * 0.60
     assert float(joints["N"].min()) > 1e5
@@ -48,7 +48,7 @@ def test_compression_nears_that_of_the_paper_under_two_metres_of_fill(dead, veri
     """The paper does not give its cover; a trial by other means found 0.32 MPa, and 2 m for 0.6."""
     deep = case("prusias", "structure.backfill.cover=2 m", "structure.backfill.erosion=0 m")
     largest = []
-    for state in (dead, af.cases.at_rest(deep)):
+    for state in (dead, af.cases.dead_load_of_case(deep)):
         use = af.statics.strength_use(state.model, state.q)
         rings = use["part"].str.endswith("arch").values
         largest.append(float(use["compression"][rings].max()))
@@ -73,7 +73,7 @@ def test_modes_of_a_trial(verified):
         "structure.sidewalls.south sidewall.above=0 m",
         "structure.backfill.erosion=0 m",
     )
-    state = af.cases.at_rest(held)
+    state = af.cases.dead_load_of_case(held)
     found = af.modes(state.model, 3, about=state)
     assert found.frequencies == pytest.approx([3.03, 3.57, 4.22], rel=0.02)
     assert found.mass_ratios[:, 0] == pytest.approx([0.29, 0.26, 0.21], abs=0.01)
@@ -83,11 +83,12 @@ def test_modes_of_a_trial(verified):
 
 @pytest.mark.slow
 def test_the_restored_bridge_is_stiffer_and_nearer_its_centre_lines(dead):
-    restored = af.cases.at_rest(case("prusias_restored"))
+    restored = af.cases.dead_load_of_case(case("prusias_restored"))
     first = [float(af.modes(each.model, 1, about=each).frequencies[0]) for each in (dead, restored)]
     assert first[1] > 1.4 * first[0]
     largest = [
-        float(abs(af.joints.judged(each.joints)["eccentricity"]).max()) for each in (dead, restored)
+        float(abs(af.joints.assessed_joints(each.joints)["eccentricity"]).max())
+        for each in (dead, restored)
     ]
     assert largest[1] < 0.7 * largest[0]
 
@@ -106,7 +107,7 @@ def test_run_command_on_the_bridge(tmp_path, capsys):
     assert "the first and the last effective along x" in told
     for name in ("dead.png", "dead_stress.png", "free_body.png", "suite.txt", "envelope.png"):
         assert (tmp_path / name).is_file()
-    for name in ("history.nc", "summary.txt", "gravest.png", "joints.png"):
+    for name in ("history.nc", "summary.txt", "critical_instant.png", "joints.png"):
         assert (tmp_path / "pair-1" / name).is_file()
 
 
@@ -121,9 +122,9 @@ def test_the_verdict_of_the_paper_by_its_own_rule_and_by_exact_joints():
     for name in ("prusias", "prusias_restored"):
         for rule, changes in {"springs": [SPRINGS, *PAPER], "exact": PAPER}.items():
             own = case(name, *changes)
-            state = af.cases.at_rest(own)
+            state = af.cases.dead_load_of_case(own)
             motion = own.ground_suite().motions[0]
-            run = af.cases.shaken(own, motion, state, af.cases.damping_of(own, state)[0])
+            run = af.cases.run_time_history(own, motion, state, af.cases.damping_of(own, state)[0])
             found[name, rule] = af.first_mechanisms(run)
     first = found["prusias", "springs"]
     assert first["any four joints"].kind == "global"

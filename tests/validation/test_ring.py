@@ -89,7 +89,7 @@ def test_every_block_is_in_balance(fidelity):
 
 def test_rigid_is_full_projected_on_rigid_motions():
     """Same joint quadrature: BᵀMB and G B of the full model are the rigid model's own."""
-    from archfem.masonry.rigid_motion import motion_of
+    from archfem.masonry.structure import rigid_motion_matrix
 
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=3)
     same = {"cells": (3, 3), "quadrature": "lobatto"}  # exact joints of rigid blocks have one facet
@@ -101,7 +101,7 @@ def test_rigid_is_full_projected_on_rigid_motions():
     basis = np.zeros((full.size, rigid.size))
     for k, number in enumerate(ring.free):
         own = np.flatnonzero(owner == number)
-        motion = motion_of(places[own], ring.blocks[number].centroid)
+        motion = rigid_motion_matrix(places[own], ring.blocks[number].centroid)
         rows = (2 * own[:, None] + np.arange(2)).ravel()
         basis[rows, 3 * k : 3 * k + 3] = motion.reshape(-1, 3)
     mass = basis.T @ (full.mass @ basis)

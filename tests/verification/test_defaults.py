@@ -1,4 +1,4 @@
-"""What is meant where nothing is said: numbers that arguments of the physics have by default.
+"""Default values of the arguments of the physics.
 
 A script that leaves an argument out relies on its default as on any other number. The tables are a
 second copy: who changes a default changes what scripts compute, and is to say so here too.
@@ -19,7 +19,7 @@ PIERS = {"course": 0.4, "chords": 1}
 MOTION = {
     "design_spectra.Eurocode8": {"type": 1, **PERCENT},
     "matching.matched": {"band": (0.05, 2.0), "tolerance": 0.05, **PERCENT},
-    "matching.misfit": {"band": (0.05, 2.0), **PERCENT},
+    "matching.spectral_misfit": {"band": (0.05, 2.0), **PERCENT},
     "motion.Motion.synthetic": {
         **{"duration": 20.0, "pga": 0.3 * 9.80665, "seed": 0, "dt": 0.005},
         "vertical_ratio": 2.0 / 3.0,
@@ -27,13 +27,13 @@ MOTION = {
     "motion.Motion.significant": {"low": 0.05, "high": 0.95},
     "motion.Motion.baseline_corrected": {"degree": 6},
     "motion.Motion.band_passed": {"order": 4},
-    "newer_codes.Ntc2018": {"topography": 1.0, **PERCENT},
-    "newer_codes.Eurocode2024": {"topography": 1.0},
-    "signals.baseline_corrected": {"degree": 6},
-    "signals.band_passed": {"order": 4},
-    "signals.significant_window": {"low": 0.05, "high": 0.95},
-    "spectra.response_spectrum": PERCENT,
-    "spectra.scaled_to_spectrum": PERCENT,
+    "design_spectra.Ntc2018": {"topography": 1.0, **PERCENT},
+    "design_spectra.Eurocode2024": {"topography": 1.0},
+    "signal_processing.correct_baseline": {"degree": 6},
+    "signal_processing.filter_band": {"order": 4},
+    "signal_processing.find_significant_window": {"low": 0.05, "high": 0.95},
+    "response_spectra.response_spectrum": PERCENT,
+    "response_spectra.scaled_to_spectrum": PERCENT,
     "suite.Suite": {"scale": 1.0, "reduction": 1.0},
     "suite.Suite.paired": {"scale": 1.0, "reduction": 1.0},
     "suite.Suite.synthetic": {
@@ -43,57 +43,62 @@ MOTION = {
 }
 
 MASONRY = {
-    "actions.BodyForce": {"vertical": 0.0},
+    "loads.BodyForce": {"vertical": 0.0},
     "assembly.assembled": STRUCTURE,
     "block.Block.drawn": {"pieces": 16},
-    "fill.jointed_fill": {"cohesion": 0.0},
+    "backfill.jointed_fill": {"cohesion": 0.0},
     "materials.Contact": {"friction": 0.6, "cohesion": 0.0, "dilatancy": 0.0, "tension": 0.0},
-    "shapes.arcades.buttressed_arch": PIERS | STRUCTURE,
-    "shapes.arcades.arcade": PIERS | STRUCTURE,
+    "shapes.bridges.buttressed_arch": PIERS | STRUCTURE,
+    "shapes.bridges.arcade": PIERS | STRUCTURE,
     "shapes.bridges.bridge": {"chords": 1} | STRUCTURE,
-    "shapes.curves.pointed_arch": {"chords": 4} | STRUCTURE,
-    "shapes.curves.elliptical_arch": {"chords": 4} | STRUCTURE,
-    "shapes.curves.flat_arch": STRUCTURE,
-    "shapes.curves.arch_along": {"chords": 4} | STRUCTURE,
-    "shapes.parts.Pier": {"course": 0.4},
-    "shapes.parts.Sidewall": {"course": 0.4, "above": 0.0, "setback": 0.4},
-    "shapes.parts.Backfill": {"erosion": 0.0, "hump": 1.0, "spandrels": 0.0},
-    "shapes.parts.Paving": {"length": 1.0},
+    "shapes.rings.pointed_arch": {"chords": 4} | STRUCTURE,
+    "shapes.rings.elliptical_arch": {"chords": 4} | STRUCTURE,
+    "shapes.rings.flat_arch": STRUCTURE,
+    "shapes.rings.arch_along": {"chords": 4} | STRUCTURE,
+    "shapes.bridge_parts.Pier": {"course": 0.4},
+    "shapes.bridge_parts.Sidewall": {"course": 0.4, "above": 0.0, "setback": 0.4},
+    "shapes.bridge_parts.Backfill": {"erosion": 0.0, "hump": 1.0, "spandrels": 0.0},
+    "shapes.bridge_parts.Paving": {"length": 1.0},
     "shapes.rings.circular_arch": STRUCTURE,
     "shapes.rings.column": STRUCTURE,
     "shapes.rings.arch_on_piers": STRUCTURE,
-    "stages.usual_stages": {"layers": 4},
+    "construction.usual_stages": {"layers": 4},
     "structure.Structure": STRUCTURE,
-    "survey.survey.read_outlines": {"snap": 1e-3},
-    "survey.survey.surveyed": {"snap": 1e-3} | STRUCTURE,
+    "survey.outlines.read_outlines": {"snap": 1e-3},
+    "survey.outlines.surveyed": {"snap": 1e-3} | STRUCTURE,
 }
 
 BLOCKS = {
     "joints.criteria.Criteria": {"hinge": 0.46, "failures": 4, "duration": 1e-3},
-    "limit.fill.Fill": {"cohesion": 0.0, "mobilisation": 1.0 / 3.0, "active": 1.0, "spread": 30.0},
-    "limit.movement.largest_movement": {"tolerance": 1e-4},
+    "limit.backfill.Fill": {
+        "cohesion": 0.0,
+        "mobilisation": 1.0 / 3.0,
+        "active": 1.0,
+        "spread": 30.0,
+    },
+    "limit.support_movement.largest_movement": {"tolerance": 1e-4},
     "limit.thickness.minimum_thickness": {"tolerance": 1e-6},
     "models.discretisation.Discretisation": {"cells": (4, 4), "degree": 1},
-    "models.exchange.states.write_state": {"magnification": 1.0},
-    "models.rigid.rigid": {"cells": 4},
-    "models.model.Prediction": {"of_small": 0.0, "of_chance": 0.0},
-    "statics.ends.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
+    "models.export.write_state": {"magnification": 1.0},
+    "models.rigid.build_rigid_model": {"cells": 4},
+    "models.model.Prediction": {"small_displacement_error": 0.0, "chaotic_spread": 0.0},
+    "statics.pushover.Stop": {"slope": 1e-6, "displacement": 0.1, "steps": 400},
     "statics.newton.Newton": {"tolerance": 1e-10},
 }
 
 SHAKEN = {
-    "collapse_scale.collapse_scale": {
+    "motion_scaling.collapse_scale": {
         **{"dt": (0.005, 0.0025), "precision": 0.05, "between": (0.1, 10.0)}
     },
-    "damping.effective_range": {"share": 0.9, "few": 32, "most": 1024},
-    "damping.effective_damping": {"ratio": 0.05, "share": 0.9},
-    "ladder.build": {"cells": (4, 4), "degree": 1, "tolerance": 0.005},
-    "scales.mechanism_scales": {"precision": 0.05, "between": (0.05, 5.0)},
+    "damping.effective_mode_range": {"mass_share": 0.9, "initial_count": 32, "max_count": 1024},
+    "damping.effective_damping": {"ratio": 0.05, "mass_share": 0.9},
+    "model_selection.build": {"cells": (4, 4), "degree": 1, "tolerance": 0.005},
+    "motion_scaling.mechanism_scales": {"precision": 0.05, "between": (0.05, 5.0)},
     "schemes.Newmark": {"beta": 0.25, "gamma": 0.5},
     "schemes.HHT": {"alpha": -0.1},
     "time_history.Record": {"every": 1},
-    "tradeoff.accuracy": {"tolerance": 0.005, **STEPS},
-    "tradeoff.settings_of": STEPS,
+    "accuracy.accuracy": {"tolerance": 0.005, **STEPS},
+    "accuracy.candidate_settings": {"meshes": STEPS["cells"], "steps": STEPS["steps"]},
 }
 
 TABLES = {"motion": MOTION, "masonry": MASONRY, "": BLOCKS, "dynamics": SHAKEN}

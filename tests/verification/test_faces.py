@@ -48,8 +48,8 @@ def test_the_basis_holds_rigid_motions(models):
     drawn = np.random.default_rng(1).normal(size=(cells.block.max() + 1, 3))[cells.block]
     x, y = cells.places.T
     wanted = np.stack([drawn[:, 0] - y * drawn[:, 2], drawn[:, 1] + x * drawn[:, 2]], 1).ravel()
-    q = np.linalg.lstsq(cells.lift.toarray(), wanted, rcond=None)[0]
-    assert np.abs(cells.lift @ q - wanted).max() < 1e-10 * np.abs(wanted).max()
+    q = np.linalg.lstsq(cells.shape_functions.toarray(), wanted, rcond=None)[0]
+    assert np.abs(cells.shape_functions @ q - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
 def test_dead_load_and_shaking_against_all_joint_nodes(arch, models):

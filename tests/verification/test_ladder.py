@@ -8,9 +8,8 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.joints.facets import Facets
-from archfem.joints.points import JointPoints
-from archfem.joints.springs import Springs
+from archfem.joints.contact_law import Facets, Springs
+from archfem.joints.quadrature import JointPoints
 
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.5, seed=5)
 TIGHT = af.statics.Newton(tolerance=1e-13)
@@ -131,7 +130,7 @@ def test_compiled_steppers_give_the_history_of_snes(ring, rung, rule, joints, sc
     }
     short = MOTION.cut(1.2, 1.8)
     slow = af.time_history(model, short, method="snes", **given)
-    for method in ("contact", "compliance", *(() if slides else ("chain",))):
+    for method in ("newton", "compliance"):
         fast = af.time_history(model, short, method=method, **given)
         assert fast.dataset.attrs["method"] == method
         assert fast.dataset.attrs["fallback_steps"] == 0
@@ -153,20 +152,19 @@ def test_a_joint_at_the_crown(stones, rung):
     assert e == pytest.approx(e[::-1], abs=1e-6)
 
 
-def test_contact_stepper_refuses_what_does_not_fall_into_modes(ring, full):
-    with pytest.raises(af.InvalidInput, match="use method='snes'"):
-        af.time_history(full, MOTION, damping=af.Rayleigh(0.05, (8, 16), "none"), method="contact")
+def test_compiled_solvers_refuse_what_is_not_compiled(ring, full):
     slow = af.build(glued(ring), cells=(1, 1), fidelity="monolithic")
-    for model, scheme in ((slow, NEWMARK), (full, CONSERVING)):
-        with pytest.raises(af.InvalidInput, match="bandwidth up to 64 and Newmark's"):
-            af.time_history(model, MOTION, scheme=scheme, method="chain")
-    with pytest.raises(af.InvalidInput, match="method 'fast' is not known"):
+    far = af.build(ring, fidelity="rigid", displacements="large")
+    for model, method in ((slow, "newton"), (slow, "compliance"), (far, "compliance")):
+        with pytest.raises(af.InvalidInput, match="use method='auto' or 'snes'"):
+            af.time_history(model, MOTION, method=method)
+    with pytest.raises(af.InvalidInput, match="method 'fast' does not exist"):
         af.time_history(full, MOTION, method="fast")
 
 
 @pytest.mark.parametrize(
     ("scheme", "method"),
-    [(NEWMARK, "chain"), (NEWMARK, "compliance"), (CONSERVING, "compliance")],
+    [(s, m) for s in (NEWMARK, CONSERVING) for m in ("newton", "compliance")],
 )
 def test_damping_on_the_blocks_alone(ring, scheme, method):
     structure = ring if scheme == CONSERVING else glued(ring)

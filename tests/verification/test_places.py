@@ -64,7 +64,7 @@ def at_rest(away):
         body = af.statics.forces_on(there, dead.joints, there.free[3], model.cells)
         found[f"{name}, body"] = np.column_stack([body.points - away, body.forces])
         if fidelity == "full":
-            stress = af.statics.principal(model, dead.q)
+            stress = af.statics.principal_stresses(model, dead.q)
             found |= {key: stress[key].values for key in ("s1", "s2")}
             found["use"] = af.statics.strength_use(model, dead.q)["use"].values
     return found

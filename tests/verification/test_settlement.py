@@ -7,8 +7,8 @@ import pytest
 from glued import glued
 
 import archfem as af
-from archfem.joints.rigid import gaps_of
-from archfem.masonry.rigid_motion import motion_of
+from archfem.joints.rigid_kinematics import block_motion_gaps
+from archfem.masonry.structure import rigid_motion_matrix
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
 COUPLE = af.circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=2, chords=1)
@@ -58,7 +58,7 @@ def test_supports_that_move_together_change_nothing(rung, rule, motion):
     found = af.dead_load(moved)
     assert differ(found.joints, reference.joints) < 1e-8  # round-off of 5 cm against µm
     gap = model.cells.displacement(found.q - reference.q)
-    plane = motion_of(model.cells.places, np.zeros(2)) @ motion
+    plane = rigid_motion_matrix(model.cells.places, np.zeros(2)) @ motion
     np.testing.assert_allclose(gap, plane, atol=1e-8)
 
 
@@ -66,10 +66,10 @@ def test_supports_that_move_together_change_nothing(rung, rule, motion):
 def test_what_supports_pull_is_the_derivative_of_the_force(rung):
     """By differences, on joints that never slide, where some are open in part."""
     model = af.build(glued(RING), fidelity=rung, cells=(2, 2), quadrature="lobatto")
-    q, motion = af.dead_load(model).q, np.zeros_like(model.supports)
+    q, motion = af.dead_load(model).q, np.zeros_like(model.support_motion)
     motion[0] = [-1.0, 0.5, 0.3]
-    ahead, back = (model.moved(sign * 1e-9 * motion).force(q) for sign in (1.0, -1.0))
-    pulled = model.pulled(q, motion)
+    ahead, back = (model.with_support_motion(sign * 1e-9 * motion).force(q) for sign in (1.0, -1.0))
+    pulled = model.support_forces(q, motion)
     np.testing.assert_allclose((ahead - back) / 2e-9, pulled, atol=1e-6 * np.abs(pulled).max())
 
 
@@ -160,7 +160,9 @@ def test_two_blocks_on_a_support_that_sinks_far_hang_on_three_hinges(rule):
 def test_the_gap_of_a_support_is_its_motion_across_the_joint():
     base = af.column(breadth=1.0, heights=[1.0])
     model = af.build(base, fidelity="rigid", quadrature="lobatto")
-    gaps = gaps_of(base, model.operator.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]]))
+    gaps = block_motion_gaps(
+        base, model.operator.points, np.array([[0.0, -0.02, 0.0], [0.0, 0.0, 0.0]])
+    )
     np.testing.assert_allclose(gaps, [[0.02] * 9 if k == 0 else [0.0] * 9 for k in range(2)])
 
 

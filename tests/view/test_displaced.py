@@ -3,7 +3,7 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.displaced import draw_during
+from archfem.view.structure import draw_during
 
 
 def labelled(figure, gid):

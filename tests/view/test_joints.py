@@ -8,7 +8,7 @@ from glued import glued
 from pictures import history
 
 import archfem as af
-from archfem.view.joints import draw_joint, draw_joints, telling_joints
+from archfem.view.histories import draw_joint, draw_joints, telling_joints
 
 
 def units(axes):
@@ -58,7 +58,7 @@ def test_joints_are_drawn_by_name_or_number(run):
 
 def test_limits_are_those_of_the_criteria_carried(run):
     sharp = af.Criteria(hinge=0.47, friction=2.0)
-    axes = draw_joints(run.judged_by(sharp), [0]).axes
+    axes = draw_joints(run.with_criteria(sharp), [0]).axes
     heights = {float(line.get_ydata()[0]) for each in axes for line in each.lines[:8]}
     assert {0.47, 2.0} <= heights
     assert not {0.46, 0.6} & heights

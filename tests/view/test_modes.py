@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.modes import REACH, draw_modes
+from archfem.view.statics import REACH, draw_modes
 
 
 def drawn(axes):

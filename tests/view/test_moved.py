@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.marks import joint_marks
-from archfem.view.moved import Falls, carrier, turned
+from archfem.view.joint_marks import joint_marks
+from archfem.view.positions import FallingBlocks, turned
 
 
 def placed(structure, number, points, pose):
@@ -26,7 +26,7 @@ def test_ends_of_a_joint_lie_between_the_faces_wherever_they_are(column):
         centre = np.array(structure.blocks[number].centroid)
         q[3 * number - 3 : 3 * number - 1] = pivot + turned(centre - pivot, angle) - centre + shift
         q[3 * number - 1] = angle
-    ends = structure.ends + carrier(column)(q)
+    ends = structure.ends + column.observer().joint_ends(q)
     lower, higher = (
         placed(structure, number, structure.ends[1], q[3 * number - 3 : 3 * number])
         for number in (1, 2)
@@ -43,7 +43,7 @@ def test_ends_of_a_hinge_are_those_of_both_faces(column):
     centre = np.array(structure.blocks[3].centroid)
     q = np.zeros(column.size)
     q[6:8], q[8] = corner + turned(centre - corner, angle) - centre, angle
-    ends = structure.ends + carrier(column)(q)
+    ends = structure.ends + column.observer().joint_ends(q)
     np.testing.assert_allclose(ends[joint, 1], corner, atol=1e-12)
     far = placed(structure, 3, structure.ends[joint, 0], q[6:9])
     np.testing.assert_allclose(ends[joint, 0], 0.5 * (far + structure.ends[joint, 0]), atol=1e-12)
@@ -53,7 +53,7 @@ def test_small_motions_move_ends_as_of_small_displacements(column):
     """To the square of the motion, 1e-6 of 1e-3."""
     small = af.build(column.structure, fidelity="rigid")
     q = 1e-6 * np.random.default_rng(1).standard_normal(column.size)
-    middle, wanted = (carrier(model)(q).mean(axis=1) for model in (column, small))
+    middle, wanted = (model.observer().joint_ends(q).mean(axis=1) for model in (column, small))
     np.testing.assert_allclose(middle, wanted, atol=1e-11)
 
 
@@ -61,7 +61,7 @@ def test_the_thrust_line_goes_through_the_hinge_of_moved_faces(column, toppled):
     """At the last instant before stones are loose, between the ends of what overlaps."""
     q = toppled.dataset["last_q"].values
     joints = toppled.joints.isel(time=-1)
-    ends = column.structure.ends + carrier(column)(q)
+    ends = column.structure.ends + column.observer().joint_ends(q)
     marks = joint_marks(column.structure, joints, shift=ends - column.structure.ends)
     share = 0.5 + joints["eccentricity"].values[:, None]
     through = (1.0 - share) * ends[:, 0] + share * ends[:, 1]
@@ -70,7 +70,7 @@ def test_the_thrust_line_goes_through_the_hinge_of_moved_faces(column, toppled):
 
 
 def test_poses_of_a_fall_run_straight_between_frames(column, toppled):
-    falls = Falls.of(column.structure, toppled)
+    falls = FallingBlocks.of(column.structure, toppled)
     times, poses = falls.times, falls.poses
     assert times[0] == pytest.approx(toppled.time[-1])
     assert (np.diff(times) > 0.0).all()
@@ -81,7 +81,7 @@ def test_poses_of_a_fall_run_straight_between_frames(column, toppled):
 
 
 def test_a_fall_begins_where_the_model_left_off_and_ends_above_ground(column, toppled):
-    falls, cells = Falls.of(column.structure, toppled), column.cells
+    falls, cells = FallingBlocks.of(column.structure, toppled), column.cells
     before = cells.places + cells.displacement(toppled.dataset["last_q"].values)
     np.testing.assert_allclose(falls.places(cells.places, cells.block, falls.times[0]), before)
     lying = np.concatenate(falls.outlines(falls.times[-1])[1:])
@@ -90,7 +90,7 @@ def test_a_fall_begins_where_the_model_left_off_and_ends_above_ground(column, to
 
 
 def test_outlines_of_a_fall_keep_their_areas(column, toppled):
-    falls = Falls.of(column.structure, toppled)
+    falls = FallingBlocks.of(column.structure, toppled)
     for block, outline in zip(
         column.structure.blocks, falls.outlines(falls.times[-1]), strict=True
     ):
@@ -102,7 +102,7 @@ def test_outlines_of_a_fall_keep_their_areas(column, toppled):
 def test_a_run_that_held_has_no_fall(column):
     still = af.Motion(np.zeros(51), 0.005)
     run = af.time_history(column, still, dt=0.005)
-    assert Falls.of(column.structure, run) is None
+    assert FallingBlocks.of(column.structure, run) is None
     with pytest.raises(af.InvalidInput, match="no fall to draw"):
         af.view.draw_fall(run)
 

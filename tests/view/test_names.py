@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
-from archfem.view.names import draw_names, short_name
+from archfem.view.structure import draw_names, short_name
 
 
 def test_short_names():

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.pushover import _apart, _runs, draw_pushover
+from archfem.view.statics import _apart, _runs, draw_pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 MODEL = af.build(RING, fidelity="rigid", quadrature="lobatto")

@@ -1,30 +1,27 @@
-"""Bridges of any number of spans: rings on piers, sidewalls behind them, fill and paving on top.
+"""Bridges and arcades: rings on piers, sidewalls behind them, backfill and paving above.
 
-Stones are polygons: a voussoir's faces follow the circle by chords, so that the fill can lie on
-them. What a bridge does not have is not modelled.
+Stones are polygons: the faces of a voussoir follow the circle by chords, so that the fill can rest
+on them.
 """
 
 from collections.abc import Sequence
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
-from archfem.annotated import as_annotated
+from archfem._validation import check_numbers, validate_arguments
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.shapes.parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.shapes.placed import Face
-from archfem.masonry.shapes.site import Site, ledge
+from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
+from archfem.masonry.shapes.stonework import Face, StoneworkBuilder, fill_ledge
 from archfem.masonry.structure import Structure
 from archfem.units import G
 
-THIN = 0.02
-"""Least fill above rings and sidewalls [m]."""
 
-
-@as_annotated
+@validate_arguments
 def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are made of)
     *,
     arches: Sequence[Arch],
@@ -47,11 +44,11 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
 
     Args:
         arches: one or more rings.
-        piers: one fewer; or one more, and then no sidewalls: the first and the last carry the outer
-            springings.
-        sidewalls: left and right, or none: the outer springings are then fixed, or on piers.
+        piers: one fewer than arches; or one more, without sidewalls: the first and the last then
+            support the outer springings.
+        sidewalls: left and right, or none, with outer springings fixed or on piers.
         backfill: or None.
-        paving: or None; it lies on the backfill.
+        paving: or None; it rests on the backfill.
         width: out of plane [m].
         material: of all stones.
         contact: between stones.
@@ -59,33 +56,38 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
         gravity: acceleration of gravity [m/s²].
 
     Raises:
-        InvalidStructure: the parts do not go together.
+        InvalidStructure: the parts do not fit together.
     """
-    _check(arches, piers, sidewalls, backfill is None and paving is not None)
-    site = Site(material, contact, chords)
-    faces, extrados = site.build(arches, piers, sidewalls)
+    _check_parts(arches, piers, sidewalls, backfill is None and paving is not None)
+    builder = StoneworkBuilder(material, contact, chords)
+    faces, extrados = builder.build(arches, piers, sidewalls)
     if backfill is not None:
-        bottom = _bottom(faces, list(chain(*extrados)), sidewalls)
-        top = backfill.surface(bottom[0][0], bottom[-1][0], _crown(faces, extrados))
+        bottom = _base_of_fill(faces, list(chain(*extrados)), sidewalls)
+        top = backfill.surface(bottom[0][0], bottom[-1][0], _highest_crown(faces, extrados))
         _check_cover(bottom, top)
-        site.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
+        builder.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
         if paving is not None:
-            site.pave(top, paving)
-    site.check()
+            builder.pave(top, paving)
+    builder.check()
     soil = contact if backfill is None else backfill.contact
 
-    def touch(a: Block, b: Block) -> Contact:
+    def select_contact(a: Block, b: Block) -> Contact:
         return soil if "backfill" in (a.part, b.part) else contact
 
     return assembled(
-        site.blocks, touch, joints=site.joints, width=width, gravity=gravity, name="bridge"
+        builder.blocks,
+        select_contact,
+        joints=builder.joints,
+        width=width,
+        gravity=gravity,
+        name="bridge",
     )
 
 
-def _check(
+def _check_parts(
     arches: Sequence[Arch], piers: Sequence[Pier], sidewalls: Sequence[Sidewall], bare: bool
 ) -> None:
-    """Refuse numbers of parts that do not go together."""
+    """Check the numbers of arches, piers and sidewalls."""
     if not arches or len(piers) not in (len(arches) - 1, len(arches) + 1):
         raise InvalidStructure(
             f"{len(arches)} arches and {len(piers)} piers: give at least one arch, and a pier "
@@ -100,17 +102,19 @@ def _check(
         raise InvalidStructure("paving lies on backfill: give backfill too, or no paving")
 
 
-def _bottom(
+def _base_of_fill(
     faces: Sequence[tuple[Face, Face]], extrados: Sequence[Point], sidewalls: Sequence[Sidewall]
 ) -> list[Point]:
-    """What the fill lies on, from left to right."""
+    """Return the lower boundary of the fill, from left to right."""
     left, right = faces[0][0], faces[-1][1]
-    after = ledge(right, -1.0, sidewalls[1:])
-    return [*ledge(left, 1.0, sidewalls[:1]), *extrados, *reversed(after)]
+    after = fill_ledge(right, -1.0, sidewalls[1:])
+    return [*fill_ledge(left, 1.0, sidewalls[:1]), *extrados, *reversed(after)]
 
 
-def _crown(faces: Sequence[tuple[Face, Face]], extrados: Sequence[Sequence[Point]]) -> Point:
-    """The highest crown, midway between the springings of its ring; of equal ones the first."""
+def _highest_crown(
+    faces: Sequence[tuple[Face, Face]], extrados: Sequence[Sequence[Point]]
+) -> Point:
+    """Return the highest crown, midway between its springings; of equal ones the first."""
     levels = [max(y for _, y in points) for points in extrados]
     level = max(levels)
     left, right = next(f for f, y in zip(faces, levels, strict=True) if y > level - 1e-9)
@@ -118,12 +122,163 @@ def _crown(faces: Sequence[tuple[Face, Face]], extrados: Sequence[Sequence[Point
 
 
 def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
-    """Refuse a fill through which a ring or a sidewall would show."""
+    """Check that the fill covers rings and sidewalls."""
+    min_cover = 0.02  # [m]; thinner layers make slivers in the mesh
     x, y = np.array(bottom).T
     cover = np.interp(x, *np.array(surface).T) - y
-    if cover.min() < THIN:
+    if cover.min() < min_cover:
         place = int(np.argmin(cover))
         raise InvalidStructure(
             f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, and it "
-            f"must be at least {THIN} m: give more cover, less erosion or lower sidewalls"
+            f"must be at least {min_cover} m: give more cover, less erosion or lower sidewalls"
         )
+
+
+# One number for all parts, or one for each, from left to right
+Numbers = float | Sequence[float]
+
+
+def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one structure)
+    *,
+    span: float,
+    thickness: float,
+    voussoirs: int,
+    breadth: float,
+    height: float,
+    rise: float | None = None,
+    embrace: float | str | None = None,
+    course: float = 0.40,
+    chords: int = 1,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return a circular arch between two buttresses in courses, flush with its intrados.
+
+    Coordinates are those of a `bridge`: x from the left springing, y from the springing level.
+
+    Args:
+        span: between the springings, along the centre line [m].
+        thickness: of the ring [m].
+        voussoirs: number of stones.
+        breadth: of each buttress [m].
+        height: of the buttresses, from foundation to springing level [m].
+        rise: of the centre line above the springings [m]; or
+        embrace: angle subtended by the ring [degrees].
+        course: height of a course, about [m].
+        chords: straight pieces of each face of a voussoir.
+        width: out of plane [m].
+        material: of all blocks.
+        contact: of all joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidStructure: the lengths do not fit together.
+    """
+    return arcade(
+        spans=[span],
+        rises=None if rise is None else [rise],
+        embraces=None if embrace is None else [embrace],
+        heights=height,
+        breadths=breadth,
+        thicknesses=thickness,
+        voussoirs=voussoirs,
+        course=course,
+        chords=chords,
+        width=width,
+        material=material,
+        contact=contact,
+        gravity=gravity,
+    )
+
+
+def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
+    *,
+    spans: Sequence[float],
+    heights: Numbers,
+    breadths: Numbers,
+    thicknesses: Numbers,
+    voussoirs: int | Sequence[int],
+    rises: Numbers | None = None,
+    embraces: float | str | Sequence[float | str] | None = None,
+    course: float = 0.40,
+    chords: int = 1,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return circular arches in a row, on piers between them and under both ends.
+
+    A single number applies to all arches, or piers. Parts are named "arch 1" and "pier 1" from the
+    left; coordinates are those of a `bridge`.
+
+    Args:
+        spans: of the arches, between their springings along the centre line [m].
+        heights: of the piers, one more than arches, from foundation to springing level [m].
+        breadths: of the piers [m].
+        thicknesses: of the rings [m].
+        voussoirs: numbers of stones.
+        rises: of the centre lines above the springings [m]; or
+        embraces: angles subtended by the rings [degrees].
+        course: height of a course, about [m].
+        chords: straight pieces of each face of a voussoir.
+        width: out of plane [m].
+        material: of all blocks.
+        contact: of all joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidStructure: the numbers or lengths do not fit together.
+    """
+    count = len(check_numbers(spans, "spans [m]"))
+    arches = [
+        Arch(
+            span=span, thickness=thick, voussoirs=stones, rise=rise, embrace=turn, name=f"arch {k}"
+        )
+        for k, (span, thick, stones, rise, turn) in enumerate(
+            zip(
+                spans,
+                _expand_values(thicknesses, count, "thicknesses"),
+                _expand_values(voussoirs, count, "voussoirs"),
+                _expand_values(rises, count, "rises"),
+                _expand_values(embraces, count, "embraces"),
+                strict=True,
+            ),
+            1,
+        )
+    ]
+    sides = [*(arch.reach for arch in arches), 0.0], [0.0, *(arch.reach for arch in arches)]
+    piers = [
+        Pier(gap=broad - right - left, height=high, course=course, name=f"pier {k}")
+        for k, (broad, high, right, left) in enumerate(
+            zip(
+                _expand_values(breadths, count + 1, "breadths"),
+                _expand_values(heights, count + 1, "heights"),
+                *sides,
+                strict=True,
+            ),
+            1,
+        )
+    ]
+    return bridge(
+        arches=arches,
+        piers=piers,
+        chords=chords,
+        width=width,
+        material=material,
+        contact=contact,
+        gravity=gravity,
+    )
+
+
+def _expand_values(values_or_one: object, count: int, name: str) -> list[Any]:
+    """Return a list with one value for each part."""
+    if values_or_one is None or isinstance(values_or_one, float | int | str):
+        return [values_or_one] * count
+    values: list[Any] = list(values_or_one)  # type: ignore[call-overload]
+    values = values * count if len(values) == 1 else values
+    if len(values) != count:
+        raise InvalidStructure(f"{len(values)} {name}: give one for all, or {count}")
+    return values

@@ -1,21 +1,27 @@
-"""Single rings and columns, and a ring on two piers."""
+"""Single arches (circular, pointed, elliptical, flat, any curve), columns, an arch on piers.
 
-from collections.abc import Sequence
+Stones of other curves than circles are polygons whose faces follow the curve by chords. Joints are
+normal to the intrados, or converge in a flat arch. Block 0 is the left abutment and joint 0 the
+left springing.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, degrees, isfinite, pi, radians, sin
+from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 
 import numpy as np
 
-from archfem.arguments import real, reals
+from archfem._typing import Array
+from archfem._validation import check_integer, check_number, check_numbers, check_sequence
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
 
-MOST = 10_000
-"""Voussoirs, or chords of each, beyond which nobody means it."""
+# Limit for the number of voussoirs, and of chords of each
+MAX_VOUSSOIRS = 10_000
 
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -40,64 +46,67 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     Args:
         thickness: ring depth t, from intrados to extrados [m].
         voussoirs: number of stones.
-        radius: of the centre line [m]; goes with `embrace`.
-        embrace: angle that the ring subtends, between its springing joints [degrees];
-            a small one is given with its unit, "5 degree".
-        span: clear span, at the intrados [m]; goes with `rise`, instead of the two above.
+        radius: of the centre line [m]; together with `embrace`.
+        embrace: angle between the springing joints [degrees]; a small one with its unit,
+            "5 degree".
+        span: clear span, at the intrados [m]; together with `rise`, instead of the two above.
         rise: clear rise, at the intrados, at most half the span [m].
         width: out of plane [m].
         material: of the stones.
         contact: of the joints.
-        chords: None makes stones that are true sectors of the ring; a number, stones whose faces
-            follow the circle by so many straight pieces, each lighter than its sector by the
-            fraction φ²/6 of the angle φ it subtends.
+        chords: None for stones that are true sectors of the ring; or the number of straight pieces
+            of each face, where a stone is lighter than its sector by the fraction φ²/6, φ the
+            angle of a piece.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
         InvalidInput: an angle looks like radians.
-        InvalidStructure: the lengths do not make a ring.
+        InvalidStructure: the lengths do not form a ring.
 
     Example:
         >>> ring = af.circular_arch(radius=2.95, embrace=159.0, thickness=0.55, voussoirs=17)
         >>> len(ring.blocks), len(ring.joints), round(ring.weight)
         (19, 18, 90051)
     """
-    real(thickness, "thickness [m]")
-    radius, embrace = _circle(radius, embrace, span, rise, thickness)
+    check_number(thickness, "thickness [m]")
+    radius, embrace = _resolve_circle(radius, embrace, span, rise, thickness)
     if not 0.0 < thickness < 2.0 * radius:
         raise InvalidStructure(
             f"thickness {thickness:.3g} m is not between 0 and twice the radius {radius:.3g} m"
         )
     if not 0.0 < embrace < 360.0:
         raise InvalidStructure(f"embrace {embrace:.4g}° is not between 0° and 360°: give degrees")
-    pieces = 1 if chords is None else chords
-    for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if not 1 <= real(count, key) <= MOST or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MOST}")
-    voussoirs, pieces = int(voussoirs), int(pieces)
-    turn = embrace / voussoirs / pieces
-    if turn > 120.0:
-        raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
-
+    voussoirs, pieces = _check_division(embrace, voussoirs, 1 if chords is None else chords)
     half = radians(embrace) / 2.0
     angles = np.linspace(-half, half, voussoirs * pieces + 1)
     inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
-    faces = [(_on_circle(inner, a), _on_circle(outer, a)) for a in angles]
+    faces = [(_point_on_circle(inner, a), _point_on_circle(outer, a)) for a in angles]
     centre = (0.0, 0.0) if chords is None else None
     stones = [
-        stone_between(
+        build_voussoir(
             faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre
         )
         for k in range(voussoirs)
     ]
     depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
-    left = abutment_behind(faces[0], -1.0, depth, material, "left abutment")
-    right = abutment_behind(faces[-1], 1.0, depth, material, "right abutment")
+    left = build_abutment(faces[0], -1.0, depth, material, "left abutment")
+    right = build_abutment(faces[-1], 1.0, depth, material, "right abutment")
     joints = [
         Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
         for k in range(voussoirs + 1)
     ]
     return Structure((left, *stones, right), tuple(joints), width, gravity, "circular arch")
+
+
+def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, int]:
+    """Check the number of voussoirs and of straight pieces of each."""
+    for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
+        if not 1 <= check_number(count, key) <= MAX_VOUSSOIRS or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MAX_VOUSSOIRS}")
+    turn = embrace / int(voussoirs) / int(pieces)
+    if turn > 120.0:
+        raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")
+    return int(voussoirs), int(pieces)
 
 
 def column(
@@ -129,8 +138,8 @@ def column(
         >>> [joint.name for joint in af.column(breadth=0.6, heights=[1.2, 1.2]).joints]
         ['joint 0', 'joint 1']
     """
-    heights = reals(heights, "heights of the blocks [m]")
-    if real(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:
+    heights = check_numbers(heights, "heights of the blocks [m]")
+    if check_number(breadth, "breadth [m]") <= 0.0 or not heights or min(heights) <= 0.0:
         raise InvalidStructure(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
@@ -153,6 +162,21 @@ def column(
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
+
+
+def _check_pier(
+    pier_breadth: float, courses: Sequence[float], thickness: float, radius: float
+) -> tuple[float, ...]:
+    """Check the breadth and the courses of a pier below a ring; return the courses."""
+    heights = check_numbers(courses, "heights of the courses [m]")
+    if not thickness <= check_number(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
+        raise InvalidStructure(
+            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
+            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
+        )
+    if not heights or min(heights) <= 0.0:
+        raise InvalidStructure(f"courses {list(heights)} m: give at least one height above 0")
+    return heights
 
 
 def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one structure)
@@ -188,23 +212,16 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
         gravity: acceleration of gravity [m/s²].
 
     Raises:
-        InvalidStructure: the lengths do not make a ring, or it does not stand on its piers.
+        InvalidStructure: the lengths do not form a ring, or it does not rest on its piers.
     """
     ring = circular_arch(
         radius=radius, thickness=thickness, embrace=180.0, voussoirs=voussoirs, chords=chords
     )
-    courses = reals(courses, "heights of the courses [m]")
-    if not thickness <= real(pier_breadth, "pier_breadth [m]") < 2.0 * radius:
-        raise InvalidStructure(
-            f"pier_breadth {pier_breadth:.3g} m is not between the ring's thickness "
-            f"{thickness:.3g} m and twice its radius {radius:.3g} m"
-        )
-    if not courses or min(courses) <= 0.0:
-        raise InvalidStructure(f"courses {list(courses)} m: give at least one height above 0")
+    courses = _check_pier(pier_breadth, courses, thickness, radius)
     levels = [0.0, *np.cumsum(courses).tolist()]
     levels = [level - levels[-1] for level in [-0.2 * min(courses), *levels]]
-    left = _pier(-radius, pier_breadth, levels, material, "left pier")
-    right = _pier(radius, pier_breadth, levels, material, "right pier")
+    left = _build_pier(-radius, pier_breadth, levels, material, "left pier")
+    right = _build_pier(radius, pier_breadth, levels, material, "right pier")
     stones = tuple(replace(stone, material=material) for stone in ring.blocks[1:-1])
     blocks = (*left, *stones, *reversed(right))
     inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
@@ -219,10 +236,10 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     return Structure(blocks, joints, width, gravity, "arch on piers")
 
 
-def _pier(
+def _build_pier(
     middle: float, breadth: float, levels: Sequence[float], material: Material, part: str
 ) -> list[Block]:
-    """Foundation and courses between levels, from below."""
+    """Build the foundation and the courses between levels, from below."""
     left, right = middle - breadth / 2.0, middle + breadth / 2.0
     return [
         Block(
@@ -238,18 +255,18 @@ def _pier(
     ]
 
 
-def _circle(
+def _resolve_circle(
     radius: float | None,
     embrace: float | str | None,
     span: float | None,
     rise: float | None,
     thickness: float,
 ) -> tuple[float, float]:
-    """Radius of the centre line and embrace, from whichever pair was given."""
-    given = {"radius [m]": radius, "span [m]": span, "rise [m]": rise}
-    for name, value in given.items():
+    """Return radius of the centre line and embrace from either pair of lengths."""
+    lengths = {"radius [m]": radius, "span [m]": span, "rise [m]": rise}
+    for name, value in lengths.items():
         if value is not None:
-            real(value, name)
+            check_number(value, name)
     if radius is not None and embrace is not None and span is None and rise is None:
         return radius, in_degrees(embrace, "embrace")
     if span is None or rise is None or radius is not None or embrace is not None:
@@ -267,22 +284,15 @@ def _circle(
     return inner + thickness / 2.0, degrees(2.0 * asin(min(1.0, span / 2.0 / inner)))
 
 
-def _on_circle(radius: float, angle: float) -> Point:
-    """Point at an angle from the crown, positive to the right."""
+def _point_on_circle(radius: float, angle: float) -> Point:
+    """Return a point of a circle at an angle from the crown, positive to the right."""
     return (float(radius * np.sin(angle)), float(radius * np.cos(angle)))
 
 
-def stone_between(
+def build_voussoir(
     faces: Sequence[tuple[Point, Point]], material: Material, name: str, centre: Point | None
 ) -> Block:
-    """Return a voussoir from its radial sections.
-
-    Args:
-        faces: intrados and extrados of each section, left to right [m].
-        material: of the stone.
-        name: of the stone.
-        centre: of the arcs, or None for straight faces [m].
-    """
+    """Build a voussoir from its radial sections."""
     intrados = [face[0] for face in faces]
     extrados = [face[1] for face in reversed(faces)]
     n = len(faces)
@@ -291,18 +301,10 @@ def stone_between(
     return Block(outline, material, name, corners=corners, part="arch", centre=centre, role="ring")
 
 
-def abutment_behind(
+def build_abutment(
     face: tuple[Point, Point], side: float, depth: float, material: Material, name: str
 ) -> Block:
-    """Return the fixed block behind a springing joint.
-
-    Args:
-        face: the joint's intrados and extrados [m].
-        side: -1 at the left and 1 at the right.
-        depth: of the block, across the joint [m].
-        material: of the block.
-        name: of the block and its part.
-    """
+    """Build the fixed block behind a springing joint."""
     inner, outer = np.array(face[0]), np.array(face[1])
     radial = (outer - inner) / np.linalg.norm(outer - inner)
     shift = side * depth * np.array([radial[1], -radial[0]])
@@ -310,3 +312,274 @@ def abutment_behind(
     start, end = (near, far) if side > 0 else (far, near)
     outline = tuple((float(x), float(y)) for x, y in (start[0], end[0], end[1], start[1]))
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
+
+
+# Intrados and extrados of a stone, each from left to right (n, 2) [m]
+Faces = tuple[Array, Array]
+
+
+def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
+    *,
+    span: float,
+    rise: float,
+    thickness: float,
+    voussoirs: int,
+    chords: int = 4,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return a pointed arch of two circular arcs centred on the springing level.
+
+    The arcs have the radius (span²/4 + rise²) / span. Even numbers of stones meet in a vertical
+    joint at the crown; odd ones have a keystone there.
+
+    Args:
+        span: clear, at the intrados [m].
+        rise: clear, at the intrados, at least half the span [m].
+        thickness: of the ring, along its joints except that at the crown, which is longer [m].
+        voussoirs: number of stones.
+        chords: straight pieces of each face of a stone.
+        width: out of plane [m].
+        material: of the stones.
+        contact: of the joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidStructure: the lengths do not form a pointed arch.
+    """
+    _check_ring(thickness, voussoirs, chords, span=span, rise=rise)
+    if rise < span / 2.0:
+        raise InvalidStructure(
+            f"rise {rise:.4g} m is below half the span {span:.4g} m: that is no pointed arch; give "
+            "circular_arch(span=…, rise=…) for a flatter one"
+        )
+    radius = (span**2 / 4.0 + rise**2) / span
+    centre = radius - span / 2.0
+    top, outer_top = atan2(rise, centre), acos(centre / (radius + thickness))
+    turns = np.minimum(2.0 * top / voussoirs * np.arange(voussoirs // 2 + 2), top)
+
+    def arc(start: float, end: float, size: float) -> Array:
+        angles = np.linspace(start, end, chords + 1)
+        return np.column_stack([centre - size * np.cos(angles), size * np.sin(angles)])
+
+    left = []
+    for start, end in pairwise(turns[: (voussoirs + 1) // 2 + 1]):
+        far = outer_top if end == top else end
+        left.append((arc(start, end, radius), arc(start, far, radius + thickness)))
+    return _assemble_ring(
+        _mirror_stones(left, voussoirs), width, material, contact, gravity, "pointed arch"
+    )
+
+
+def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
+    *,
+    span: float,
+    rise: float,
+    thickness: float,
+    voussoirs: int,
+    chords: int = 4,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return an arch whose intrados is half an ellipse, of stones of equal length along it.
+
+    Args:
+        span: clear, at the intrados [m].
+        rise: clear, at the intrados; half the span makes a semicircle [m].
+        thickness: of the ring, at right angles to the intrados [m].
+        voussoirs: number of stones.
+        chords: straight pieces of each face of a stone.
+        width: out of plane [m].
+        material: of the stones.
+        contact: of the joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidStructure: the lengths do not form an arch.
+    """
+    _check_ring(thickness, voussoirs, chords, span=span, rise=rise)
+    half = span / 2.0
+    angles = np.linspace(0.0, np.pi, 4001)  # the length of the ellipse is exact to 1e-7
+    distances = _cumulative_length(np.column_stack([-half * np.cos(angles), rise * np.sin(angles)]))
+
+    def section(share: Array) -> Faces:
+        angle = np.interp(share * distances[-1], distances, angles)
+        normal = np.column_stack([-rise * np.cos(angle), half * np.sin(angle)])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        points = np.column_stack([-half * np.cos(angle), rise * np.sin(angle)])
+        return points, points + thickness * normal
+
+    stones = _divide_ring(section, voussoirs, chords)
+    return _assemble_ring(stones, width, material, contact, gravity, "elliptical arch")
+
+
+def flat_arch(
+    *,
+    span: float,
+    thickness: float,
+    voussoirs: int,
+    skewback: float | str,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return a flat arch with horizontal faces, whose joints converge in one point below.
+
+    Args:
+        span: clear, at the soffit, which is divided equally [m].
+        thickness: height of the stones [m].
+        voussoirs: number of stones.
+        skewback: angle of the springing joints from the vertical [degrees].
+        width: out of plane [m].
+        material: of the stones.
+        contact: of the joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidInput: the angle looks like radians.
+        InvalidStructure: the lengths do not form an arch.
+    """
+    _check_ring(thickness, voussoirs, 1, span=span)
+    angle = in_degrees(skewback, "skewback")
+    if not 0.0 < angle < 60.0:
+        raise InvalidStructure(f"skewback {angle:.4g}° is not between 0° and 60°: try 20°")
+    growth = 1.0 + thickness * tan(np.radians(angle)) / (span / 2.0)
+
+    def section(share: Array) -> Faces:
+        x = span * (share - 0.5)
+        low = np.column_stack([x, np.zeros_like(x)])
+        return low, np.column_stack([growth * x, np.full_like(x, thickness)])
+
+    stones = _divide_ring(section, voussoirs, 1)
+    return _assemble_ring(stones, width, material, contact, gravity, "flat arch")
+
+
+def arch_along(
+    intrados: Sequence[Point] | Array,
+    *,
+    thickness: float,
+    voussoirs: int,
+    chords: int = 4,
+    width: float = 1.0,
+    material: Material = STONE,
+    contact: Contact = STONE_TO_STONE,
+    gravity: float = G,
+) -> Structure:
+    """Return an arch along any intrados, of stones of equal length along it.
+
+    Args:
+        intrados: points from one springing to the other, connected by straight lines (n, 2) [m];
+            normals are computed from three neighbours, so the points must resolve the curvature.
+        thickness: of the ring, at right angles to the intrados [m].
+        voussoirs: number of stones.
+        chords: straight pieces of each face of a stone.
+        width: out of plane [m].
+        material: of the stones.
+        contact: of the joints.
+        gravity: acceleration of gravity [m/s²].
+
+    Raises:
+        InvalidInput: the points are no rows of two numbers.
+        InvalidStructure: they are fewer than three, two consecutive ones coincide, or the ring
+            crosses itself.
+    """
+    _check_ring(thickness, voussoirs, chords)
+    rows = [
+        check_numbers(point, f"intrados[{k}] [m]", 2)
+        for k, point in enumerate(check_sequence(intrados, "intrados"))
+    ]
+    points = np.array(rows, dtype=float)
+    if len(points) < 3 or np.any(np.all(np.diff(points, axis=0) == 0.0, axis=1)):
+        raise InvalidStructure(
+            f"an intrados of {len(points)} points: give at least three, no two alike in a row"
+        )
+    points = points if points[0, 0] < points[-1, 0] else points[::-1]
+    distances = _cumulative_length(points)
+    slope = np.gradient(points, distances, axis=0, edge_order=2)
+
+    def section(share: Array) -> Faces:
+        at = share * distances[-1]
+        x, y, ahead, up = (np.interp(at, distances, each) for each in (*points.T, *slope.T))
+        normal = np.column_stack([-up, ahead]) / np.hypot(up, ahead)[:, None]
+        inner = np.column_stack([x, y])
+        return inner, inner + thickness * normal
+
+    stones = _divide_ring(section, voussoirs, chords)
+    return _assemble_ring(stones, width, material, contact, gravity, "arch")
+
+
+def _check_ring(thickness: float, voussoirs: int, chords: int, **lengths: float) -> None:
+    """Check the lengths and numbers of a ring."""
+    check_integer(voussoirs, "voussoirs")
+    check_integer(chords, "chords")
+    for key, value in {"thickness": thickness, **lengths}.items():
+        if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
+            raise InvalidStructure(f"{key} {value:.4g} m is not between 0 and 1000 m")
+
+
+def _cumulative_length(points: Array) -> Array:
+    """Return the length of a polyline up to each of its points (n,) [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
+def _divide_ring(section: Callable[[Array], Faces], voussoirs: int, chords: int) -> list[Faces]:
+    """Return the faces of equal stones from a parametrisation of intrados and extrados."""
+    shares = np.linspace(0.0, 1.0, voussoirs * chords + 1)
+    inner, outer = section(shares)
+    ends = [(k * chords, (k + 1) * chords + 1) for k in range(voussoirs)]
+    return [(inner[a:b], outer[a:b]) for a, b in ends]
+
+
+def _mirror_stones(left: list[Faces], count: int) -> list[Faces]:
+    """Return the faces of all stones from the left half; for an odd count the last is a half."""
+
+    def mirror(points: Array) -> Array:
+        return points[::-1] * (-1.0, 1.0)
+
+    if count % 2 == 0:
+        return [*left, *((mirror(a), mirror(b)) for a, b in reversed(left))]
+    inner, outer = (np.concatenate([half, mirror(half)[1:]]) for half in left[-1])
+    return [*left[:-1], (inner, outer), *((mirror(a), mirror(b)) for a, b in reversed(left[:-1]))]
+
+
+def _assemble_ring(
+    stones: Sequence[Faces],
+    width: float,
+    material: Material,
+    contact: Contact,
+    gravity: float,
+    name: str,
+) -> Structure:
+    """Assemble stones, from left to right, between two fixed abutments."""
+    sections = [(inner[0], outer[0]) for inner, outer in stones]
+    sections.append((stones[-1][0][-1], stones[-1][1][-1]))
+    faces = [(_as_point(inner), _as_point(outer)) for inner, outer in sections]
+    blocks = [
+        Block(
+            (*map(_as_point, inner), *map(_as_point, outer[::-1])),
+            material,
+            f"voussoir {k}",
+            corners=(0, len(inner) - 1, len(inner), len(inner) + len(outer) - 1),
+            part="arch",
+            role="ring",
+        )
+        for k, (inner, outer) in enumerate(stones, 1)
+    ]
+    depth = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
+    left = build_abutment(faces[0], -1.0, depth, material, "left abutment")
+    right = build_abutment(faces[-1], 1.0, depth, material, "right abutment")
+    joints = [
+        Joint((k, k + 1), *face, contact, f"joint {k}", "arch", "ring")
+        for k, face in enumerate(faces)
+    ]
+    return Structure((left, *blocks, right), tuple(joints), width, gravity, name)
+
+
+def _as_point(place: Array) -> Point:
+    """Return coordinates as floats, with -0.0 as 0.0."""
+    return (float(place[0]) + 0.0, float(place[1]) + 0.0)

@@ -1,73 +1,165 @@
 """Outlines as people draw them: closed polygons in GeoJSON and DXF files.
 
 The drawing is an elevation: x to the right, y upwards.
+
+Drawings as DXF: closed polylines and lines on layers, in metres.
+
+A user's own mesh of gmsh (.msh) as outlines: what lies in one physical surface is one block.
+
+The file is read by meshio: nothing in it is executed.
 """
 
 import json
-from collections.abc import Collection, Iterator
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from archfem.arrays import Array
+from archfem._files import atomic_write, check_file, read_text
+from archfem._typing import Array
 from archfem.errors import InvalidInput
-from archfem.files import check_file, text_of
-from archfem.masonry.naming import did_you_mean
-from archfem.masonry.survey.tagged import part_of, physical_surfaces
+from archfem.masonry.structure import suggest_name
 from archfem.units import in_unit
 
+# Sine of the turn below which a vertex lies on a straight edge
+STRAIGHT = 1e-9
+
+# Cells that make blocks, and how many of their points are corners
+CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+
+# Cells that make physical curves
+CURVES_TAGGED = {"line", "line3"}
+
+
+def physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
+    """Return the name and the outline of each physical surface, in the order of their tags."""
+    mesh = _mesh(path)
+    names = _names(mesh, 2)
+    points = _plane_tagged(mesh.points) * factor
+    found: dict[int, list[NDArray[np.intp]]] = {}
+    for cells, tags in _tagged(mesh, set(CORNERS)):
+        for cell, tag in zip(cells.data[:, : CORNERS[cells.type]], tags, strict=True):
+            found.setdefault(int(tag), []).append(cell)
+    if not found:
+        raise InvalidInput("it has no physical surface: tag each block with one, in gmsh")
+    return [
+        (names.get(tag, f"block {tag}"), points[_outline(cells, points, names.get(tag, str(tag)))])
+        for tag, cells in sorted(found.items())
+    ]
+
+
+def physical_curves(path: Path, factor: float = 1.0) -> list[tuple[str, Array]]:
+    """Return name and edge mid-points (n, 2) [m] of each named physical curve."""
+    mesh = _mesh(path)
+    names, points = _names(mesh, 1), mesh.points[:, :2] * factor
+    found: dict[str, list[Array]] = {}
+    for cells, tags in _tagged(mesh, CURVES_TAGGED):
+        for edge, tag in zip(cells.data[:, :2], tags, strict=True):
+            if int(tag) in names:
+                found.setdefault(names[int(tag)], []).append(points[edge].mean(axis=0))
+    return [(name, np.array(middles)) for name, middles in found.items()]
+
+
+def part_of(name: str) -> str:
+    """Return the part that a block belongs to by its name: up to a comma, or without its number."""
+    head, comma, _ = name.partition(",")
+    return head.strip() if comma else re.sub(r"\s*\d+$", "", name)
+
+
+def _mesh(path: Path) -> Any:
+    """A mesh file as meshio has it."""
+    try:
+        import meshio
+    except ImportError as error:
+        raise InvalidInput(
+            "meshes are read with meshio, which is not installed: pip install 'archfem[exchange]'"
+        ) from error
+    try:
+        return meshio.gmsh.read(path)
+    except (Exception, SystemExit) as error:  # meshio and its formats raise all sorts
+        raise InvalidInput(f"it is no mesh of gmsh that meshio reads: {error}") from error
+
+
+def _names(mesh: Any, dimension: int) -> dict[int, str]:
+    """Names of the physical groups of one dimension by their tags."""
+    return {
+        int(tag): name for name, (tag, size) in mesh.field_data.items() if int(size) == dimension
+    }
+
+
+def _tagged(mesh: Any, kinds: set[str]) -> list[tuple[Any, Any]]:
+    """Cells of some kinds and the tag of the physical group of each."""
+    tags = mesh.cell_data.get("gmsh:physical", [])
+    pairs = zip(mesh.cells, tags, strict=True) if tags else ()
+    return [(cells, own) for cells, own in pairs if cells.type in kinds]
+
+
+def _plane_tagged(points: Array) -> Array:
+    """Points in the plane of x and y (n, 2)."""
+    if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-6 * np.ptp(points[:, :2]):
+        raise InvalidInput("it does not lie in the plane of x and y: mesh an elevation in it")
+    return points[:, :2]
+
+
+def _outline(cells: list[NDArray[np.intp]], points: Array, name: str) -> list[int]:
+    """Points around cells, one after another; without those on straight edges."""
+    ends: Counter[tuple[int, int]] = Counter()
+    for cell in cells:
+        x, y = points[cell].T
+        around = cell if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0 else cell[::-1]
+        ends.update((int(a), int(b)) for a, b in zip(around, np.roll(around, -1), strict=True))
+    rim = [(a, b) for a, b in ends if (b, a) not in ends]
+    after = dict(rim)
+    loop = [rim[0][0]]
+    while (following := after[loop[-1]]) != loop[0] and len(loop) <= len(rim):
+        loop.append(following)
+    if len(loop) != len(rim) or len(after) != len(rim):
+        raise InvalidInput(
+            f"physical surface '{name}' is in pieces or has a hole: tag each block by itself"
+        )
+    places = points[loop]
+    before, ahead = places - np.roll(places, 1, axis=0), np.roll(places, -1, axis=0) - places
+    turn = before[:, 0] * ahead[:, 1] - before[:, 1] * ahead[:, 0]
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(ahead, axis=1)
+    return [
+        point for point, bends in zip(loop, np.abs(turn) > STRAIGHT * lengths, strict=True) if bends
+    ]
+
+
+# Most bytes of a drawing
 LARGEST = 2**25
-"""Most bytes of a drawing."""
 
+# Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong
 SIZES = (0.02, 20.0)
-"""Between what the diagonal of half of all blocks lies [m]; otherwise the unit is wrong."""
 
+# What is read of a GeoJSON feature; others are left alone
 PROPERTIES = ("name", "part", "role", "material", "fixed")
-"""What is read of a GeoJSON feature; others are left alone."""
 
+# What stones are drawn with in DXF but cannot be read from
 CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
-"""What stones are drawn with in DXF but cannot be read from."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A closed polygon of a drawing and what the drawing says of it.
+    """A closed polygon of a drawing and what the drawing says of it."""
 
-    Attributes:
-        points: vertices, either way round, the first not repeated (n, 2) [m].
-        name: of the block.
-        layer: that it is drawn on; in GeoJSON its part.
-        material: name of its material, or None.
-        fixed: or None.
-        role: of its part, or None.
-    """
-
-    points: Array
-    name: str
-    layer: str
-    material: str | None = None
-    fixed: bool | None = None
-    role: str | None = None
+    points: Array  # vertices, either way round, the first not repeated (n, 2) [m]
+    name: str  # of the block
+    layer: str  # that it is drawn on; in GeoJSON its part
+    material: str | None = None  # name of its material, or None
+    fixed: bool | None = None  # or None
+    role: str | None = None  # of its part, or None
 
 
 def outlines_in(
     path: str | Path, unit: str | None = None, ignored: Collection[str] = ()
 ) -> list[Outline]:
-    """Return the closed polygons of a drawing.
-
-    Args:
-        path: a .geojson or .json file, a FeatureCollection of Polygons with the properties of
-            `PROPERTIES`; or a .dxf file, closed LWPOLYLINEs and POLYLINEs, each named by the TEXT
-            or MTEXT whose insertion point lies in it, or else by its layer and a number; or a .msh
-            file of gmsh, each physical surface a block on the layer that `part_of` tells.
-        unit: of the coordinates. By default what a DXF file says ($INSUNITS), metres in GeoJSON.
-        ignored: layers of a DXF file that are not read.
-
-    Raises:
-        InvalidInput: it is no such file, or holds what cannot be a block.
-    """
+    """Return the closed polygons of a drawing."""
     path = Path(path)
     readers = {".geojson": _geojson, ".json": _geojson, ".dxf": _dxf, ".msh": _msh}
     if path.suffix.lower() not in readers:
@@ -84,7 +176,7 @@ def outlines_in(
 def _geojson(path: Path, unit: str | None, ignored: Collection[str]) -> Iterator[Outline]:
     """Polygons of a GeoJSON file."""
     try:
-        found = json.loads(text_of(path, "drawing", LARGEST))
+        found = json.loads(read_text(path, "drawing", LARGEST))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"it is not JSON: {error}") from error
     if not isinstance(found, dict) or not isinstance(found.get("features"), list):
@@ -126,7 +218,7 @@ def _feature(feature: dict[str, Any], name: str, factor: float) -> Outline:
 def _check_properties(told: dict[str, Any], name: str) -> None:
     """Refuse properties that are misspelt or of the wrong kind."""
     for key in set(told) - set(PROPERTIES):
-        if hint := did_you_mean(key.lower(), PROPERTIES, 0.8):
+        if hint := suggest_name(key.lower(), PROPERTIES, 0.8):
             raise InvalidInput(f"'{name}' has a property '{key}': {hint}")
     if told.get("fixed") not in (None, True, False):
         raise InvalidInput(f"'{name}': fixed = {told['fixed']!r} is not true or false")
@@ -241,3 +333,34 @@ def _check_sizes(outlines: list[Outline]) -> None:
     if typical < SIZES[0] and away[0] <= 180.0 and away[1] <= 90.0:
         remedy += "; coordinates in degrees (CRS84) do not do: export projected metres"
     raise InvalidInput(f"a block is typically {typical:.3g} m large: {remedy}")
+
+
+# Height of names [m]
+TEXT = 0.05
+
+
+def write_dxf(
+    path: str | Path,
+    outlines: Mapping[str, Sequence[tuple[str, Array]]],
+    lines: Mapping[str, Sequence[tuple[str, Array]]] | None = None,
+) -> Path:
+    """Write a drawing that `read_outlines` reads, and any program for drawings."""
+    import ezdxf
+    import shapely
+
+    drawing = ezdxf.new("R2010", units=ezdxf.units.M)  # type: ignore[attr-defined]
+    space = drawing.modelspace()
+    for layer, polygons in outlines.items():
+        for name, points in polygons:
+            given = [(float(x), float(y)) for x, y in points]
+            space.add_lwpolyline(given, close=True, dxfattribs={"layer": layer})
+            inside = shapely.Polygon(given).representative_point()
+            note = {"layer": f"{layer} names", "height": TEXT, "insert": (inside.x, inside.y)}
+            space.add_text(name, dxfattribs=note)
+    for layer, runs in (lines or {}).items():
+        for _, points in runs:
+            given = [(float(x), float(y)) for x, y in points]
+            space.add_lwpolyline(given, dxfattribs={"layer": layer})
+    with atomic_write(Path(path)) as draft:
+        drawing.saveas(draft)
+    return Path(path)

@@ -15,13 +15,13 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.errors import InvalidStructure
-from archfem.masonry.overlaps import check_apart, check_simple
-from archfem.masonry.structure import TOUCHING
+from archfem.masonry.block import check_overlaps, check_simple
+from archfem.masonry.structure import CONTACT_TOLERANCE
 
+# Gaps up to so many times the tolerance are taken for faults of the survey
 NEARLY = 5.0
-"""Gaps up to so many times the tolerance are taken for faults of the survey."""
 
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
@@ -30,20 +30,7 @@ Boundaries = list[list[int]]
 def snapped(
     outlines: Sequence[Array], names: Sequence[str], snap: float
 ) -> tuple[list[Array], float]:
-    """Make outlines touch that nearly do.
-
-    Args:
-        outlines: vertices of each (n, 2), either way round [m].
-        names: of the blocks, for errors.
-        snap: tolerance [m].
-
-    Returns:
-        The outlines, all anticlockwise, and the largest movement of a vertex [m].
-
-    Raises:
-        InvalidStructure: an outline crosses itself, two overlap or are the same, or a gap between
-            two is little wider than the tolerance.
-    """
+    """Make outlines touch that nearly do."""
     if not snap > 0.0:
         raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
     for name, points in zip(names, outlines, strict=True):
@@ -67,7 +54,7 @@ def snapped(
         if len(boundary) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
         check_simple(points, name)
-    check_apart(found, names, NEARLY * snap)
+    check_overlaps(found, names, NEARLY * snap)
     _check_gaps(places, boundaries, names, snap)
     return found, float(moved.max())
 
@@ -186,7 +173,7 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     """Refuse blocks that nearly touch."""
     import shapely
 
-    near = TOUCHING * float(np.linalg.norm(np.ptp(places, axis=0)))
+    near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
     polygons = [shapely.Polygon(places[boundary]) for boundary in boundaries]
     tree = shapely.STRtree(polygons)
     first = {

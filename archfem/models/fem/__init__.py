@@ -1,20 +1,16 @@
-"""Meshes, spaces and forms: the one place that knows FEniCSx and gmsh.
+"""Finite elements: gmsh meshes, function spaces and UFL forms.
 
-edges         edges that touching blocks share
-division      into how many cells each edge is cut
-mesh          one conforming mesh of all blocks
-meshes        those made lately, for structures of the same shapes
-space         the Lagrange space broken across joints
-joint_facets  what points on joint facets carry into forms, and what is read there
-joint_forms   gap, slip and tractions of joints in UFL
-forms         weak forms of blocks and joints
-step_forms    the same, averaged over a step in time
-_fenicsx      what differs between versions of DOLFINx
+    _fenicsx       DOLFINx version differences
+    edge_division  edges and cells along them
+    forms          UFL forms of blocks and joints
+    joint_facets   facets of joints and their two sides
+    mesh           conforming gmsh mesh
+    space          space broken across joints
 
-Start reading at `mesh`, then at `space`.
+Only this package imports gmsh and FEniCSx.
 """
 
-from archfem.packages import needed
+from archfem._optional import require_package
 
-with needed("FEniCSx"):
+with require_package("FEniCSx"):
     from archfem.models.fem import _fenicsx as _fenicsx

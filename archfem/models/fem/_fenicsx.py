@@ -1,7 +1,7 @@
-"""The one place that touches what differs between versions of DOLFINx.
+"""Functions of DOLFINx that differ between its versions.
 
-Features are tested, never version numbers: it works with 0.5 (Debian 12), 0.9 (Debian 13) and 0.11.
-Everything here is serial: one analysis is one process.
+Features are tested, never version numbers: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11 work. All of
+it is serial: one analysis is one process.
 """
 
 import logging
@@ -16,7 +16,7 @@ from scipy import sparse
 
 from archfem._petsc import PETSc
 
-# The form compiler reports each call of the C compiler on the root logger; that is noise here.
+# The form compiler reports each call of the C compiler on the root logger.
 logging.getLogger().addFilter(lambda record: "distutils" not in record.pathname)
 
 if "dolfinx" not in sys.modules:
@@ -42,52 +42,51 @@ COMM = MPI.COMM_SELF
 Numbers = NDArray[np.int32]
 
 
-def mesh_from_gmsh(model: Any) -> tuple[Any, Any, Any]:
-    """Turn the current gmsh model into a plane mesh, its cell tags and its facet tags."""
+def import_gmsh_mesh(model: Any) -> tuple[Any, Any, Any]:
+    """Return the current gmsh model as a plane mesh, its cell tags and its facet tags."""
     grid, cells, facets = _gmsh_io.model_to_mesh(model, COMM, 0, gdim=2)[:3]
     return grid, cells, facets
 
 
-def connect(grid: Any, start: int, end: int) -> Any:
-    """Give the entities of dimension `end` at each of dimension `start`; index it with a number."""
+def find_connectivity(grid: Any, start: int, end: int) -> Any:
+    """Return a function from an entity of dimension `start` to those of `end` at it."""
     topology = getattr(grid.topology, "_cpp_object", grid.topology)
     topology.create_connectivity(start, end)
-    connectivity = grid.topology.connectivity(start, end)
-    return connectivity.links
+    return grid.topology.connectivity(start, end).links
 
 
-def tags(grid: Any, dimension: int, entities: Numbers, values: Numbers) -> Any:
-    """Tag entities of a mesh."""
+def tag_entities(grid: Any, dimension: int, entities: Numbers, values: Numbers) -> Any:
+    """Return tags of entities of a mesh."""
     order = np.argsort(entities)
     return dolfinx.mesh.meshtags(
         grid, dimension, entities[order].astype(np.int32), values[order].astype(np.int32)
     )
 
 
-def space(grid: Any, kind: str, degree: int, size: int) -> Any:
-    """A space of vectors with so many components."""
+def vector_space(grid: Any, kind: str, degree: int, size: int) -> Any:
+    """Return a space of vectors with `size` components."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(grid, (kind, degree, (size,)))
     return fem.VectorFunctionSpace(grid, (kind, degree), dim=size)
 
 
 def cell_dofs(space: Any) -> Numbers:
-    """Nodes of each cell (n_cells, nodes a cell); a node has one dof a component."""
+    """Return the nodes of each cell (n_cells, nodes a cell); a node has one dof a component."""
     listed = space.dofmap.list
     flat = listed.array if hasattr(listed, "array") else np.asarray(listed)
     return flat.reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
 def facet_nodes(space: Any) -> Numbers:
-    """Positions in a cell's node list of the nodes on each of its facets (facets, nodes)."""
+    """Return positions in a cell's node list of the nodes on its facets (facets, nodes)."""
     layout = space.dofmap.dof_layout
     facets = space.mesh.ufl_cell().num_facets
     count = facets() if callable(facets) else facets
     return np.array([layout.entity_closure_dofs(1, facet) for facet in range(count)])
 
 
-def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
-    """Give the same space with other node numbers (n_cells, nodes a cell) from 0 to count - 1."""
+def renumber_space(space: Any, numbers: Numbers, count: int) -> Any:
+    """Return a space with other node numbers (n_cells, nodes a cell) from 0 to count - 1."""
     old = space.dofmap
     dofmap = cpp.fem.DofMap(
         old.dof_layout,
@@ -111,32 +110,32 @@ def renumbered(space: Any, numbers: Numbers, count: int) -> Any:
 
 
 def jump_measure(grid: Any, facets: Any, rule: str, degree: int) -> Any:
-    """Measure over tagged interior facets with a quadrature rule of this polynomial degree."""
+    """Return the measure over tagged interior facets with a quadrature rule of a degree."""
     metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
     return ufl.Measure("dS", domain=grid, subdomain_data=facets, metadata=metadata)
 
 
 def cell_measure(grid: Any, cells: Any) -> Any:
-    """Measure over tagged cells."""
+    """Return the measure over tagged cells."""
     return ufl.Measure("dx", domain=grid, subdomain_data=cells)
 
 
 def constant(grid: Any, value: Any) -> Any:
-    """A number in a form that may change without compiling it again."""
+    """Return a number in a form that may change without another compilation."""
     return fem.Constant(grid, PETSc.ScalarType(value))
 
 
-def assembled_matrix(form: Any) -> sparse.csr_matrix:
+def assemble_matrix(form: Any) -> sparse.csr_matrix:
     """Assemble a bilinear form."""
     matrix = fem.petsc.assemble_matrix(form)
     matrix.assemble()
     indptr, indices, data = matrix.getValuesCSR()
-    result = sparse.csr_matrix((data, indices, indptr), matrix.getSize())
-    matrix.destroy()
-    return result
+    assembled = sparse.csr_matrix((data, indices, indptr), matrix.getSize())
+    matrix.destroy()  # PETSc objects are not garbage collected reliably
+    return assembled
 
 
-def assembled_vector(form: Any) -> NDArray[np.float64]:
+def assemble_vector(form: Any) -> NDArray[np.float64]:
     """Assemble a linear form."""
     vector = fem.petsc.assemble_vector(form)
     values: NDArray[np.float64] = vector.array.copy()
@@ -144,15 +143,15 @@ def assembled_vector(form: Any) -> NDArray[np.float64]:
     return values
 
 
-def points_of_vertices(grid: Any) -> Numbers:
-    """Number of the geometry point of each vertex (n_vertices,)."""
-    corners = connect(grid, 2, 0)
+def find_vertex_points(grid: Any) -> Numbers:
+    """Return the geometry point of each vertex (n_vertices,)."""
+    corners = find_connectivity(grid, 2, 0)
     try:
         listed = grid.geometry.dofmaps[0]
     except (AttributeError, TypeError):
         listed = grid.geometry.dofmap
-    result = np.zeros(grid.topology.index_map(0).size_local, dtype=np.int32)
+    points = np.zeros(grid.topology.index_map(0).size_local, dtype=np.int32)
     for cell in range(grid.topology.index_map(2).size_local):
         nodes = listed.links(cell) if hasattr(listed, "links") else listed[cell]
-        result[corners(cell)] = nodes
-    return result
+        points[corners(cell)] = nodes
+    return points

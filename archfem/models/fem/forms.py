@@ -1,15 +1,20 @@
-"""Weak forms in UFL: the definition that everything else is measured against.
+"""Weak forms of blocks and joints in UFL: the definition behind all meshed models.
 
 Find u in the broken space such that for all v
 
     ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t) = ∫ w ρ b·v
 
-with plane stress σ and the tractions of `joints.law`, of the gap g = ⟦u⟧·n and the slip s = ⟦u⟧·t:
+with plane stress σ and the tractions of `joints.contact_law`, of the gap g = ⟦u⟧·n and the slip
+s = ⟦u⟧·t:
 
     t_n = k_n <g>_-,    t_s = k_s (s - s_p),    |t_s| ≤ μ |t_n| + c on the closed part of a joint,
 
-where s_p is how far each point had slid for good, and has to grow where friction does not hold t_s.
-Joints without friction coefficient never slide. `step_forms` has the means of all over a step.
+where s_p is the irreversible slip of each point, which grows where friction does not hold t_s.
+Joints without friction coefficient never slide. `models.reference` has the means over a step.
+
+With n the normal from one side of a facet to the other and ⟦u⟧ the jump along it, neither gap nor
+slip depends on which side comes first. Here t is ±n rotated to the left, with the sign that, for n
+from the lower to the higher block, lets t point to the extrados.
 """
 
 from dataclasses import dataclass
@@ -21,31 +26,178 @@ import ufl
 from dolfinx import fem
 from scipy import sparse
 
-from archfem.arrays import Array
+from archfem._typing import Array
+from archfem.joints.contact_law import (
+    clip_to_friction,
+    closed_fraction,
+    friction_excess,
+    mean_closing,
+    normal_traction,
+    shear_over_step,
+    shear_traction,
+)
+from archfem.joints.operator import SLIP_LIMIT_TOLERANCE
 from archfem.joints.quadrature import Quadrature
 from archfem.models.fem import _fenicsx
-from archfem.models.fem.joint_facets import JointFacets, Reading
-from archfem.models.fem.joint_forms import Faces, Fields
+from archfem.models.fem.joint_facets import JointFacets, Patch, PointReader
 from archfem.models.fem.space import BrokenSpace
+
+# Overlap of faces that just touch [m], and friction reserve there [Pa]: far below round-off of any
+# other value, but it makes UFL's derivatives those of a closed joint that holds
+CONTACT_PERTURBATION = 1e-200
+
+Fields = tuple[Any, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFaces:
+    """UFL expressions of gap, slip and tractions on the facets of one contact and colour."""
+
+    facets: JointFacets  # on all joints
+    patch: Patch  # those of this contact and of one colour
+
+    def _number(self, value: float) -> Any:
+        return _fenicsx.constant(self.facets.space.mesh.grid, value)
+
+    @cached_property
+    def _stiffness(self) -> Fields:
+        """k_n and k_s [Pa/m]."""
+        contact = self.patch.contact
+        return self._number(contact.normal_stiffness), self._number(contact.shear_stiffness)
+
+    @cached_property
+    def _strength(self) -> Fields:
+        """Friction μ [-] and cohesion c [Pa]."""
+        contact = self.patch.contact
+        return self._number(contact.coefficient), self._number(contact.cohesion)
+
+    @cached_property
+    def _normal(self) -> Any:
+        return ufl.FacetNormal(self.facets.space.mesh.grid)("+")
+
+    def opening(self, u: Any) -> Any:
+        """Return the gap of a displacement, positive open [m]."""
+        return ufl.dot(u("-") - u("+"), self._normal)
+
+    def slip(self, u: Any) -> Any:
+        """Return the slip of a displacement, of the higher block toward the extrados [m]."""
+        tangent = self.facets.tangent_sign(self.patch.colour) * ufl.perp(self._normal)
+        return ufl.dot(u("-") - u("+"), tangent)
+
+    def _trial_shear(self, u: Any) -> Any:
+        """Traction along the joint without further slip [Pa]."""
+        slip = self.slip(u) - self.facets.point_values(self.patch.colour)
+        return shear_traction(slip, self._stiffness[1])
+
+    def _limit(self, normal: Any, closed: Any) -> Any:
+        """Coulomb's limit, μ |t_n| + c where closed [Pa]."""
+        friction, cohesion = self._strength
+        return cohesion * closed - friction * normal
+
+    def tractions(self, u: Any) -> Fields:
+        """Return the tractions across and along the joint [Pa]."""
+        return self._tractions(u, 0.0)
+
+    def tangent_tractions(self, u: Any, fixed: Any) -> Fields:
+        """Return tractions for the tangent: points that slide by round-off alone hold.
+
+        The limit is a little larger; `fixed` equals u, but the derivative by u leaves it constant.
+        """
+        if not self.patch.contact.slides:
+            return self.tractions(u)
+        limit, closed = self._limit_of(fixed), self._closed(fixed)
+        return self._tractions(u, SLIP_LIMIT_TOLERANCE * limit + CONTACT_PERTURBATION * closed)
+
+    def _tractions(self, u: Any, reserve: Any) -> Fields:
+        """Tractions with a reserve on Coulomb's limit [Pa]."""
+        normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
+        shear = self._trial_shear(u)
+        if self.patch.contact.slides:
+            shear = clip_to_friction(shear, self._limit_of(u) + reserve)
+        return normal, shear
+
+    def _closed(self, u: Any) -> Any:
+        """One where the joint is closed, else zero [-]."""
+        return ufl.conditional(ufl.lt(self.opening(u) - CONTACT_PERTURBATION, 0.0), 1.0, 0.0)
+
+    def _limit_of(self, u: Any) -> Any:
+        """Coulomb's limit of a displacement [Pa]."""
+        normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
+        return self._limit(normal, self._closed(u))
+
+    def energy(self, u: Any) -> Any:
+        """Return the energy stored per area without further slip [J/m²]."""
+        normal = normal_traction(self.opening(u), self._stiffness[0])
+        return 0.5 * (normal * self.opening(u) + self._trial_shear(u) ** 2 / self._stiffness[1])
+
+    def updated_slip(self, u: Any) -> Any:
+        """Return the irreversible slip once the joint is displaced by u [m]."""
+        return self._irreversible_slip(u, self.tractions(u)[1])
+
+    def _irreversible_slip(self, u: Any, shear: Any) -> Any:
+        """Slip less its elastic part [m]."""
+        if not self.patch.contact.slides:
+            return self.facets.point_values(self.patch.colour)
+        return self.slip(u) - shear / self._stiffness[1]
+
+    def _gap_path(self, step: Fields, lag: Any) -> Fields:
+        """Gaps at both ends of the step, shifted by the lag of damping [m]."""
+        before, after = (self.opening(u) - CONTACT_PERTURBATION for u in step)
+        ahead = lag * (after - before)
+        return before + ahead, after + ahead
+
+    def _shear_path(self, step: Fields) -> Fields:
+        """Elastic traction at the start, and its change without further slip [Pa]."""
+        return self._trial_shear(step[0]), shear_traction(
+            self.slip(step[1]) - self.slip(step[0]), self._stiffness[1]
+        )
+
+    def _mean_limit(self, step: Fields, lag: Any) -> Any:
+        """Coulomb's limit over a step: that of the mean normal traction [Pa]."""
+        path = self._gap_path(step, lag)
+        return self._limit(self._stiffness[0] * mean_closing(*path), closed_fraction(*path))
+
+    def _mean_shear(self, step: Fields, lag: Any, shear_lag: Any) -> Fields:
+        """Mean shear with the limit at `lag`, and its elastic part at the end [Pa]."""
+        first, change = self._shear_path(step)
+        if not self.patch.contact.slides:
+            return first + (0.5 + shear_lag) * change, first + change
+        return shear_over_step(first, change, shear_lag, self._mean_limit(step, lag))
+
+    def means(self, step: Fields, lag: Any) -> Fields:
+        """Return the means over a step of the tractions across and along the joint [Pa]."""
+        normal = self._stiffness[0] * mean_closing(*self._gap_path(step, lag))
+        return normal, self._mean_shear(step, lag, lag)[0]
+
+    def slip_after_step(self, step: Fields, lag: Any) -> Any:
+        """Return the irreversible slip at the end of a step [m]."""
+        return self._irreversible_slip(step[1], self._mean_shear(step, lag, lag)[1])
+
+    def dissipation(self, step: Fields, lag: Any) -> Any:
+        """Return the energy per area lost to friction and damping over a step [J/m²]."""
+        # damping across the joint: lagged minus unlagged mean traction, on the change of the gap
+        before, after = self._gap_path(step, 0.0)
+        ahead = mean_closing(*self._gap_path(step, lag)) - mean_closing(before, after)
+        across = self._stiffness[0] * ahead * (after - before)
+        first, change = self._shear_path(step)
+        lagged, mean = (self._mean_shear(step, lag, each)[0] for each in (lag, 0.0))
+        along = (lagged - mean) * change
+        if self.patch.contact.slides:
+            # energy lost by a shear limit lowered at the start, and friction along the slip
+            limit = self._mean_limit(step, lag)
+            start = clip_to_friction(first, limit)
+            excess = abs(friction_excess(start + change, limit))
+            along += 0.5 * (first**2 - start**2) + excess * limit
+        return across + along / self._stiffness[1]
 
 
 def strain(u: Any) -> Any:
-    """Return the small strain ε(u), a UFL expression.
-
-    Args:
-        u: displacement, a UFL expression [m].
-    """
+    """Return the small strain ε(u), a UFL expression."""
     return ufl.sym(ufl.grad(u))
 
 
 def plane_stress(u: Any, young: Any, poisson: Any) -> Any:
-    """Return the stress of a linear elastic sheet that is free out of plane [Pa].
-
-    Args:
-        u: displacement, a UFL expression [m].
-        young: Young's modulus [Pa].
-        poisson: Poisson's ratio [-].
-    """
+    """Return the stress of a linear elastic sheet that is free out of plane [Pa]."""
     shear = young / (2.0 * (1.0 + poisson))
     plane = young * poisson / (1.0 - poisson**2)
     return 2.0 * shear * strain(u) + plane * ufl.tr(strain(u)) * ufl.Identity(2)
@@ -57,35 +209,31 @@ class Forms:
 
     Materials and contacts enter as constants of the forms, so that changing a number compiles
     nothing. Matrices and vectors are over all nodes, those of fixed blocks included.
-
-    Attributes:
-        space: of the displacements.
-        rule: quadrature along the joints.
     """
 
-    space: BrokenSpace
-    rule: Quadrature
+    space: BrokenSpace  # of the displacements
+    rule: Quadrature  # quadrature along the joints
 
     @cached_property
     def _measures(self) -> list[tuple[Any, Any]]:
-        """Pairs (material, its dx)."""
+        """Materials and the measures over their cells."""
         mesh, structure = self.space.mesh, self.space.mesh.structure
         materials = list(dict.fromkeys(block.material for block in structure.blocks))
         of_block = np.array([materials.index(block.material) for block in structure.blocks])
         cells = np.arange(len(mesh.blocks), dtype=np.int32)
-        tags = _fenicsx.tags(mesh.grid, 2, cells, of_block[mesh.blocks])
+        tags = _fenicsx.tag_entities(mesh.grid, 2, cells, of_block[mesh.blocks])
         dx = _fenicsx.cell_measure(mesh.grid, tags)
         return [(material, dx(k)) for k, material in enumerate(materials)]
 
     @cached_property
     def facets(self) -> JointFacets:
-        """Facets on joints, and what their points carry."""
+        """Facets on joints, and values at their points."""
         return JointFacets(self.space, self.rule)
 
     @cached_property
-    def faces(self) -> list[Faces]:
-        """Faces of joints, of one contact each."""
-        return [Faces(self.facets, patch) for patch in self.facets.patches]
+    def faces(self) -> list[ContactFaces]:
+        """Faces of the joints, one entry for each contact and colour."""
+        return [ContactFaces(self.facets, patch) for patch in self.facets.patches]
 
     def _number(self, value: float) -> Any:
         return _fenicsx.constant(self.space.mesh.grid, value)
@@ -94,13 +242,8 @@ class Forms:
     def _width(self) -> Any:
         return self._number(self.space.mesh.structure.width)
 
-    def bodies(self, u: Any, v: Any) -> Any:
-        """Return ∫ w σ(u):ε(v), a UFL form.
-
-        Args:
-            u: displacement, a UFL expression [m].
-            v: another.
-        """
+    def block_work(self, u: Any, v: Any) -> Any:
+        """Return ∫ w σ(u):ε(v), a UFL form."""
         width = self._width
         terms = [
             width
@@ -111,42 +254,26 @@ class Forms:
         return sum(terms[1:], terms[0])
 
     def over_joints(self, densities: list[Any]) -> Any:
-        """Return Σ ∫ w d over the joints, a UFL form.
-
-        Args:
-            densities: for each of `faces`, a UFL expression.
-        """
+        """Return Σ ∫ w d over the joints, a UFL form."""
         width = self._width
         pairs = zip(densities, self.faces, strict=True)
         terms = [width * density * faces.patch.measure for density, faces in pairs]
         return sum(terms[1:], terms[0])
 
-    def pushed(self, tractions: list[Fields], v: Any) -> Any:
-        """Return Σ ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t), a UFL form.
-
-        Args:
-            tractions: across and along the joint, for each of `faces`, UFL expressions [Pa].
-            v: displacement, a UFL expression.
-        """
+    def joint_work(self, tractions: list[Fields], v: Any) -> Any:
+        """Return Σ ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t), a UFL form."""
         pairs = zip(tractions, self.faces, strict=True)
         return self.over_joints([n * f.opening(v) + s * f.slip(v) for (n, s), f in pairs])
 
-    def reading(self, values: list[list[Any]]) -> Reading:
-        """Compile what reads values at the points of joints.
-
-        Args:
-            values: for each of `faces`, n UFL expressions.
-
-        Returns:
-            What `JointFacets.read` takes.
-        """
+    def point_reader(self, values: list[list[Any]]) -> PointReader:
+        """Compile the form that evaluates expressions at the points of joints."""
         patches = [faces.patch for faces in self.faces]
-        return self.facets.reading(list(zip(patches, values, strict=True)))
+        return self.facets.point_reader(list(zip(patches, values, strict=True)))
 
     def stiffness(self) -> sparse.csr_matrix:
         """Assemble the blocks' stiffness [N/m]."""
         u, v = ufl.TrialFunction(self.space.functions), ufl.TestFunction(self.space.functions)
-        return _fenicsx.assembled_matrix(fem.form(self.bodies(u, v)))
+        return _fenicsx.assemble_matrix(fem.form(self.block_work(u, v)))
 
     def mass(self) -> sparse.csr_matrix:
         """Assemble the consistent mass [kg]."""
@@ -157,97 +284,76 @@ class Forms:
             width * self._number(m.unit_weight / structure.gravity) * ufl.inner(u, v) * dx
             for m, dx in self._measures
         ]
-        return _fenicsx.assembled_matrix(fem.form(sum(terms[1:], terms[0])))
+        return _fenicsx.assemble_matrix(fem.form(sum(terms[1:], terms[0])))
 
     @cached_property
     def _displacements(self) -> Fields:
-        """The displacement, and the same where derivatives shall not see it."""
+        """The displacement, and an equal one that derivatives leave constant."""
         return fem.Function(self.space.functions), fem.Function(self.space.functions)
 
-    def _placed(self, displacement: Array, slid: Array | None) -> None:
-        """Give all forms a displacement, and how far each joint point has slid before."""
+    def _set_state(self, displacement: Array, slip: Array | None) -> None:
+        """Set displacement and irreversible slip in all forms."""
         for u in self._displacements:
             u.x.array[:] = displacement
-        self.facets.carry(np.zeros(self.facets.count) if slid is None else slid)
+        self.facets.set_point_values(np.zeros(self.facets.count) if slip is None else slip)
 
     @cached_property
     def _force(self) -> Any:
         u, v = self._displacements[0], ufl.TestFunction(self.space.functions)
-        pushed = self.pushed([faces.tractions(u) for faces in self.faces], v)
-        return fem.form(self.bodies(u, v) + pushed)
+        of_joints = self.joint_work([faces.tractions(u) for faces in self.faces], v)
+        return fem.form(self.block_work(u, v) + of_joints)
 
-    def force(self, displacement: Array, slid: Array | None = None) -> Array:
-        """Return the assembled internal forces of blocks and joints (2 m,) [N].
-
-        Args:
-            displacement: of all nodes (2 m,) [m].
-            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
-        """
-        self._placed(displacement, slid)
-        return _fenicsx.assembled_vector(self._force)
+    def force(self, displacement: Array, slip: Array | None = None) -> Array:
+        """Return the assembled internal forces of blocks and joints (2 m,) [N]."""
+        self._set_state(displacement, slip)
+        return _fenicsx.assemble_vector(self._force)
 
     @cached_property
     def _tangent(self) -> Any:
-        (u, same), v = self._displacements, ufl.TestFunction(self.space.functions)
-        pushed = self.pushed([faces.steady_tractions(u, same) for faces in self.faces], v)
-        return fem.form(ufl.derivative(self.bodies(u, v) + pushed, u))
+        (u, fixed), v = self._displacements, ufl.TestFunction(self.space.functions)
+        of_joints = self.joint_work([f.tangent_tractions(u, fixed) for f in self.faces], v)
+        return fem.form(ufl.derivative(self.block_work(u, v) + of_joints, u))
 
-    def tangent(self, displacement: Array, slid: Array | None = None) -> sparse.csr_matrix:
-        """Return the assembled derivative of `force` (2 m, 2 m) [N/m].
-
-        Args:
-            displacement: of all nodes (2 m,) [m].
-            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
-        """
-        self._placed(displacement, slid)
-        return _fenicsx.assembled_matrix(self._tangent)
+    def tangent(self, displacement: Array, slip: Array | None = None) -> sparse.csr_matrix:
+        """Return the assembled derivative of `force` (2 m, 2 m) [N/m]."""
+        self._set_state(displacement, slip)
+        return _fenicsx.assemble_matrix(self._tangent)
 
     @cached_property
     def _energy(self) -> Any:
         u = self._displacements[0]
         stored = self.over_joints([faces.energy(u) for faces in self.faces])
-        return fem.form(0.5 * self.bodies(u, u) + stored)
+        return fem.form(0.5 * self.block_work(u, u) + stored)
 
-    def energy(self, displacement: Array, slid: Array | None = None) -> float:
-        """Return the potential energy of blocks and joints if nothing slid any further [J].
-
-        Args:
-            displacement: of all nodes (2 m,) [m].
-            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
-        """
-        self._placed(displacement, slid)
+    def energy(self, displacement: Array, slip: Array | None = None) -> float:
+        """Return the potential energy of blocks and joints without further slip [J]."""
+        self._set_state(displacement, slip)
         return float(fem.assemble_scalar(self._energy))
 
     @cached_property
-    def _tractions(self) -> Reading:
+    def _tractions(self) -> PointReader:
         u = self._displacements[0]
-        return self.reading([[*faces.tractions(u), faces.slid(u)] for faces in self.faces])
+        return self.point_reader(
+            [[*faces.tractions(u), faces.updated_slip(u)] for faces in self.faces]
+        )
 
-    def tractions(self, displacement: Array, slid: Array | None = None) -> Array:
-        """Return what acts at the points of each joint facet, and how far they have slid then.
-
-        Args:
-            displacement: of all nodes (2 m,) [m].
-            slid: how far each joint point has slid for good (p,) [m]; None where nothing has.
-
-        Returns:
-            Tractions across and along the joint [Pa], and how far the points have slid for good
-            [m], as `JointFacets.read` (3, f, k).
-        """
-        self._placed(displacement, slid)
+    def tractions(self, displacement: Array, slip: Array | None = None) -> Array:
+        """Return tractions and irreversible slip of the points of each joint facet (3, f, k)."""
+        self._set_state(displacement, slip)
         return self.facets.read(self._tractions)
 
     def stress(self) -> sparse.csr_matrix:
-        """Mean stress of each cell, (σ_xx, σ_yy, σ_xy), from nodal displacements (3 cells, 2 m)."""
+        """Return the matrix from nodal displacements to mean stresses of the cells (3 n, 2 m)."""
         grid = self.space.mesh.grid
-        cellwise = _fenicsx.space(grid, "DG", 0, 3)
+        cellwise = _fenicsx.vector_space(grid, "DG", 0, 3)
         u, test = ufl.TrialFunction(self.space.functions), ufl.TestFunction(cellwise)
         terms = []
         for m, dx in self._measures:
             s = plane_stress(u, self._number(m.young), self._number(m.poisson))
             terms.append(ufl.inner(ufl.as_vector([s[0, 0], s[1, 1], s[0, 1]]), test) * dx)
-        integral = _fenicsx.assembled_matrix(fem.form(sum(terms[1:], terms[0])))
+        integral = _fenicsx.assemble_matrix(fem.form(sum(terms[1:], terms[0])))
         ones = ufl.inner(ufl.as_vector([1.0, 1.0, 1.0]), test) * ufl.dx(domain=grid)
-        areas = _fenicsx.assembled_vector(fem.form(ones))
+        areas = _fenicsx.assemble_vector(fem.form(ones))
+        # σ_xx, σ_yy, σ_xy of each cell in turn
         order = (3 * _fenicsx.cell_dofs(cellwise) + np.arange(3)).ravel()
         return (sparse.diags(1.0 / areas) @ integral)[order]

@@ -1,9 +1,9 @@
-"""Points on joint facets in weak forms: what they carry into integrals, and what is read there.
+"""Quadrature points on joint facets in weak forms: values set there, and values read there.
 
-Forms know functions, not points. Here a number at each point of a facet is a function that is
-constant around the point, which a quadrature rule with the same points sees as it is: facets carry
-their numbers in the cells at their sides, in a colour of their own where a cell has several facets
-on joints. Read the other way, the integral against such functions gives the values at points.
+UFL integrates functions and has no point values. A value at each point of a facet is therefore a
+function that is constant around the point, which a quadrature rule with the same points integrates
+exactly. The values of a facet are stored in the cells at its sides, under a colour of its own where
+a cell has several facets on joints. Integrals against such functions give values at the points.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 
-from archfem.arrays import Array
+from archfem._typing import Array
 from archfem.joints.quadrature import Quadrature
 from archfem.masonry.materials import Contact
 from archfem.models.fem import _fenicsx
@@ -23,50 +23,34 @@ from archfem.models.fem.space import BrokenSpace
 
 Numbers = NDArray[np.intp]
 
-PLACE = 5
-"""Numbers that place a facet: its beginning, direction over length, and sense of slips."""
+# Values that describe a facet before those of its points: x and y of its beginning, direction over
+# length (x, y), and the sign of its tangent
+FACET_VALUE_COUNT = 5
 
 
 @dataclass(frozen=True)
 class Patch:
-    """The facets of one contact and one colour, none of which share a cell.
-
-    Attributes:
-        contact: how their faces touch.
-        colour: number of the set of facets.
-        measure: integrates over them by the rule.
-    """
+    """The facets of one contact and one colour, none of which share a cell."""
 
     contact: Contact
     colour: int
-    measure: Any
+    measure: Any  # UFL measure over them with the quadrature rule
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """A compiled form that reads values at the points of all facets.
+class PointReader:
+    """A compiled form that evaluates n expressions at the k points of all facets."""
 
-    Attributes:
-        form: linear, on functions constant in each cell.
-        places: of the n values at each facet's points, on either side, in what is assembled
-            (f, 2, n k).
-    """
-
-    form: Any
-    places: Numbers
+    form: Any  # linear, on functions constant in each cell
+    places: Numbers  # entries of the assembled vector, for each facet and side (f, 2, n k)
 
 
 @dataclass(frozen=True, eq=False)
 class JointFacets:
-    """The facets on all joints, in the order of their joints, along each of them.
+    """The facets on all joints, in the order of their joints, along each of them."""
 
-    Attributes:
-        space: of the displacements.
-        rule: quadrature on each facet, of k points.
-    """
-
-    space: BrokenSpace
-    rule: Quadrature
+    space: BrokenSpace  # of the displacements
+    rule: Quadrature  # quadrature on each facet, of k points
 
     @property
     def size(self) -> int:
@@ -74,49 +58,50 @@ class JointFacets:
         return self.rule.count(self.space.degree)
 
     @cached_property
-    def _found(self) -> tuple[Numbers, Numbers, Array]:
-        """Facets (f,), numbers of their joints (f,), and arms of their ends (f, 2) [m]."""
+    def _sorted(self) -> tuple[Numbers, Numbers, Array]:
+        """Facets (f,), their joints (f,), and offsets of their ends from mid-depth (f, 2) [m]."""
         facets, joint = self.space.mesh.joints
-        arms = np.array([self._arms(*each) for each in zip(facets, joint, strict=True)])
-        order = np.lexsort((arms[:, 0], joint))
-        return facets[order], joint[order].astype(np.intp), arms[order]
+        ends = np.array([self._end_offsets(*pair) for pair in zip(facets, joint, strict=True)])
+        order = np.lexsort((ends[:, 0], joint))
+        return facets[order], joint[order].astype(np.intp), ends[order]
 
-    def _arms(self, facet: int, number: int) -> Array:
-        """From where to where along its joint a facet goes (2,) [m]."""
+    def _end_offsets(self, facet: int, number: int) -> Array:
+        """Return the offsets of both ends of a facet from the joint's mid-depth (2,) [m]."""
         grid, joint = self.space.mesh.grid, self.space.mesh.structure.joints[number]
-        cell = _fenicsx.connect(grid, 1, 2)(facet)[0]
-        position = int(np.flatnonzero(_fenicsx.connect(grid, 2, 1)(cell) == facet)[0])
+        cell = _fenicsx.find_connectivity(grid, 1, 2)(facet)[0]
+        position = int(np.flatnonzero(_fenicsx.find_connectivity(grid, 2, 1)(cell) == facet)[0])
         nodes = self.space.cells[cell][_fenicsx.facet_nodes(self.space.functions)[position]]
-        arms = (self.space.places[nodes] - joint.middle) @ joint.tangent
-        return np.array([arms.min(), arms.max()])
+        offsets = (self.space.places[nodes] - joint.middle) @ joint.tangent
+        return np.array([offsets.min(), offsets.max()])
 
     @property
     def numbers(self) -> Numbers:
         """Numbers of the facets in the mesh (f,)."""
-        return self._found[0]
+        return self._sorted[0]
 
     @property
     def joint(self) -> Numbers:
         """Number of each facet's joint (f,)."""
-        return self._found[1]
+        return self._sorted[1]
 
     @cached_property
     def _cells(self) -> Numbers:
         """Cells at each facet (f, 2)."""
-        cells_at = _fenicsx.connect(self.space.mesh.grid, 1, 2)
+        cells_at = _fenicsx.find_connectivity(self.space.mesh.grid, 1, 2)
         return np.array([cells_at(facet) for facet in self.numbers])
 
     @cached_property
     def colours(self) -> Numbers:
         """Colours of the facets, such that no cell has two of one colour (f,)."""
+        # greedy colouring, facet by facet
         taken: dict[int, set[int]] = {}
-        found = []
+        colours = []
         for cells in self._cells:
             used = set().union(*(taken.setdefault(cell, set()) for cell in cells))
-            found.append(next(c for c in range(len(used) + 1) if c not in used))
+            colours.append(next(c for c in range(len(used) + 1) if c not in used))
             for cell in cells:
-                taken[cell].add(found[-1])
-        return np.array(found)
+                taken[cell].add(colours[-1])
+        return np.array(colours)
 
     @property
     def _colour_count(self) -> int:
@@ -124,34 +109,29 @@ class JointFacets:
         return int(self.colours.max()) + 1
 
     @cached_property
-    def arms(self) -> Array:
-        """Distance of each facet's points from the middle of its joint (f, k) [m]."""
-        first, last = self._found[2].T[..., None]
-        found: Array = first + (last - first) * self.rule.on_facet(self.space.degree)[0]
-        return found
+    def offsets(self) -> Array:
+        """Offset of each facet's points from the joint's mid-depth (f, k) [m]."""
+        first, last = self._sorted[2].T[..., None]
+        return first + (last - first) * self.rule.on_facet(self.space.degree)[0]
 
     @cached_property
     def _lengths(self) -> Array:
-        """Length that each facet's points stand for (f, k) [m]."""
-        length: Array = np.diff(self._found[2], axis=1)
-        return length * self.rule.on_facet(self.space.degree)[1]
+        """Quadrature weights of each facet's points (f, k) [m]."""
+        return np.diff(self._sorted[2], axis=1) * self.rule.on_facet(self.space.degree)[1]
 
     @cached_property
     def points(self) -> Numbers:
-        """Number among all joint points of each facet's points (f, k).
-
-        They are numbered as those of a `JointOperator`: where neighbouring facets share a point,
-        it has one number.
-        """
-        found, count = np.empty(self.arms.shape, dtype=np.intp), 0
-        for number in range(len(self.space.mesh.structure.joints)):
-            own = self.joint == number
-            ends = self._found[2][own]
+        """Numbers of each facet's points among all joint points of a `JointOperator` (f, k)."""
+        # a point that neighbouring facets share has one number
+        numbers, count = np.empty(self.offsets.shape, dtype=np.intp), 0
+        for joint in range(len(self.space.mesh.structure.joints)):
+            facets = self.joint == joint
+            ends = self._sorted[2][facets]
             along = self.rule.on_joint(np.append(ends[:, 0], ends[-1, 1]), self.space.degree)[0]
-            off = np.abs(self.arms[own][..., None] - along)
-            found[own] = count + off.argmin(axis=-1)
+            distance = np.abs(self.offsets[facets][..., None] - along)
+            numbers[facets] = count + distance.argmin(axis=-1)
             count += len(along)
-        return found
+        return numbers
 
     @property
     def count(self) -> int:
@@ -159,12 +139,11 @@ class JointFacets:
         return int(self.points.max()) + 1
 
     @property
-    def _senses(self) -> Array:
-        """Whether the normal, turned left, shows each facet the way to the extrados (f,); ±1."""
+    def _tangent_signs(self) -> Array:
+        """1 where the normal, rotated to the left, points to the extrados, else -1 (f,)."""
         structure = self.space.mesh.structure
         x, y = structure.normals.T
-        found: Array = np.sign(np.sum(np.stack([-y, x], 1) * structure.tangents, 1))[self.joint]
-        return found
+        return np.sign(np.sum(np.stack([-y, x], 1) * structure.tangents, 1))[self.joint]
 
     @cached_property
     def patches(self) -> list[Patch]:
@@ -174,132 +153,101 @@ class JointFacets:
         of_joint = np.array([contacts.index(joint.contact) for joint in joints])
         count = self._colour_count
         numbers = of_joint[self.joint] * count + self.colours
-        tags = _fenicsx.tags(grid, 1, self.numbers, numbers)
+        tags = _fenicsx.tag_entities(grid, 1, self.numbers, numbers)
         dS = _fenicsx.jump_measure(grid, tags, *self._scheme)
         return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
 
     @property
     def _scheme(self) -> tuple[str, int]:
-        """Quadrature along joints as FFCx knows it, by the degree it integrates exactly."""
+        """Quadrature scheme of FFCx and the polynomial degree it integrates exactly."""
         if self.rule.rule == "gauss":
             return "default", 2 * self.size - 1
         return "GLL", 2 * self.size - 3
 
-    def _blank(self, size: int) -> tuple[Any, Numbers]:
-        """Functions constant in each cell, of so many numbers a colour; places (f, 2, size)."""
-        functions = _fenicsx.space(self.space.mesh.grid, "DG", 0, size * self._colour_count)
+    def _cellwise_space(self, size: int) -> tuple[Any, Numbers]:
+        """Space of functions constant in each cell, `size` a colour; entries (f, 2, size)."""
+        functions = _fenicsx.vector_space(self.space.mesh.grid, "DG", 0, size * self._colour_count)
         nodes = _fenicsx.cell_dofs(functions)[self._cells, 0]
         number = nodes.astype(np.intp) * self._colour_count + self.colours[:, None]
         return functions, size * number[..., None] + np.arange(size)
 
     @cached_property
-    def _carried(self) -> tuple[Any, Numbers]:
-        """A function with the place of each facet and a number for each of its points."""
-        functions, where = self._blank(PLACE + self.size)
+    def _values(self) -> tuple[Any, Numbers]:
+        """Function with the place of each facet and a value for each point; entries of those."""
+        functions, entries = self._cellwise_space(FACET_VALUE_COUNT + self.size)
         structure = self.space.mesh.structure
-        start, length = self._found[2][:, :1], np.diff(self._found[2], axis=1)
+        start, length = self._sorted[2][:, :1], np.diff(self._sorted[2], axis=1)
         along = structure.tangents[self.joint]
         begin = structure.middles[self.joint] + start * along
-        place = np.hstack([begin, along / length, self._senses[:, None]])
+        place = np.hstack([begin, along / length, self._tangent_signs[:, None]])
         function = fem.Function(functions)
-        function.x.array[where[..., :PLACE]] = place[:, None]
-        return function, where[..., PLACE:]
+        function.x.array[entries[..., :FACET_VALUE_COUNT]] = place[:, None]
+        return function, entries[..., FACET_VALUE_COUNT:]
 
-    def carry(self, values: Array) -> None:
-        """Give the points numbers that `carried` has in forms, such as how far they have slid.
+    def set_point_values(self, values: Array) -> None:
+        """Set the values of all joint points that `point_values` has in forms (p,)."""
+        function, entries = self._values
+        function.x.array[entries] = values[self.points][:, None]
 
-        Args:
-            values: of all joint points (p,).
-        """
-        function, where = self._carried
-        function.x.array[where] = values[self.points][:, None]
+    def _facet_values(self, colour: int) -> list[Any]:
+        """Return the values of a facet of a colour, UFL expressions."""
+        size = FACET_VALUE_COUNT + self.size
+        return [self._values[0]("+")[colour * size + k] for k in range(size)]
 
-    def _own(self, colour: int) -> list[Any]:
-        """Numbers that a facet of a colour carries, UFL expressions."""
-        size = PLACE + self.size
-        return [self._carried[0]("+")[colour * size + k] for k in range(size)]
+    def tangent_sign(self, colour: int) -> Any:
+        """Return 1 where the normal, rotated to the left, points to the extrados, else -1."""
+        return self._facet_values(colour)[FACET_VALUE_COUNT - 1]
 
-    def sense(self, colour: int) -> Any:
-        """Return 1 where the normal, turned left, shows the way to the extrados, else -1.
+    def point_values(self, colour: int) -> Any:
+        """Return the values set at the points, a UFL expression."""
+        values = self._facet_values(colour)[FACET_VALUE_COUNT:]
+        pairs = zip(values, self._indicators(colour), strict=True)
+        return sum(value * indicator for value, indicator in pairs)
 
-        Args:
-            colour: of the facets.
-        """
-        return self._own(colour)[PLACE - 1]
-
-    def carried(self, colour: int) -> Any:
-        """Return what the points carry, a UFL expression.
-
-        Args:
-            colour: of the facets.
-        """
-        values = self._own(colour)[PLACE:]
-        return sum(value * mark for value, mark in zip(values, self._marks(colour), strict=True))
-
-    def _marks(self, colour: int) -> list[Any]:
-        """For each point of a facet, a UFL expression that is one around it, else zero."""
+    def _indicators(self, colour: int) -> list[Any]:
+        """Return a UFL expression for each point of a facet, one around it and zero elsewhere."""
         x = ufl.SpatialCoordinate(self.space.mesh.grid)("+")
-        own = self._own(colour)
-        place = (x[0] - own[0]) * own[2] + (x[1] - own[1]) * own[3]
+        x0, y0, dx, dy = self._facet_values(colour)[:4]
+        place = (x[0] - x0) * dx + (x[1] - y0) * dy  # 0 to 1 along the facet
         points = self.rule.on_facet(self.space.degree)[0]
         middles = 0.5 * (points[1:] + points[:-1])
         beyond = [ufl.conditional(ufl.gt(place, float(m)), 1.0, 0.0) for m in middles]
         ends = zip([1.0, *beyond], [*beyond, 0.0], strict=True)
         return [before - after for before, after in ends]
 
-    def reading(self, values: list[tuple[Patch, list[Any]]]) -> Reading:
-        """Compile what reads values at the points of all facets.
-
-        Args:
-            values: for each patch, n UFL expressions.
-
-        Returns:
-            What `read` takes.
-        """
+    def point_reader(self, values: list[tuple[Patch, list[Any]]]) -> PointReader:
+        """Compile the form that evaluates expressions at the points of all facets."""
         size = len(values[0][1]) * self.size
-        functions, places = self._blank(size)
+        functions, places = self._cellwise_space(size)
         test = ufl.TestFunction(functions)("+")
         terms = []
         for patch, expressions in values:
-            marks = self._marks(patch.colour)
-            products = [value * mark for value in expressions for mark in marks]
-            own = [test[patch.colour * size + k] for k in range(size)]
-            here = sum(value * each for value, each in zip(products, own, strict=True))
-            terms.append(here * patch.measure)
-        return Reading(fem.form(sum(terms[1:], terms[0])), places)
+            indicators = self._indicators(patch.colour)
+            products = [value * indicator for value in expressions for indicator in indicators]
+            of_colour = [test[patch.colour * size + k] for k in range(size)]
+            pairs = zip(products, of_colour, strict=True)
+            terms.append(sum(value * each for value, each in pairs) * patch.measure)
+        return PointReader(fem.form(sum(terms[1:], terms[0])), places)
 
-    def read(self, reading: Reading) -> Array:
-        """Return values at the points of each facet (n, f, k).
+    def read(self, reader: PointReader) -> Array:
+        """Return values at the points of each facet (n, f, k)."""
+        sides = _fenicsx.assemble_vector(reader.form)[reader.places]
+        sums = sides.sum(axis=1)  # "+" is one of the sides; the other has zeros
+        return sums.reshape(len(sums), -1, self.size).swapaxes(0, 1) / self._lengths
 
-        Args:
-            reading: made by `reading`.
-        """
-        sides = _fenicsx.assembled_vector(reading.form)[reading.places]
-        sums = sides.sum(axis=1)  # one side has all, the other nothing
-        values: Array = sums.reshape(len(sums), -1, self.size).swapaxes(0, 1) / self._lengths
-        return values
-
-    def gathered(self, values: Array) -> Array:
-        """Return values at all joint points from those of each facet (p,).
-
-        Args:
-            values: of one number wherever facets share a point (f, k).
-        """
-        found = np.empty(self.count)
-        found[self.points] = values
-        return found
+    def gather(self, values: Array) -> Array:
+        """Return values at all joint points from those of each facet (p,)."""
+        gathered = np.empty(self.count)
+        gathered[self.points] = values
+        return gathered
 
     def resultants(self, normal: Array, shear: Array) -> Array:
         """Return N, V, M of every joint from tractions (n_joints, 3) [N, N, N m].
 
         N = -∫ w t_n,   V = ∫ w t_s,   M = -∫ w t_n r
-
-        Args:
-            normal: at the points of each facet, positive where they pull (f, k) [Pa].
-            shear: at the same points, of the sign of slips (f, k) [Pa].
         """
         structure = self.space.mesh.structure
-        found = np.zeros((len(structure.joints), 3))
-        density = structure.width * np.stack([-normal, shear, -normal * self.arms], axis=-1)
-        np.add.at(found, self.joint, np.sum(density * self._lengths[..., None], axis=1))
-        return found
+        resultants = np.zeros((len(structure.joints), 3))
+        density = structure.width * np.stack([-normal, shear, -normal * self.offsets], axis=-1)
+        np.add.at(resultants, self.joint, np.sum(density * self._lengths[..., None], axis=1))
+        return resultants

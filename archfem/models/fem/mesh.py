@@ -1,12 +1,14 @@
-"""One conforming mesh of all blocks: cell tags are blocks, facet tags are joints.
+"""Conforming meshes of all blocks by gmsh: cell tags are blocks, facet tags are joints.
 
-Blocks share their nodes along joints; `space` breaks the displacement there. Tags are numbers
-of blocks and joints plus one, since gmsh counts from one, and every group carries its name.
+Blocks share their nodes along joints; `space` breaks the displacement there. Tags are numbers of
+blocks and joints plus one, since gmsh counts from one, and every group has its name. Recent meshes
+are cached by the shapes of the structure, whatever its materials.
 """
 
-from collections.abc import Iterator
+from collections import OrderedDict
+from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,118 +17,95 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from archfem._optional import require_package
 from archfem.errors import InvalidInput, MeshError
-from archfem.masonry.structure import TOUCHING, Structure
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 from archfem.models.discretisation import Discretisation
 from archfem.models.fem import _fenicsx
-from archfem.models.fem.division import Division, divided
-from archfem.packages import needed
+from archfem.models.fem.edge_division import Division, divide_edges
 
-with needed("gmsh"):
+with require_package("gmsh"):
     import gmsh
-
-FRONTAL = 6
-"""Gmsh's number for the frontal Delaunay algorithm."""
-
-MESH = b"$MeshFormat"
-"""How a file of gmsh begins that is a mesh; anything else gmsh may read as a script."""
-
-FULL_QUAD = 3
-"""Gmsh's number for recombination that leaves no triangle: it splits a mesh twice as coarse."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A structure's mesh.
-
-    Attributes:
-        structure: what was meshed.
-        grid: the DOLFINx mesh.
-        blocks: number of each cell's block (n_cells,).
-        joints: facets (f,) and numbers (f,) of their joints.
-    """
+    """A mesh of a structure."""
 
     structure: Structure
-    grid: Any
-    blocks: NDArray[np.int32]
+    grid: Any  # DOLFINx mesh
+    blocks: NDArray[np.int32]  # block of each cell (n_cells,)
+    # facets on joints, and the joints they lie on, each (f,)
     joints: tuple[NDArray[np.int32], NDArray[np.int32]]
 
 
-def mesh(structure: Structure, asked: Discretisation | None = None) -> Mesh:
-    """Mesh a structure.
-
-    Args:
-        structure: what to mesh.
-        asked: number and kind of cells; by default the usual ones.
-
-    Returns:
-        The mesh.
-
-    Raises:
-        MeshError: the blocks cannot be cut conformingly as asked.
-    """
-    with _model(structure.name):
-        _generate(structure, asked or Discretisation())
-        return _imported(structure)
+def generate_mesh(structure: Structure, settings: Discretisation | None = None) -> Mesh:
+    """Mesh a structure."""
+    with _gmsh_model(structure.name):
+        _generate(structure, settings or Discretisation())
+        return _import_tagged(structure)
 
 
-def write_mesh(structure: Structure, path: str | Path, asked: Discretisation | None = None) -> None:
+def write_mesh(
+    structure: Structure, path: str | Path, settings: Discretisation | None = None
+) -> None:
     """Mesh a structure and write a gmsh file with named physical groups.
 
     Args:
-        structure: what to mesh.
+        structure: structure to mesh.
         path: of the file, *.msh.
-        asked: number and kind of cells; by default the usual ones.
+        settings: number and shape of cells; by default `Discretisation()`.
 
     Raises:
-        MeshError: the blocks cannot be cut conformingly as asked.
+        MeshError: no conforming mesh with these settings exists.
     """
-    with _model(structure.name):
-        _generate(structure, asked or Discretisation())
+    with _gmsh_model(structure.name):
+        _generate(structure, settings or Discretisation())
         gmsh.write(str(path))
 
 
 def read_mesh(structure: Structure, path: str | Path) -> Mesh:
-    """Read the mesh of a structure from a gmsh file, of `write_mesh` or of one's own.
+    """Read the mesh of a structure from a gmsh file, by `write_mesh` or another program.
 
-    Cells belong to the block whose name their physical surface bears; without a name to the block
+    Cells belong to the block with the name of their physical surface; without a name to the block
     of its tag less one. Facets between two blocks belong to the joint that they lie on, whatever
     their physical curves; blocks must share their nodes there.
 
     Args:
-        structure: what was meshed.
+        structure: meshed structure.
         path: of the file.
 
     Returns:
         The mesh.
 
     Raises:
-        InvalidInput: there is no such file.
+        InvalidInput: the file does not exist.
         MeshError: it is no mesh, or its groups are not the structure's blocks and joints.
     """
     if not Path(path).is_file():
         raise InvalidInput(f"there is no mesh file {path}: write it with write_mesh")
-    given = Path(path).read_bytes()
-    if not given.startswith(MESH):
+    content, header = Path(path).read_bytes(), b"$MeshFormat"
+    if not content.startswith(header):
         raise MeshError(
-            f"{path} does not begin with {MESH.decode()}: gmsh would run it as a script, commands "
-            "of the shell and all; give a mesh as gmsh saves it"
+            f"{path} does not begin with {header.decode()}: gmsh would run it as a script, shell "
+            "commands included; give a mesh as gmsh saves it"
         )
-    with _model(structure.name), TemporaryDirectory() as alone:
-        mesh_only = Path(alone) / "mesh.msh"  # without options beside it, which gmsh runs too
-        mesh_only.write_bytes(given)
+    with _gmsh_model(structure.name), TemporaryDirectory() as folder:
+        # a folder without options beside the mesh, which gmsh would run too
+        copy = Path(folder) / "mesh.msh"
+        copy.write_bytes(content)
         try:
-            gmsh.merge(str(mesh_only))
-            return _own(structure)
+            gmsh.merge(str(copy))
+            return _import_named(structure)
         except MeshError:
             raise
-        except Exception as error:  # neither gmsh nor FEniCSx raise anything more specific
+        except Exception as error:  # gmsh and FEniCSx raise nothing more specific
             raise MeshError(f"{path} is not a gmsh mesh of it: {error}") from error
 
 
 @contextmanager
-def _model(name: str) -> Iterator[None]:
-    """A fresh, silent gmsh model, gone afterwards."""
+def _gmsh_model(name: str) -> Iterator[None]:
+    """Open a new gmsh model without output, and close it at the end."""
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -136,35 +115,35 @@ def _model(name: str) -> Iterator[None]:
         gmsh.finalize()
 
 
-def _generate(structure: Structure, asked: Discretisation) -> None:
+def _generate(structure: Structure, settings: Discretisation) -> None:
     """Build geometry and mesh of all blocks in the current gmsh model."""
-    division = divided(structure, asked)
+    division = divide_edges(structure, settings)
     edges = division.edges
     geo = gmsh.model.geo
     corners = [geo.addPoint(x, y, 0.0) for x, y in edges.points]
-    pieces = [_pieces(division, edge, corners) for edge in range(len(edges.ends))]
+    lines = [_add_lines(division, edge, corners) for edge in range(len(edges.ends))]
     for number, block in enumerate(structure.blocks):
         loop = [
             line
             for start, edge in zip(edges.boundaries[number], edges.around[number], strict=True)
-            for line in _run(pieces[edge], start == edges.ends[edge, 0])
+            for line in _orient_lines(lines[edge], start == edges.ends[edge, 0])
         ]
         surface = geo.addPlaneSurface([geo.addCurveLoop(loop)], number + 1)
         if block.corners is not None:
             ends = [corners[point] for point in edges.corners(number)]
             geo.mesh.setTransfiniteSurface(surface, "Alternate", ends)
-        if asked.cell == "quadrilateral":
+        if settings.cell == "quadrilateral":
             geo.mesh.setRecombine(2, surface)
         gmsh.model.addPhysicalGroup(2, [surface], number + 1, block.name)
     for number, (joint, shared) in enumerate(zip(structure.joints, edges.joints, strict=True)):
-        lines = [line for edge in shared for line in pieces[edge]]
-        gmsh.model.addPhysicalGroup(1, lines, number + 1, joint.name)
+        on_joint = [line for edge in shared for line in lines[edge]]
+        gmsh.model.addPhysicalGroup(1, on_joint, number + 1, joint.name)
     geo.synchronize()
-    _fill(division)
+    _mesh_blocks(division)
 
 
-def _pieces(division: Division, edge: int, corners: list[int]) -> list[int]:
-    """Lines along an edge, of as many cells each as its number is a multiple of."""
+def _add_lines(division: Division, edge: int, corners: list[int]) -> list[int]:
+    """Add lines along an edge, each with the cells of which the edge has a multiple."""
     geo = gmsh.model.geo
     unit = int(division.units[edge])
     first, last = division.edges.ends[edge]
@@ -177,21 +156,22 @@ def _pieces(division: Division, edge: int, corners: list[int]) -> list[int]:
     return lines
 
 
-def _run(lines: list[int], forward: bool) -> list[int]:
-    """Lines along an edge, or back along it."""
+def _orient_lines(lines: list[int], forward: bool) -> list[int]:
+    """Return the lines along an edge, or back along it."""
     return lines if forward else [-line for line in reversed(lines)]
 
 
-def _fill(division: Division) -> None:
-    """Mesh the blocks, those without corners with cells of their sizes."""
+def _mesh_blocks(division: Division) -> None:
+    """Mesh the blocks, those without corners with graded cells."""
 
-    def size(dimension: int, tag: int, x: float, y: float, z: float, given: float) -> float:
-        own = division.sizes.get(tag - 1) if dimension == 2 else None
-        return given if own is None else float(own.at(np.array([x, y])))
+    def size(dimension: int, tag: int, x: float, y: float, z: float, default: float) -> float:
+        sizes = division.sizes.get(tag - 1) if dimension == 2 else None
+        return default if sizes is None else float(sizes.evaluate(np.array([x, y])))
 
     if division.sizes:
-        gmsh.option.setNumber("Mesh.RecombinationAlgorithm", FULL_QUAD)
-    gmsh.option.setNumber("Mesh.Algorithm", FRONTAL)
+        # full-quad recombination: splits a mesh twice as coarse and leaves no triangle
+        gmsh.option.setNumber("Mesh.RecombinationAlgorithm", 3)
+    gmsh.option.setNumber("Mesh.Algorithm", 6)  # frontal Delaunay
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.model.mesh.setSizeCallback(size)
     failure = ""
@@ -200,32 +180,32 @@ def _fill(division: Division) -> None:
     except Exception as error:  # gmsh raises nothing more specific
         failure = f": {error}"
     for number, block in enumerate(division.edges.structure.blocks):
-        kinds = gmsh.model.mesh.getElementTypes(2, number + 1)
-        if not len(kinds):
+        types = gmsh.model.mesh.getElementTypes(2, number + 1)
+        if not len(types):
             raise MeshError(
                 f"gmsh cannot mesh block '{block.name}'{failure}: check that its outline crosses "
                 "neither itself nor another's"
             )
-        if len(kinds) > 1:
+        if len(types) > 1:
             raise MeshError(
-                f"triangles are left among the quadrilaterals of block '{block.name}', and a mesh "
+                f"triangles remain among the quadrilaterals of block '{block.name}', and a mesh "
                 "has one kind of cell: use cell = 'triangle'"
             )
 
 
-def _imported(structure: Structure) -> Mesh:
-    """The current gmsh model as a checked mesh."""
-    grid, cells, facets = _fenicsx.mesh_from_gmsh(gmsh.model)
+def _import_tagged(structure: Structure) -> Mesh:
+    """Return the current gmsh model, generated here, as a checked mesh."""
+    grid, cells, facets = _fenicsx.import_gmsh_mesh(gmsh.model)
     count = grid.topology.index_map(2).size_local
     blocks = np.full(count, -1, dtype=np.int32)
     blocks[cells.indices] = cells.values - 1
-    result = Mesh(structure, grid, blocks, (facets.indices, facets.values - 1))
-    _check(result)
-    return result
+    mesh = Mesh(structure, grid, blocks, (facets.indices, facets.values - 1))
+    _check_mesh(mesh)
+    return mesh
 
 
-def _own(structure: Structure) -> Mesh:
-    """The current gmsh model, whose groups are a user's own, as a checked mesh."""
+def _import_named(structure: Structure) -> Mesh:
+    """Return the current gmsh model, with groups by name, as a checked mesh."""
     numbers = {block.name: number for number, block in enumerate(structure.blocks)}
     groups = [int(tag) for _, tag in gmsh.model.getPhysicalGroups(2)]
     names = {tag: gmsh.model.getPhysicalName(2, tag) or f"block {tag}" for tag in groups}
@@ -235,31 +215,32 @@ def _own(structure: Structure) -> Mesh:
             f"the mesh has {len(names)} physical surfaces, of which {strange} are no blocks, and "
             f"the structure {len(numbers)} blocks: the mesh is of another structure"
         )
-    grid, cells, _ = _fenicsx.mesh_from_gmsh(gmsh.model)
+    grid, cells, _ = _fenicsx.import_gmsh_mesh(gmsh.model)
     blocks = np.full(grid.topology.index_map(2).size_local, -1, dtype=np.int32)
     blocks[cells.indices] = [numbers[names[int(tag)]] for tag in cells.values]
-    result = Mesh(structure, grid, blocks, _joint_facets(structure, grid, blocks))
-    _check(result)
-    return result
+    mesh = Mesh(structure, grid, blocks, _find_joint_facets(structure, grid, blocks))
+    _check_mesh(mesh)
+    return mesh
 
 
-def _joint_facets(
+def _find_joint_facets(
     structure: Structure, grid: Any, blocks: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Facets between two blocks, and the joint that each lies on."""
-    cells_at, nodes_of = _fenicsx.connect(grid, 1, 2), _facet_points(grid)
-    near, by_pair = TOUCHING * structure.size, structure.pairs.tolist()
+    """Return the facets between two blocks, and the joint that each lies on."""
+    cells_at, nodes_of = _fenicsx.find_connectivity(grid, 1, 2), _facet_points(grid)
+    near, by_pair = CONTACT_TOLERANCE * structure.size, structure.pairs.tolist()
     facets, joints = [], []
     for facet in range(grid.topology.index_map(1).size_local):
         sides = sorted({int(blocks[cell]) for cell in cells_at(facet)})
         if len(sides) < 2:
             continue
         middle = grid.geometry.x[nodes_of(facet)][:, :2].mean(axis=0)
-        found = [number for number, pair in enumerate(by_pair) if pair == sides]
-        away = middle - structure.middles[found]
-        beside = np.abs(np.sum(away * structure.normals[found], axis=1))
-        along = np.abs(np.sum(away * structure.tangents[found], axis=1))
-        on = np.flatnonzero((beside < near) & (along < structure.depths[found] / 2.0))
+        # joints between these blocks, and the distance of the facet's middle from theirs
+        between = [number for number, pair in enumerate(by_pair) if pair == sides]
+        away = middle - structure.middles[between]
+        beside = np.abs(np.sum(away * structure.normals[between], axis=1))
+        along = np.abs(np.sum(away * structure.tangents[between], axis=1))
+        on = np.flatnonzero((beside < near) & (along < structure.depths[between] / 2.0))
         if not len(on):
             names = [structure.blocks[number].name for number in sides]
             raise MeshError(
@@ -267,21 +248,21 @@ def _joint_facets(
                 "structure has no joint: the mesh is of another structure"
             )
         facets.append(facet)
-        joints.append(found[on[0]])
+        joints.append(between[on[0]])
     return np.array(facets, dtype=np.int32), np.array(joints, dtype=np.int32)
 
 
-def _check(mesh: Mesh) -> None:
-    """Every cell in a block; every joint facet between the two right blocks, whole joints."""
+def _check_mesh(mesh: Mesh) -> None:
+    """Refuse cells without block, facets between wrong blocks, and joints not covered."""
     structure = mesh.structure
-    found = set(mesh.blocks.tolist())
-    if found != set(range(len(structure.blocks))):
+    numbers = set(mesh.blocks.tolist())
+    if numbers != set(range(len(structure.blocks))):
         raise MeshError(
-            f"the mesh has block numbers {sorted(found)}, the structure 0 to "
+            f"the mesh has block numbers {sorted(numbers)}, the structure 0 to "
             f"{len(structure.blocks) - 1}: the mesh is of another structure"
         )
     x = mesh.grid.geometry.x
-    cells_at, nodes_of = _fenicsx.connect(mesh.grid, 1, 2), _facet_points(mesh.grid)
+    cells_at, nodes_of = _fenicsx.find_connectivity(mesh.grid, 1, 2), _facet_points(mesh.grid)
     covered = np.zeros(len(structure.joints))
     for facet, number in zip(*mesh.joints, strict=True):
         if not 0 <= number < len(structure.joints):
@@ -295,7 +276,9 @@ def _check(mesh: Mesh) -> None:
             )
         ends = x[nodes_of(facet)][:, :2]
         covered[number] += np.linalg.norm(ends[1] - ends[0])
-    wrong = np.flatnonzero(np.abs(covered - structure.depths) > 4.0 * TOUCHING * structure.size)
+    wrong = np.flatnonzero(
+        np.abs(covered - structure.depths) > 4.0 * CONTACT_TOLERANCE * structure.size
+    )
     if len(wrong):
         joint = structure.joints[wrong[0]]
         raise MeshError(
@@ -305,7 +288,33 @@ def _check(mesh: Mesh) -> None:
 
 
 def _facet_points(grid: Any) -> Any:
-    """A function from a facet to the numbers of its two mesh points."""
-    vertices = _fenicsx.connect(grid, 1, 0)
-    corner = _fenicsx.points_of_vertices(grid)
+    """Return a function from a facet to its two mesh points."""
+    vertices = _fenicsx.find_connectivity(grid, 1, 0)
+    corner = _fenicsx.find_vertex_points(grid)
     return lambda facet: corner[vertices(facet)]
+
+
+_recent_meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
+
+
+def cached_mesh(structure: Structure, settings: Discretisation, max_meshes: int = 4) -> Mesh:
+    """Return the mesh of a structure, or a recent one of a structure of the same shapes."""
+    cells = (settings.through, settings.along, settings.cell, settings.coarse, settings.degree)
+    key = (*map(_shape_key, (*structure.blocks, *structure.joints)), cells)
+    try:
+        hash(key)
+    except TypeError:  # outlines may be lists
+        return generate_mesh(structure, settings)
+    if key not in _recent_meshes:
+        _recent_meshes[key] = generate_mesh(structure, settings)
+        while len(_recent_meshes) > max_meshes:
+            _recent_meshes.popitem(last=False)
+    _recent_meshes.move_to_end(key)
+    return replace(_recent_meshes[key], structure=structure)
+
+
+def _shape_key(part: object) -> Hashable:
+    """Return all fields of a block or joint but material and contact."""
+    names = (field.name for field in fields(part))  # type: ignore[arg-type]
+    values = tuple(getattr(part, name) for name in names if name not in ("material", "contact"))
+    return type(part).__name__, values

@@ -4,56 +4,55 @@ import re
 
 import numpy as np
 
-from archfem.motion.records.channel import Channel
-from archfem.motion.records.text import COUNT, NUMBER, RecordText
-from archfem.motion.records.units import units_written
+from archfem.motion.records.record_file import (
+    COUNT_PATTERN,
+    NUMBER_PATTERN,
+    Channel,
+    RecordText,
+    find_units,
+)
 
-_HEADER = 40  # lines, at most
-_DIRECTION = r"[NSEWUD]-[NSEWUD]"
-_RAW_PEAK = 0.5  # the header's peaks are those before AFAD took the offset out
+_HEADER_LINES = 40  # lines, at most
+_DIRECTION_PATTERN = r"[NSEWUD]-[NSEWUD]"
 
 
 def recognises(text: RecordText) -> bool:
-    """Return whether the header counts data the way AFAD does.
-
-    Args:
-        text: the file.
-    """
-    return text.holds(r"^\s*NUMBER OF DATA\s*:", _HEADER) and text.holds(
-        r"SAMPLING INTERVAL", _HEADER
+    """Return whether the header has the keys of AFAD for count and step."""
+    return text.contains(r"^\s*NUMBER OF DATA\s*:", _HEADER_LINES) and text.contains(
+        r"SAMPLING INTERVAL", _HEADER_LINES
     )
 
 
 def read(text: RecordText) -> list[Channel]:
-    """Return the three components.
-
-    Args:
-        text: the file.
-
-    Raises:
-        InvalidInput: count, step, unit or directions are missing, or the samples contradict them.
-    """
-    count_line, count = text.find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT})\s*$", stop=_HEADER)
-    step_line, step = text.find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER})\s*$", stop=_HEADER)
-    peak_line, peaks = text.find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=_HEADER)
-    names_line, names = text.find(
-        rf"^\s*({_DIRECTION})\s+({_DIRECTION})\s+({_DIRECTION})\s*$",
-        start=max(count_line, step_line, peak_line),
-        stop=_HEADER,
+    """Read the three components."""
+    count_line, count = text.find(
+        rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$", stop=_HEADER_LINES
     )
-    units = units_written(peaks[1])
+    step_line, step = text.find(
+        rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$", stop=_HEADER_LINES
+    )
+    peak_line, peaks = text.find(
+        r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=_HEADER_LINES
+    )
+    names_line, names = text.find(
+        rf"^\s*({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s*$",
+        start=max(count_line, step_line, peak_line),
+        stop=_HEADER_LINES,
+    )
+    units = find_units(peaks[1])
     if len(units) != 1:
-        raise text.error("the header does not tell the unit of the peaks", peak_line)
+        raise text.error("the header does not state the unit of the peaks", peak_line)
     unit = units.pop()
-    numbers = text.last_block(names_line + 1, 3 * int(count[1]))
-    if len(text.row(names_line + 1)) != 3:
+    numbers = text.read_last_block(names_line + 1, 3 * int(count[1]))
+    if len(text.parse_row(names_line + 1)) != 3:
         raise text.error("expected one sample of each of three components", names_line + 1)
     samples = np.reshape(numbers, (-1, 3)) * unit
-    stated = [float(peak) * unit for peak in re.findall(rf"\)\s*({NUMBER})", peaks[2])]
+    stated = [float(peak) * unit for peak in re.findall(rf"\)\s*({NUMBER_PATTERN})", peaks[2])]
     for column, peak in zip(samples.T, stated, strict=False):
-        text.check_peak(column, peak, tolerance=_RAW_PEAK)
-    dt = text.step(float(step[1]), step_line)
+        # the header has the peaks before the correction of the offset
+        text.check_peak(column, peak, tolerance=0.5)
+    dt = text.check_step(float(step[1]), step_line)
     return [
-        Channel.directed(column, dt, name)
+        Channel.from_direction(column, dt, name)
         for column, name in zip(samples.T, names.groups(), strict=True)
     ]

@@ -7,26 +7,23 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from archfem.arrays import Array
+from archfem._optional import check_drawing
+from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.models.model import Model
-from archfem.packages import check_drawing
-from archfem.view.films.scenes import check_film
-from archfem.view.films.setup import Setup
-from archfem.view.films.shots import Shot, moving
-from archfem.view.films.triangles import Triangles
-from archfem.view.marks import support_outlines
-from archfem.view.moved import fields_at, kept_fields
+from archfem.view.films.film import check_film
+from archfem.view.films.frames import Frame, moving
+from archfem.view.films.renderer import Triangles
+from archfem.view.films.settings import Setup
+from archfem.view.joint_marks import support_outlines
+from archfem.view.positions import fields_at, kept_fields
 from archfem.view.style import EDGE, GHOST, HINGE, SUPPORT, THRUST
 
-LIFT = 1e-3
-"""How far a layer lies before the one below, relative to the size of the structure."""
-
+# The look of the scale of colours
 BAR = {"title_font_size": 14, "label_font_size": 12, "color": EDGE, "fmt": "%.3g", "n_labels": 2}
-"""The look of the scale of colours."""
 
+# Place and look of the slider
 SLIDER = {"pointa": (0.2, 0.92), "pointb": (0.8, 0.92), "title_height": 0.02, "color": EDGE}
-"""Place and look of the slider."""
 
 
 class Viewer:
@@ -74,7 +71,7 @@ class Viewer:
         shot = next(moving(self._setup, self._run, when, fields_at(self._run, when)))
         self._blocks.points = self._flat(self._triangles.corners(shot.places).reshape(-1, 2), 0)
         self._blocks["shade"] = self._shades(shot)
-        edges = shot.places[self._setup.model.cells.rims]
+        edges = shot.places[self._setup.model.cells.outline_edges]
         for layer, (name, ends) in enumerate({"edges": edges, "thrust": shot.marks.links}.items()):
             self._moved[name].dataset = _lines(self._flat(ends.reshape(-1, 2), layer + 1))
         self._moved["hinges"].dataset = pv.PolyData(self._flat(shot.marks.hinges, 3))
@@ -101,7 +98,7 @@ class Viewer:
         )
         for outline in support_outlines(setup.model, setup.magnification):
             self._add(_polygon(self._flat(outline, 0)), SUPPORT)
-        self._add(_lines(self._flat(cells.places[cells.rims].reshape(-1, 2), -1)), GHOST)
+        self._add(_lines(self._flat(cells.places[cells.outline_edges].reshape(-1, 2), -1)), GHOST)
         self._moved = {
             "edges": self._add(pv.PolyData(), EDGE, 1.5),
             "thrust": self._add(pv.PolyData(), THRUST, 3.0),
@@ -118,7 +115,7 @@ class Viewer:
         self.plotter.add_actor(actor, render=False)
         return mapper
 
-    def _shades(self, shot: Shot) -> Array:
+    def _shades(self, shot: Frame) -> Array:
         """What the corners of the triangles are coloured by."""
         if self._setup.scale.colour == "stress":
             return np.repeat(shot.shades[self._triangles.cell], 3)
@@ -126,7 +123,8 @@ class Viewer:
 
     def _flat(self, points: Array, layer: int) -> Array:
         """Points of the plane, in a layer of the picture (n, 3) [m]."""
-        height = LIFT * self._setup.model.structure.size
+        # how far a layer lies before the one below, relative to the size of the structure
+        height = 1e-3 * self._setup.model.structure.size
         return np.column_stack([points, np.full(len(points), layer * height)])
 
 
@@ -165,5 +163,4 @@ def _lines(points: Array) -> pv.PolyData:
 
 def _polygon(points: Array) -> pv.PolyData:
     """A polygon (n, 3), cut into triangles as it may be concave."""
-    cut: pv.PolyData = pv.PolyData(points, faces=[len(points), *range(len(points))]).triangulate()
-    return cut
+    return pv.PolyData(points, faces=[len(points), *range(len(points))]).triangulate()

@@ -15,21 +15,14 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-DENSE = 300.0
-"""Dots per inch of the pictures that `archfem.view.save` writes."""
-
 
 @dataclass(frozen=True)
-class Words:
-    """A paragraph, or lines of text as they are.
+class TextBlock:
+    """A paragraph, or lines of text as they are."""
 
-    Attributes:
-        text: the words; they are escaped, and what stands between ` is set as code.
-        manner: "plain", "missing" for what the results do not hold, "doubt" for what is to be
-            looked at, or "lines" for text whose columns matter.
-    """
-
-    text: str
+    text: str  # the words; they are escaped, and what stands between ` is set as code
+    # "plain", "missing" for what the results do not hold, "doubt" for what is to be looked at, or
+    # "lines" for text whose columns matter
     manner: str = "plain"
 
     kind = "words"
@@ -37,45 +30,28 @@ class Words:
 
 @dataclass(frozen=True)
 class Grid:
-    """A table.
+    """A table."""
 
-    Attributes:
-        head: titles of the columns; none for a list of terms and what they are.
-        rows: as many cells each.
-        caption: above the table.
-    """
-
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    caption: str = ""
+    head: Sequence[str]  # titles of the columns; none for a list of terms and what they are
+    rows: Sequence[Sequence[str]]  # as many cells each
+    caption: str = ""  # above the table
 
     kind = "grid"
 
 
 @dataclass(frozen=True)
-class Plate:
-    """A figure.
+class FigureBlock:
+    """A figure."""
 
-    Attributes:
-        source: the picture itself, as a data URI.
-        caption: below it.
-        inches: its width; it is made smaller where the page is narrower.
-    """
-
-    source: str
-    caption: str
-    inches: float
+    source: str  # the picture itself, as a data URI
+    caption: str  # below it
+    inches: float  # its width; it is made smaller where the page is narrower
 
     kind = "plate"
 
     @classmethod
-    def of(cls, figure: Figure, caption: str) -> "Plate":
-        """Return a figure as lines that stay sharp at any size.
-
-        Args:
-            figure: as drawn.
-            caption: below it.
-        """
+    def of(cls, figure: Figure, caption: str) -> "FigureBlock":
+        """Return a figure as lines that stay sharp at any size."""
         for text in figure.findobj(Text):  # names and titles are words, though they hold a $
             text.set_parse_math(False)
         buffer = BytesIO()
@@ -84,50 +60,32 @@ class Plate:
         return cls(_uri("image/svg+xml", buffer.getvalue()), caption, float(figure.get_figwidth()))
 
     @classmethod
-    def read(cls, path: Path, caption: str) -> "Plate":
-        """Return a picture that was written earlier.
-
-        Args:
-            path: a .png file.
-            caption: below it.
-        """
+    def read(cls, path: Path, caption: str) -> "FigureBlock":
+        """Return a picture that was written earlier."""
         content = path.read_bytes()
         pixels = int.from_bytes(content[16:20], "big")  # where the header of the format has it
-        return cls(_uri("image/png", content), caption, round(pixels / DENSE, 2))
+        # dots per inch of the pictures that `archfem.view.save` writes
+        return cls(_uri("image/png", content), caption, round(pixels / 300.0, 2))
 
 
 @dataclass(frozen=True)
 class Section:
-    """A chapter of a document.
+    """A chapter of a document."""
 
-    Attributes:
-        title: its heading.
-        pieces: `Words`, `Grid`, `Plate`, `Player`.
-        level: 2, or 3 for a part of the chapter before.
-    """
-
-    title: str
-    pieces: Sequence[Any]
-    level: int = 2
+    title: str  # its heading
+    pieces: Sequence[Any]  # `Words`, `Grid`, `Plate`, `Player`
+    level: int = 2  # 2, or 3 for a part of the chapter before
 
 
 @dataclass(frozen=True)
 class Document:
-    """A whole document.
+    """A whole document."""
 
-    Attributes:
-        title: of all.
-        subtitle: below it.
-        facts: what is to be seen at once: a name and a value each.
-        sections: in order.
-        foot: at the end.
-    """
-
-    title: str
-    subtitle: str
-    facts: Sequence[tuple[str, str]]
-    sections: Sequence[Section]
-    foot: str = ""
+    title: str  # of all
+    subtitle: str  # below it
+    facts: Sequence[tuple[str, str]]  # what is to be seen at once: a name and a value each
+    sections: Sequence[Section]  # in order
+    foot: str = ""  # at the end
 
     @property
     def page(self) -> str:
@@ -136,12 +94,7 @@ class Document:
 
 
 def rendered(template: str, **values: Any) -> str:
-    """Return a template of this room filled in; words are escaped.
-
-    Args:
-        template: name of its file.
-        values: that it asks for.
-    """
+    """Return a template of this room filled in; words are escaped."""
     return _templates().get_template(template).render(**values)
 
 

@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+from archfem._files import atomic_write
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.files import in_one_stroke
 from archfem.models.model import Model
 from archfem.view.pages.document import rendered
-from archfem.view.pages.scenes import LARGEST, Scene
-
-TALLEST, FURNITURE, COLUMN = 540.0, 550.0, 900.0
-"""Height of the picture at most, of all that is around it, and the width of a notebook [pixels]."""
+from archfem.view.pages.player_data import LARGEST, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +50,12 @@ class Player:
     def _repr_html_(self) -> str:
         """The player in a frame of its own, so that a notebook's style and its own stay apart."""
         low, high = self.scene.box
-        picture = min(TALLEST, COLUMN * float((high[1] - low[1]) / (high[0] - low[0])))
-        style = f"width:100%;height:{picture + FURNITURE:.0f}px;border:0"
+        # height of the picture at most, of all that is around it, and the width of a notebook
+        # [pixels]
+        picture = min(540.0, 900.0 * float((high[1] - low[1]) / (high[0] - low[0])))
+        # height of the picture at most, of all that is around it, and the width of a notebook
+        # [pixels]
+        style = f"width:100%;height:{picture + 550.0:.0f}px;border:0"
         return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
 
 
@@ -89,21 +90,10 @@ def player(run: History, model: Model | None = None, *, title: str = "") -> Play
 
 
 def write_page(path: str | Path, text: str) -> Path:
-    """Write a page in one stroke.
-
-    Args:
-        path: the file, .html; folders are made.
-        text: of the page.
-
-    Returns:
-        The file.
-
-    Raises:
-        InvalidInput: the suffix is not that of a page.
-    """
+    """Write a page in one stroke."""
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise InvalidInput(f"{target} has suffix '{target.suffix}': a page is .html")
-    with in_one_stroke(target) as draft:
+    with atomic_write(target) as draft:
         draft.write_text(text, encoding="utf-8")
     return target

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.models.exchange.solids import Solids
+from archfem.models.export import Solids
 
 ROUND_OFF = 1e-12
 """Of coordinates of some metres [m]."""
@@ -20,7 +20,7 @@ def test_faces_are_where_their_edges_say(fidelity):
         radius=2.0, thickness=0.4, voussoirs=5, pier_breadth=0.8, courses=[0.5, 0.5]
     )
     solids = Solids(af.build(portal, fidelity=fidelity, cells=(2, 3)))
-    found = solids.between(solids.places)
+    found = solids.joint_faces(solids.places)
     ends = np.array([joint.ends for joint in portal.joints])
     assert found == pytest.approx(solids.corners, abs=ROUND_OFF)
     assert found[:, :2] == pytest.approx(ends, abs=ROUND_OFF)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.colours import scale_for, shade
+from archfem.view.films.settings import scale_for, shade
 
 
 def test_colours_are_millimetres_and_megapascals(coarse):

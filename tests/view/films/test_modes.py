@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.modes import FRAMES, film_modes
+from archfem.view.films.film import FRAMES, film_modes
 
 
 @pytest.mark.slow

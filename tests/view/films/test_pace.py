@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.pace import decisive, even, pace_of, slowed
-from archfem.view.moved import Falls
+from archfem.view.films.frames import decisive, even, pace_of, slowed
+from archfem.view.positions import FallingBlocks
 
 KEPT = np.linspace(0.0, 10.0, 401)
 
@@ -34,12 +34,12 @@ def test_a_film_of_another_length_tells_its_speed():
 
 
 def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
-    falls = Falls.of(column.structure, toppled)
+    falls = FallingBlocks.of(column.structure, toppled)
     start, end = decisive(toppled, falls)
     assert start < falls.times[0] < end
     start, end = decisive(run, None)
     assert start < run.mechanism.time < end
-    calm = run.judged_by(af.Criteria(failures=17))
+    calm = run.with_criteria(af.Criteria(failures=17))
     tilt = abs(run.joints["eccentricity"]).max("joint")
     start, end = decisive(calm, None)
     assert start < float(tilt["time"][int(tilt.argmax("time"))]) < end

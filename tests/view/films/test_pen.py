@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import RendererAgg
 
-from archfem.view.films.pen import Pen
+from archfem.view.films.renderer import Canvas
 
 SEEN = np.array([-2.0, -1.0]), np.array([2.0, 1.0])
 
@@ -14,7 +14,7 @@ def sheet():
     """Pixels, and a pen to whose window of 400 by 300 a metre is 100 pixels."""
     renderer = RendererAgg(500, 400, 100.0)
     renderer.clear()
-    return renderer, Pen(renderer, (50, 50, 450, 350), *SEEN)
+    return renderer, Canvas(renderer, (50, 50, 450, 350), *SEEN)
 
 
 def ink(renderer):

@@ -6,9 +6,9 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.view.films.pace import even
-from archfem.view.films.scenes import film, picture
-from archfem.view.moved import fields_at
+from archfem.view.films.film import film, picture
+from archfem.view.films.frames import even
+from archfem.view.positions import fields_at
 from archfem.view.style import HINGE, MOVED
 
 SIZE = (640, 400)  # small: rendering takes the time

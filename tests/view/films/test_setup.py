@@ -3,8 +3,8 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.films.setup import Setup
-from archfem.view.marks import SWING
+from archfem.view.films.settings import Setup
+from archfem.view.joint_marks import SWING
 
 
 def test_a_support_that_moved_is_drawn_where_it_is(model):

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.scenes import film
-from archfem.view.films.setup import Setup
-from archfem.view.films.shots import falling, moving
-from archfem.view.moved import Falls, fields_at
+from archfem.view.films.film import film
+from archfem.view.films.frames import falling, moving
+from archfem.view.films.settings import Setup
+from archfem.view.positions import FallingBlocks, fields_at
 
 
 @pytest.fixture
 def falls(column, toppled):
-    return Falls.of(column.structure, toppled)
+    return FallingBlocks.of(column.structure, toppled)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_the_view_has_room_for_what_falls_and_its_ground(setup, column, falls):
 
 def test_what_flies_far_is_not_followed(setup, falls, column):
     away = falls.poses + np.array([1e3, 0.0, 0.0])
-    far = setup.with_falls(Falls(falls.structure, falls.times, away, falls.level))
+    far = setup.with_falls(FallingBlocks(falls.structure, falls.times, away, falls.level))
     assert (
         np.ptp([far.low, far.high], axis=0).max()
         < 4.0 * column.structure.size + np.ptp([setup.low, setup.high], axis=0).max()

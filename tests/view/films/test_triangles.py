@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from archfem.models.cells import Cells
-from archfem.view.films.triangles import Triangles
+from archfem.models.model import Cells
+from archfem.view.films.renderer import Triangles
 
 
 def cells_of(*outlines):

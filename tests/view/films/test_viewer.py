@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.packages import can_draw
+from archfem._optional import can_draw
 
 pytestmark = pytest.mark.skipif(not can_draw(), reason="no library to draw with")
 

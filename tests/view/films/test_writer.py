@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.writer import film_path, write_film
+from archfem.view.films.encoder import film_path, write_film
 
 
 def cut_short(count):

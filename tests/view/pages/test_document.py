@@ -3,17 +3,17 @@
 from matplotlib.figure import Figure
 from pages import read_page
 
-from archfem.view.pages.document import Document, Grid, Plate, Section, Words
+from archfem.view.pages.document import Document, FigureBlock, Grid, Section, TextBlock
 
 
 def test_words_of_users_are_escaped_and_numbers_typeset():
     evil = "<script>alert(1)</script>"
     pieces = [
-        Words(f"{evil} and `a < b`", "missing"),
-        Words(evil, "lines"),
+        TextBlock(f"{evil} and `a < b`", "missing"),
+        TextBlock(evil, "lines"),
         Grid([evil, "x"], [[evil, "-0.5"], ["-", "a-b"]], evil),
         Grid((), [(evil, evil)]),
-        Plate.of(Figure(figsize=(2.0, 1.0)), evil),
+        FigureBlock.of(Figure(figsize=(2.0, 1.0)), evil),
     ]
     page = Document(evil, evil, [(evil, evil)], [Section(evil, pieces)], evil).page
     read = read_page(page)

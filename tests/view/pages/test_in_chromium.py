@@ -7,7 +7,7 @@ import pytest
 from chromium import browser, complaints, opened, printed
 
 import archfem as af
-from archfem.view.pages.outlines import Outlines
+from archfem.view.pages.player_data import Outlines
 
 pytestmark = pytest.mark.slow
 
@@ -91,8 +91,8 @@ def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
 
 def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
     """Of each figure all is on one page; it may not break, and none is higher than a page."""
-    case = af.Case.read(small, ["output.fields_every=10"])
-    *_, run = af.cases.carried_out(case, pairs=["first"])
+    case = af.Case.read(small, ["output.save_fields_every=10"])
+    *_, run = af.cases.run_case(case, pairs=["first"])
     path = run.report(tmp_path / "report.html")
     with browser(wide=665) as driver:  # the width of the text on A4
         opened(driver, path)

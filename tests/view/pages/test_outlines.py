@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.pages.outlines import Outlines
+from archfem.view.pages.player_data import Outlines
 
 
 def test_chords_stay_near_their_arcs(ring):
@@ -59,6 +59,6 @@ def test_supports_that_moved_are_drawn_where_they_are(stack):
     motions = np.zeros((len(stack.blocks), 3))
     motions[base] = [0.1, -0.2, 0.0]
     outlines = Outlines(stack)
-    moved = outlines.moved(model.moved(motions), np.zeros((1, model.size)))[0]
+    moved = outlines.moved(model.with_support_motion(motions), np.zeros((1, model.size)))[0]
     assert np.allclose(moved[outlines.block == base], [0.1, -0.2])
     assert not moved[outlines.block != base].any()

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from archfem.view.pages.packing import Pack, quantum_of, unpacked
+from archfem.view.pages.player_data import PackedArrays, quantum_of, unpacked
 
 
 def test_arrays_come_back_within_half_a_quantum():
     values = np.random.default_rng(0).normal(size=(3, 500)).cumsum(axis=1)
     values[1, 100:120] = values[2, 0] = np.nan
-    pack = Pack()
+    pack = PackedArrays()
     quantum = quantum_of(values, 4000)
     pack.add("first", values, quantum)
     pack.add("times", np.linspace(0.0, 100.0, 77)[None], 1e-6)
@@ -26,6 +26,6 @@ def test_a_quantum_of_nothing_is_one():
 
 
 def test_steady_values_take_next_to_no_room():
-    pack = Pack()
+    pack = PackedArrays()
     pack.add("steady", np.full((100, 4000), 3.0), 1e-3)
     assert len(pack.text) < 10_000

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.pages.outlines import Outlines
-from archfem.view.pages.packing import unpacked
-from archfem.view.pages.scenes import Scene
+from archfem.view.pages.player_data import Outlines, Scene, unpacked
 
 
 def arrays(scene):

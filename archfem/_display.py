@@ -1,0 +1,58 @@
+"""Text, HTML and pictures of result classes, whose methods may live in rooms to the right.
+
+A result such as a history is defined left of the room that draws it. Its methods `plot`, `player`
+and `report` are therefore bound when they are called, through one table that a test resolves.
+"""
+
+from collections.abc import Mapping
+from html import escape
+from importlib import import_module
+from typing import Any
+
+# "Class.method": "module:function" below archfem; the function takes the instance first.
+LATE_BOUND_METHODS: Mapping[str, str] = {
+    "CaseResult.player": "cases.report.report:player_of_case",
+    "CaseResult.report": "cases.report.report:write_report_of_case",
+    "Collapse.plot": "view.collapse:draw_found",
+    "Equilibrium.plot": "view.statics:draw_dead_load",
+    "History.player": "view.pages.player:player",
+    "History.plot": "view.histories:draw_joints",
+    "History.report": "cases.report.report:write_report_of_history",
+    "Modes.plot": "view.statics:draw_modes",
+    "Motion.plot": "view.motions:draw_motion",
+    "Pushover.plot": "view.statics:draw_pushover",
+    "Structure.plot": "view.structure:draw_structure",
+}
+
+
+def call_late_bound(method: str, *args: Any, **options: Any) -> Any:
+    """Call the function which `LATE_BOUND_METHODS` names for a method."""
+    module, _, function = LATE_BOUND_METHODS[method].partition(":")
+    return getattr(import_module(f"archfem.{module}"), function)(*args, **options)
+
+
+class ResultDisplay:
+    """Mixin for result classes: one-line `repr`, notebook HTML and `.plot()`."""
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the result with the function of `archfem.view` for its class.
+
+        Args:
+            options: of that function: `draw_structure`, `draw_dead_load`, `draw_joints` for a
+                history, `draw_pushover`, `draw_collapse`, `draw_modes` or `draw_motion`.
+
+        Returns:
+            A matplotlib figure, which `archfem.view.save` writes.
+        """
+        return call_late_bound(f"{type(self).__name__}.plot", self, **options)
+
+    def _summary(self) -> str:
+        """Describe the result in one or two lines."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return self._summary()
+
+    def _repr_html_(self) -> str:
+        """Return the summary as HTML; names may contain a <."""
+        return f"<pre>{escape(self._summary())}</pre>"

@@ -1,0 +1,65 @@
+"""Datasets in NetCDF files with a checksum, so that a damaged file is recognised when it is read.
+
+The file ends with the SHA-256 digest of everything before it, which NetCDF readers skip. The file
+is created in memory and written atomically: a full disk raises the error of the disk.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import netCDF4
+import xarray as xr
+
+from archfem._files import atomic_write, read_bytes
+from archfem.errors import InvalidInput
+
+# Precedes the digest at the end of a file.
+CHECKSUM_MARK = b"\narchfem: SHA-256 of all before this line "
+
+# Attribute of a dataset with a checksum: without the mark such a file is truncated.
+CHECKSUM_ATTRIBUTE = "sealed"
+
+
+def write_dataset(
+    dataset: xr.Dataset, path: Path, encoding: Mapping[Any, Any] = MappingProxyType({})
+) -> Path:
+    """Write a dataset atomically: a killed run leaves the old file or the new one."""
+    file = netCDF4.Dataset(path.name, "w", memory=1)
+    try:
+        store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+        dataset.assign_attrs({CHECKSUM_ATTRIBUTE: 1}).dump_to_store(store, encoding=dict(encoding))
+    finally:
+        content = bytes(file.close())
+    with atomic_write(path) as draft:
+        draft.write_bytes(content + CHECKSUM_MARK + _digest(content))
+    return path
+
+
+def read_dataset(path: str | Path, what: str) -> xr.Dataset:
+    """Read a NetCDF file and verify its checksum."""
+    # a history has no other limit of size than the disk's
+    content = read_bytes(path, what, max_bytes=2**40)
+    before, mark, digest = content.rpartition(CHECKSUM_MARK)
+    damaged = InvalidInput(
+        f"{path} is damaged: it is not what was written there; delete it and run again"
+    )
+    if mark and digest != _digest(before):
+        raise damaged
+    try:
+        file = netCDF4.Dataset(Path(path).name, memory=before if mark else content)
+        store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+        with xr.open_dataset(store) as opened:
+            dataset = opened.load()
+    except Exception as error:  # HDF5, NetCDF and xarray raise errors of many classes
+        raise InvalidInput(f"{path} is not a NetCDF file: {error}") from error
+    if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and not mark:
+        raise damaged
+    return dataset
+
+
+def _digest(content: bytes) -> bytes:
+    """Compute the digest as hexadecimal text."""
+    return hashlib.sha256(content).hexdigest().encode()

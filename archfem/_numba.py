@@ -1,0 +1,168 @@
+"""Compilation by numba: decorators of kernels and the folder of the compiled code.
+
+A kernel allocates no arrays. Numba counts references to arrays wherever a function receives or
+slices one, by atomic operations that take longer than the arithmetic of small functions. The option
+`_nrt` removes the counting; a function that allocates nevertheless does not compile. Divisions do
+not check for zero.
+
+Numba stores compiled code beside the sources. Where these are read-only, as in an installation for
+all users, it goes to the user's cache, and where that is read-only too, to a temporary folder.
+"""
+
+import atexit
+import hashlib
+import logging
+import os
+import shutil
+import sys
+import tempfile
+from contextlib import suppress
+from functools import cache
+from multiprocessing import parent_process
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import event
+
+logger = logging.getLogger("archfem")
+
+# Folders of the modules with compiled functions
+SOURCE_FOLDERS = tuple(
+    Path(__file__).parent / room
+    for room in ("joints/large", "dynamics/solvers", "dynamics/rigid_body")
+)
+
+# Environment variable of numba that names the folder of compiled code
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"
+
+KERNEL_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
+
+# Compiles a kernel that Python calls, and stores it on disk. Kernels that only kernels call are part
+# of the callers' code: a file for each would cost the generation of machine code once more.
+entry: Any = numba.njit(**KERNEL_OPTIONS, cache=True)
+
+# Compiles a function that allocates no arrays.
+kernel: Any = numba.njit(**KERNEL_OPTIONS)
+
+# Compiles a kernel as part of its callers.
+inlined_kernel: Any = numba.njit(**KERNEL_OPTIONS, forceinline=True)
+
+# Compiles a kernel whose sums may be reordered, so that several terms are added at a time.
+summing_kernel: Any = numba.njit(**KERNEL_OPTIONS, fastmath={"contract", "reassoc"})
+
+# Compiles a function that returns slices of its arrays, as part of its callers.
+view_kernel: Any = numba.njit(**KERNEL_OPTIONS, inline="always")
+
+
+class CompilationNotice(event.Listener):
+    """Event listener that announces the first compilation of a function of this package."""
+
+    def on_start(self, event: Any) -> None:
+        function = getattr(event.data["dispatcher"], "py_func", None)
+        if getattr(function, "__module__", "").startswith("archfem."):
+            _announce_compilation()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@cache
+def _announce_compilation() -> None:
+    """Write the notice, once."""
+    sys.stderr.write(
+        "archfem: compiling the time steps, which takes about a minute; later runs reuse the result"
+        " ('archfem compile' compiles everything, 'archfem doctor' shows the folder)\n"
+    )
+    sys.stderr.flush()
+
+
+@cache
+def prepare_cache() -> None:
+    """Choose the folder of compiled code; to be called before the first function is declared."""
+    folder = _cache_folder()
+    if folder is not None:  # child processes inherit it through the environment
+        os.environ[CACHE_VARIABLE] = str(folder)
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    if parent_process() is None:
+        event.register("numba:compile", CompilationNotice())  # type: ignore[no-untyped-call]
+
+
+def cache_folders() -> list[Path]:
+    """Return the folders of compiled code, whether they exist or not."""
+    folder = os.environ.get(CACHE_VARIABLE)
+    if folder is None:
+        return [source / "__pycache__" for source in SOURCE_FOLDERS]
+    return [place for source in SOURCE_FOLDERS for place in Path(folder).glob(f"{source.name}_*")]
+
+
+def count_cached_functions() -> int:
+    """Count the compiled functions that are as new as their sources."""
+    newest = 0.0
+    if os.environ.get(CACHE_VARIABLE) is None:  # else the folder's name is a digest of the sources
+        newest = max(path.stat().st_mtime for path in _source_files())
+    cached = [path for folder in cache_folders() for path in folder.glob("*.nbi")]
+    return sum(path.stat().st_mtime >= newest for path in cached)
+
+
+def delete_stale_cache(folder: Path, *others: Path) -> None:
+    """Delete compiled code of a folder that is older than any source of it or of other folders.
+
+    Numba checks the source of each function, but not of the functions it calls: a compiled function
+    would go on using their old versions.
+    """
+    sources = [path for each in (folder, *others) for path in each.glob("*.py")]
+    newest = max(path.stat().st_mtime for path in sources)
+    for path in (folder / "__pycache__").glob("*.nb[ic]"):
+        with suppress(OSError):  # another process was first, or the file is read-only
+            if path.stat().st_mtime < newest:
+                path.unlink()
+
+
+def _cache_folder() -> Path | None:
+    """Return the first writable folder for compiled code; None for that beside the sources."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen is None and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
+        return None
+    # one folder for each state of the sources, for the reason given in `delete_stale_cache`
+    name = f"archfem-{_source_digest()}"
+    places = [Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / name]
+    if chosen is not None:
+        base = Path(chosen)  # or the choice of the parent process, which has such a name already
+        places.insert(0, (base.parent if base.name.startswith("archfem-") else base) / name)
+    for place in places:
+        if _is_writable(place):
+            return place
+    temporary = Path(tempfile.mkdtemp(prefix="archfem-"))
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    logger.warning(
+        "compiled code cannot be stored: neither beside %s nor in %s may be written, so that every "
+        "run compiles for a minute; set %s to a folder that you may write to",
+        SOURCE_FOLDERS[0],
+        " or ".join(map(str, places)),
+        CACHE_VARIABLE,
+    )
+    return temporary
+
+
+def _is_writable(folder: Path) -> bool:
+    """Return whether files can be created in a folder, which is created if missing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _source_files() -> list[Path]:
+    """List the modules with compiled functions."""
+    return sorted(path for source in SOURCE_FOLDERS for path in source.glob("*.py"))
+
+
+def _source_digest() -> str:
+    """Compute a digest of the names and contents of these modules."""
+    digest = hashlib.sha256()
+    for path in _source_files():
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

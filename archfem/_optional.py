@@ -1,0 +1,93 @@
+"""Optional packages: which features require them, and the command that installs them.
+
+Everything but FEniCSx comes with `pip install archfem`; FEniCSx has no wheels.
+"""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ctypes import CDLL
+from typing import NamedTuple
+
+from archfem.errors import NotInstalled
+
+# FEniCSx and the packages it is built on
+FENICSX_PACKAGES = ("dolfinx", "petsc4py", "slepc4py", "mpi4py")
+
+
+class Requirement(NamedTuple):
+    """A package that may be missing."""
+
+    feature: str  # that requires it
+    remedy: str  # how to install it
+
+
+FENICSX_REMEDY = (
+    "on Debian and Ubuntu 'apt-get install python3-dolfinx' and a virtual environment made by "
+    "'/usr/bin/python3 -m venv --system-site-packages DIR', elsewhere 'conda install -c "
+    "conda-forge fenics-dolfinx slepc4py'"
+)
+
+OPTIONAL_PACKAGES = {
+    "FEniCSx": Requirement(
+        "meshes, and all models but those of fidelity = 'rigid' (--set model.fidelity=rigid),",
+        FENICSX_REMEDY,
+    ),
+    "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
+    "SLEPc": Requirement("modes of large models", "it comes with FEniCSx, " + FENICSX_REMEDY),
+    "EGL": Requirement(
+        "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
+    ),
+    "gmsh": Requirement(
+        "meshes",
+        "'pip install gmsh'; where libGLU or another library is missing, 'apt-get install "
+        "libglu1-mesa libgl1 libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 "
+        "libfontconfig1'",
+    ),
+}
+
+# VTK draws without a screen by the first of these libraries that it finds.
+OFFSCREEN_LIBRARIES = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
+
+
+@contextmanager
+def require_package(name: str) -> Iterator[None]:
+    """Turn a failed import into an error that names the feature and the remedy."""
+    try:
+        yield
+    except Exception as error:  # another NumPy or a missing library raises errors of many classes
+        raise NotInstalled(missing_package_message(name, str(error))) from error
+
+
+def missing_package_message(name: str, reason: str) -> str:
+    """Return the message of a package that cannot be loaded."""
+    package = OPTIONAL_PACKAGES[name]
+    return (
+        f"{name} cannot be loaded by {sys.executable} ({reason}); {package.feature} need it: "
+        f"{package.remedy}"
+    )
+
+
+def check_drawing() -> None:
+    """Refuse to open a viewer where VTK finds no library for it, which would end the process."""
+    if not can_draw():
+        names = ", ".join(OFFSCREEN_LIBRARIES)
+        raise NotInstalled(missing_package_message("EGL", f"none of {names} is there"))
+
+
+def can_draw() -> bool:
+    """Return whether VTK finds a library to draw with."""
+    if sys.platform != "linux":
+        return True
+    screen = ("libGL.so.1",) if os.environ.get("DISPLAY") else ()
+    return any(map(_is_loadable, (*OFFSCREEN_LIBRARIES, *screen)))
+
+
+def _is_loadable(library: str) -> bool:
+    """Return whether a shared library can be loaded with all its dependencies."""
+    try:
+        CDLL(library)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,40 @@
+"""Linear algebra on one thread, so that results are equal bit for bit on any machine.
+
+The threads of a BLAS split a sum among themselves, and the rounding depends on their number. Where a
+joint is about to open, the last bit decides. Problems are small, so one thread is also the fastest.
+"""
+
+import sys
+import threading
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from typing import Any, TypeVar
+
+from threadpoolctl import ThreadpoolController
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_thread = threading.local()
+
+
+def single_threaded(function: Function) -> Function:
+    """Decorate a function so that its linear algebra runs on one thread."""
+
+    @wraps(function)
+    def wrapper(*args: Any, **options: Any) -> Any:
+        if getattr(_thread, "is_limited", False):  # a caller has set the limit already
+            return function(*args, **options)
+        with _loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
+            _thread.is_limited = True
+            try:
+                return function(*args, **options)
+            finally:
+                _thread.is_limited = False
+
+    return wrapper  # type: ignore[return-value]
+
+
+@lru_cache(maxsize=1)
+def _loaded_libraries(_: int) -> ThreadpoolController:
+    """Find the loaded BLAS libraries, again whenever the number of modules has changed (1 ms)."""
+    return ThreadpoolController()

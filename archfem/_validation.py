@@ -1,0 +1,260 @@
+"""Checks of arguments: numbers, sequences, and values that a function's annotations allow."""
+
+import inspect
+import os
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
+from functools import cache, wraps
+from math import inf, isfinite
+from numbers import Integral
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from archfem.errors import InvalidInput
+
+# Length of a value that an error quotes, in characters
+MAX_REPR_LENGTH = 200
+
+_NUMBER_TYPES = (int, float, np.integer, np.floating)
+
+
+def short_repr(value: Any) -> str:
+    """Return the `repr` of any value, shortened for an error message."""
+    try:
+        text = repr(value)
+    except Exception:  # integers of thousands of digits, or a faulty `__repr__`
+        return f"<{type(value).__name__} that cannot be written>"
+    if len(text) <= MAX_REPR_LENGTH:
+        return text
+    return f"{text[: MAX_REPR_LENGTH - 20]} … {text[-17:]}"
+
+
+def check_number(value: Any, name: str, *, minimum: float = -inf) -> float:
+    """Return a finite number of at least a minimum as a float."""
+    if not is_number(value):
+        raise InvalidInput(f"{name} = {short_repr(value)} is not a finite number")
+    if value < minimum:
+        raise InvalidInput(f"{name} = {short_repr(value)} is below {minimum:g}, the least allowed")
+    return float(value)
+
+
+def is_one_of(value: Any, known: Collection[Any]) -> bool:
+    """Return whether a value is one of some strings or numbers; arrays and lists never are."""
+    return isinstance(value, (str, *_NUMBER_TYPES, NoneType)) and value in known
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a finite number that a float can hold."""
+    try:
+        return isinstance(value, _NUMBER_TYPES) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # an integer beyond the range of floats
+        return False
+
+
+def check_integer(value: Any, name: str, *, minimum: int = 1, maximum: int = 2**62) -> int:
+    """Return an integer within bounds as an int."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < minimum:
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} is not a whole number of at least {minimum}"
+        )
+    if int(value) > maximum:
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} is above {maximum}, the most there is room for"
+        )
+    return int(value)
+
+
+def count_pieces(length: float, size: float, name: str, maximum: int = 10_000) -> int:
+    """Return the number of pieces, at least one, of about a given size in a length."""
+    count = length / size
+    if not count <= maximum:
+        raise InvalidInput(
+            f"{name}: {length:g} by {size:g} makes {count:.3g}, and there is room for {maximum}"
+        )
+    return max(1, round(count))
+
+
+def check_numbers(value: Any, name: str, count: int | None = None) -> tuple[float, ...]:
+    """Return a sequence of finite numbers as a tuple of floats."""
+    values = check_sequence(value, name, count)
+    return tuple(check_number(each, f"{name}[{k}]") for k, each in enumerate(values))
+
+
+def check_unmasked(value: Any, name: str) -> None:
+    """Refuse arrays with masked values, whose data below the mask are undefined."""
+    count = int(np.sum(value.mask)) if isinstance(value, np.ma.MaskedArray) else 0
+    if count:
+        raise InvalidInput(f"{name} has {count} values masked: fill them in, or leave them out")
+
+
+def check_sequence(value: Any, name: str, count: int | None = None) -> tuple[Any, ...]:
+    """Return a sequence of any values as a tuple."""
+    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} is not a row of values: give {_example(count)}"
+        )
+    try:
+        values = tuple(value)
+    except TypeError as error:  # an array without axes
+        raise InvalidInput(f"{name} = {short_repr(value)} is not a row: {error}") from error
+    if count is not None and len(values) != count:
+        raise InvalidInput(
+            f"{name} = {short_repr(value)} has {len(values)} values: give {_example(count)}"
+        )
+    return values
+
+
+def check_type(value: Any, expected: type | tuple[type, ...], name: str, remedy: str) -> None:
+    """Refuse a value that is not an instance of the expected classes."""
+    if not isinstance(value, expected):
+        raise InvalidInput(f"{name} is a {type(value).__name__}: {remedy}")
+
+
+def _example(count: int | None) -> str:
+    """Return how a sequence of `count` values is written."""
+    return "(a, b, …)" if count is None else f"({', '.join('abcdef'[:count])})"
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Class = TypeVar("Class", bound=type)
+
+_TYPE_NAMES = {float: "a number", int: "a whole number", bool: "True or False", str: "words"}
+
+
+def validate_arguments(function: Function) -> Function:
+    """Decorate a function so that it refuses arguments which its annotations do not allow.
+
+    Integers must be whole, arrays finite, and sequences hold the annotated types; a bool is no
+    number. The function itself checks the rest, such as the sign of a length.
+    """
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def wrapper(*args: Any, **options: Any) -> Any:
+        _check_values(signature.bind(*args, **options).arguments, _hints(function))
+        return function(*args, **options)
+
+    return wrapper  # type: ignore[return-value]
+
+
+def validate_methods(cls: Class) -> Class:
+    """Decorate the public methods of a class with `validate_arguments`."""
+    for name, method in list(vars(cls).items()):
+        if inspect.isfunction(method) and not name.startswith("_"):
+            setattr(cls, name, validate_arguments(method))
+    return cls
+
+
+def check_fields(instance: Any) -> None:
+    """Refuse fields of a dataclass that do not match their annotations, in `__post_init__`."""
+    hints = _hints(instance.__class__)
+    _check_values({name: getattr(instance, name) for name in hints}, hints)
+
+
+def _check_values(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
+    """Refuse values that do not match their annotations."""
+    for name, value in values.items():
+        if name in hints and not matches_annotation(value, hints[name]):
+            raise InvalidInput(
+                f"{name} = {short_repr(value)} is a {type(value).__name__}: give "
+                f"{_describe(hints[name])}"
+            )
+
+
+@cache
+def _hints(annotated: Hashable) -> dict[str, Any]:
+    """Evaluate the annotations of a function or class, once."""
+    return get_type_hints(annotated)
+
+
+def matches_annotation(value: Any, hint: Any) -> bool:
+    """Return whether a value matches an annotation."""
+    if type(value) is hint:
+        return True
+    origin, inner = _split_annotation(hint)
+    if origin in (Union, UnionType):
+        return any(matches_annotation(value, each) for each in inner)
+    if origin is Literal:
+        return value in inner
+    if origin is _CALLABLE:
+        return callable(value)
+    if origin is np.ndarray:
+        return _is_array(value)
+    if isinstance(origin, type) and issubclass(origin, os.PathLike | Mapping | type):
+        return isinstance(value, origin)
+    if isinstance(origin, type) and issubclass(origin, Iterable):
+        return _is_sequence(value, origin, inner)
+    return _is_instance(value, hint)
+
+
+@cache
+def _split_annotation(hint: Hashable) -> tuple[Any, tuple[Any, ...]]:
+    """Return the container type of an annotation and its arguments, cached for speed."""
+    return get_origin(hint), get_args(hint)
+
+
+_CALLABLE = get_origin(Callable[[], None])
+_MAPPINGS = (Mapping, dict)
+_MISSING = object()
+
+
+def _is_instance(value: Any, kind: Any) -> bool:
+    """Return whether a value is an instance of a class or protocol, or a valid number."""
+    if kind is float:  # the function itself checks for NaN and infinity
+        return is_number(value) or (isinstance(value, float) and not isfinite(value))
+    if kind is int:
+        return is_number(value) and value == int(value) and not isinstance(value, float)
+    if kind in (None, NoneType):
+        return value is None
+    if kind is Any or not isinstance(kind, type):
+        return True
+    if getattr(kind, "_is_protocol", False):
+        members = [name for name in vars(kind) if not name.startswith("_")]
+        # properties are not evaluated, which may be expensive
+        return all(
+            inspect.getattr_static(value, name, _MISSING) is not _MISSING for name in members
+        )
+    return isinstance(value, kind)
+
+
+def _is_array(value: Any) -> bool:
+    """Return whether a value is an array, or nested sequences, of finite unmasked numbers."""
+    if isinstance(value, str | np.ma.MaskedArray):
+        return False
+    try:
+        return bool(np.isfinite(np.asarray(value, dtype=float)).all())
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _is_sequence(value: Any, kind: type, inner: tuple[Any, ...]) -> bool:
+    """Return whether a value is a sequence of the annotated types and length."""
+    if isinstance(value, str | bytes | bytearray | memoryview | Mapping):
+        return False
+    if not isinstance(value, Collection) or (isinstance(value, np.ndarray) and not value.ndim):
+        return False
+    if isinstance(value, np.ma.MaskedArray):
+        return False
+    if kind is tuple and inner[-1] is not ...:
+        return len(value) == len(inner) and all(map(matches_annotation, value, inner))
+    return all(matches_annotation(each, inner[0]) for each in value)
+
+
+def _describe(hint: Any) -> str:
+    """Describe an annotation in words."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return " or ".join(_describe(each) for each in inner)
+    if origin is Literal:
+        return f"one of {inner}"
+    if origin is np.ndarray:
+        return "an array of finite numbers"
+    if origin is _CALLABLE:
+        return "a function"
+    if isinstance(origin, type) and issubclass(origin, Iterable) and origin not in _MAPPINGS:
+        items = [_describe(each) for each in inner if each is not ...]
+        return f"a row of {', '.join(items)}"
+    if hint in (None, NoneType):
+        return "None"
+    return _TYPE_NAMES.get(hint, getattr(hint, "__name__", str(hint)))

@@ -1,0 +1,164 @@
+"""Sections [analysis] and [limit] of case files: time stepping, damping, and limit analysis."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.dynamics.schemes import (
+    HHT,
+    Conserving,
+    EffectiveDamping,
+    Newmark,
+    Rayleigh,
+    Scheme,
+    StiffnessDamping,
+    Viscous,
+    check_friction_scheme,
+    check_large_displacement_scheme,
+)
+from archfem.errors import InvalidInput
+from archfem.limit.backfill import Fill
+from archfem.limit.collapse import Collapse, collapse_factor
+from archfem.masonry.loads import Action, BodyForce, PointLoad
+from archfem.masonry.structure import Structure
+
+ANALYSIS_KEYS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "stop_at_mechanism": bool}
+DAMPING_KEYS = {
+    **{"ratio": "1", "frequency": "Hz", "frequencies": ["Hz"], "modes": str, "kind": str},
+    **{"mass_share": "1", "joints": str},
+}
+LIMIT_KEYS = {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict}
+POINT_LOAD_KEYS = {"x": "m", "force": ["N"]}
+FILL_KEYS = {
+    **{"friction_angle": "degree", "cohesion": "Pa", "mobilisation": "1", "active": "1"},
+    **{"dispersal": str, "spread": "degree"},
+}
+
+
+def parse_analysis(table: Any) -> dict[str, Any]:
+    """Return the checked keys of [analysis]."""
+    analysis = check_table(table, ANALYSIS_KEYS, "analysis")
+    if "damping" in analysis:
+        analysis["damping"] = check_table(analysis["damping"], DAMPING_KEYS, "analysis.damping")
+    return analysis
+
+
+def parse_damping(analysis: Table) -> Viscous | EffectiveDamping | None:
+    """Return the damping of a case; that of effective modes has no frequencies yet."""
+    if "damping" not in analysis:
+        return None
+    damping = dict(analysis["damping"])
+    keys = set(damping) - {"joints"}
+    if {"ratio", "modes"} <= keys <= {"ratio", "modes", "kind", "mass_share"}:
+        # The share of mass selects the second mode, which stiffness damping has not.
+        rayleigh = damping.get("kind") == "rayleigh"
+        if damping.pop("modes") == "effective" and ("mass_share" not in keys or rayleigh):
+            return EffectiveDamping(**damping)
+    elif keys == {"ratio", "frequency"}:
+        return StiffnessDamping(**damping)
+    elif keys == {"ratio", "frequencies"} and len(damping["frequencies"]) == 2:
+        return Rayleigh(**{**damping, "frequencies": tuple(damping["frequencies"])})
+    raise InvalidInput(
+        f"analysis.damping = {analysis['damping']}: give a ratio and a frequency, e.g. "
+        "{ ratio = 0.05, frequency = 8.0 }, two for Rayleigh damping, frequencies = [8.0, "
+        '16.0], or modes = "effective" for them, with kind = "rayleigh" (and a mass_share) for two'
+    )
+
+
+def parse_scheme(analysis: Table) -> Scheme:
+    """Return the time integration scheme of a case."""
+    name, alpha = analysis.get("scheme", "conserving"), analysis.get("alpha")
+    schemes = {"conserving": Conserving, "newmark": Newmark, "hht": HHT}
+    if name not in schemes or (alpha is not None and name != "hht"):
+        raise InvalidInput(
+            f"analysis.scheme = {name!r} with alpha {alpha}: use 'conserving', 'newmark', or "
+            "'hht' and alpha"
+        )
+    return schemes[name]() if alpha is None else HHT(alpha)
+
+
+def check_scheme(analysis: Table, structure: Structure, displacements: str = "small") -> None:
+    """Refuse a scheme that cannot integrate the case's contacts or displacements."""
+    # Friction is integrated over a step by the conserving scheme alone.
+    if displacements == "large":
+        check_large_displacement_scheme(parse_scheme(analysis))
+    try:
+        check_friction_scheme(parse_scheme(analysis), structure)
+    except InvalidInput as error:
+        name = analysis.get("scheme", "conserving")
+        raise InvalidInput(
+            f'analysis.scheme = {name!r}: {error}; in a case file, scheme = "conserving", or '
+            'friction = "none" and no tension in the table of each of its [contacts]'
+        ) from error
+
+
+@dataclass(frozen=True)
+class LimitAnalysis:
+    """Limit analysis of a case: the live load, the friction law and the strength of a fill.
+
+    Attributes:
+        live: loads that grow together; the collapse factor multiplies them.
+        friction: friction law, "coulomb", "nonassociated", or None without sliding.
+        fill: strength of the fill, or None.
+    """
+
+    live: Sequence[Action]
+    friction: str | None
+    fill: Fill | None = None
+
+    def solve(self, structure: Structure) -> Collapse:
+        """Compute the load factor at which a structure of rigid blocks becomes a mechanism.
+
+        Args:
+            structure: structure of the case.
+
+        Returns:
+            Result of `archfem.collapse_factor`.
+
+        Raises:
+            InvalidInput: a load misses the structure, or blocks are too soft to be rigid and the
+                case gives no strength of a fill.
+        """
+        return collapse_factor(structure, live=self.live, friction=self.friction, fill=self.fill)
+
+
+def parse_limit(table: Any) -> LimitAnalysis:
+    """Return the limit analysis of a case."""
+    values = check_table(table, LIMIT_KEYS, "limit")
+    live: list[Action] = []
+    if "horizontal" in values or "vertical" in values:
+        live.append(BodyForce(values.get("horizontal", 0.0), values.get("vertical", 0.0)))
+    if "point" in values:
+        live.append(_point_load(values["point"]))
+    if not live:
+        raise InvalidInput(
+            "limit has no load: give horizontal = 1.0, a multiple of each block's weight, or "
+            'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
+        )
+    laws = ("coulomb", "nonassociated", "none")
+    friction = check_choice(values.get("friction", "coulomb"), laws, "limit.friction")
+    fill = _fill(values["fill"]) if "fill" in values else None
+    return LimitAnalysis(tuple(live), None if friction == "none" else friction, fill)
+
+
+def _fill(table: Any) -> Fill:
+    """Return the strength of the fill."""
+    fill = check_table(table, FILL_KEYS, "limit.fill")
+    if "friction_angle" not in fill:
+        raise InvalidInput(
+            f"limit.fill = {table} lacks its angle of friction: give friction_angle = "
+            '"35 degree", which well-packed gravel has'
+        )
+    return Fill(**fill)
+
+
+def _point_load(table: Any) -> PointLoad:
+    """Return a concentrated live load."""
+    point = check_table(table, POINT_LOAD_KEYS, "limit.point")
+    if set(point) != set(POINT_LOAD_KEYS) or len(point["force"]) != 2:
+        raise InvalidInput(
+            f"limit.point = {table}: give a place and the two components of a force, e.g. "
+            '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
+        )
+    return PointLoad(point["x"], point["force"])

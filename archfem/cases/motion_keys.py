@@ -1,0 +1,193 @@
+"""Sections [motion] and [suite] of case files: ground motions, suites and target spectra."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archfem.cases.toml_file import Table, check_choice, check_table
+from archfem.errors import InvalidInput
+from archfem.motion.design_spectra import (
+    Asce2022,
+    DesignSpectrum,
+    Eurocode8,
+    Eurocode2024,
+    Ntc2018,
+    TableSpectrum,
+    Tbec2018,
+)
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+
+SYNTHETIC_KEYS = {"duration": "s", "pga": "m/s**2", "seed": int, "dt": "s", "vertical_ratio": "1"}
+SOURCE_KEYS = {
+    **{"file": str, "column": int, "units": str, "dt": "s"},
+    **{"synthetic": dict, "samples": ["m/s**2"]},
+}
+MOTION_KEYS = {
+    **SOURCE_KEYS,
+    **{"vertical": (str, dict), "resample": "s", "start": "s", "end": "s", "scale": "1"},
+    "reversed": bool,
+}
+SUITE_KEYS = {
+    **{"name": str, "folder": str, "reversed": bool, "target": dict, "matched": bool},
+    **{"scale": "1", "reduction": "1", "pairs": dict},
+}
+# Design spectra for 5 % damping by name, with their keys; accelerations are in g.
+TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
+    "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
+    "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
+    "NTC-2018": (
+        Ntc2018,
+        {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
+    ),
+    "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
+    "EC8-2024": (
+        Eurocode2024,
+        {"s_alpha": "1", "s_beta": "1", "f_alpha": "1", "f_beta": "1", "topography": "1"},
+    ),
+    "table": (TableSpectrum, {"periods": ["s"], "values": ["1"], "vertical_values": ["1"]}),
+}
+
+
+def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
+    """Return the checked keys of one motion."""
+    settings = _parse_source(table, MOTION_KEYS, section)
+    if isinstance(settings.get("vertical"), dict):
+        vertical = _parse_source(settings["vertical"], SOURCE_KEYS, f"{section}.vertical")
+        if "vertical_ratio" in vertical.get("synthetic", {}):
+            raise InvalidInput(
+                f"{section}.vertical.synthetic.vertical_ratio: a vertical has none, its pga is its "
+                "own peak"
+            )
+        settings["vertical"] = vertical
+    return settings
+
+
+def build_motion(settings: Table, folder: Path = Path(), section: str = "motion") -> Motion:
+    """Read or synthesise a motion, then resample, cut, reverse and scale it, in this order."""
+    motion = _build_source(settings, folder)
+    step = settings.get("resample")
+    motion = motion if step is None else motion.resampled(step)
+    if "vertical" in settings:
+        vertical = _build_vertical(settings["vertical"], folder)
+        vertical = vertical if step is None else vertical.resampled(step)
+        if abs(vertical.dt - motion.dt) > 1e-6 * motion.dt:  # equal but for round-off
+            raise InvalidInput(
+                f"{section}: the vertical has a step of {vertical.dt:g} s, the horizontal of "
+                f'{motion.dt:g} s: bring both to one with {section}.resample = "{motion.dt:g} s"'
+            )
+        motion = motion.with_vertical(vertical)
+    # Times of the case are those of the resampled motion, before it is reversed.
+    if "start" in settings or "end" in settings:
+        motion = motion.cut(settings.get("start", 0.0), settings.get("end"))
+    motion = motion.reversed() if settings.get("reversed", False) else motion
+    return motion.scaled(settings.get("scale", 1.0))
+
+
+def parse_suite(table: Any) -> dict[str, Any]:
+    """Return the checked keys of a suite."""
+    settings = check_table(table, SUITE_KEYS, "suite")
+    pairs = settings.get("pairs", {})
+    if not pairs:
+        raise InvalidInput(
+            "suite.pairs is empty: write a table for each pair, e.g. "
+            "[suite.pairs.first] with synthetic = { seed = 1 }"
+        )
+    # Each pair has a result folder of its name.
+    for name in pairs:
+        if not re.fullmatch(r"\w[\w +-]*", name):
+            raise InvalidInput(
+                f"suite.pairs: '{name}' names a folder of results too: use letters, digits, _ and -"
+            )
+    settings["pairs"] = {
+        name: parse_motion(pair, f"suite.pairs.{name}") for name, pair in pairs.items()
+    }
+    if settings.get("matched", False) and "target" not in settings:
+        raise InvalidInput(
+            "suite.matched = true needs a target, e.g. "
+            'target = { code = "TBEC-2018", ss = 1.14, s1 = 0.315, site = "ZD" }'
+        )
+    build_target_spectrum(settings)  # refuses parameters of the code that are out of range
+    return settings
+
+
+def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
+    """Return the target spectrum of a suite, or None."""
+    if "target" not in settings:
+        return None
+    values = dict(settings["target"])
+    code = check_choice(values.pop("code", None), TARGET_SPECTRA, "suite.target.code")
+    spectrum, keys = TARGET_SPECTRA[code]
+    try:
+        return spectrum(**check_table(values, keys, "suite.target"))
+    except TypeError as error:
+        raise InvalidInput(f"suite.target of {code}: {error}") from error
+
+
+def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
+    """Return the pairs of a suite under their names, before spectral matching."""
+    files = folder / settings.get("folder", "")
+    return tuple(
+        # Without the transverse component, which plane structures do not feel.
+        replace(build_motion(pair, files, f"suite.pairs.{name}"), name=name, transverse=None)
+        for name, pair in settings["pairs"].items()
+    )
+
+
+def build_suite(settings: Table, folder: Path = Path()) -> Suite:
+    """Return a suite of pairs, matched to its target spectrum if the case says so."""
+    suite = Suite(
+        settings.get("name", "suite"),
+        build_pairs(settings, folder),
+        scale=settings.get("scale", 1.0),
+        reduction=settings.get("reduction", 1.0),
+    )
+    target = build_target_spectrum(settings)
+    suite = suite.matched(target) if target and settings.get("matched", False) else suite
+    return suite.reversed() if settings.get("reversed", False) else suite
+
+
+def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
+    """Check the keys of the source of a motion: a file, samples, or synthetic."""
+    settings = check_table(table, keys, section)
+    sources = sorted({"file", "synthetic", "samples"} & set(settings))
+    if len(sources) != 1:
+        raise InvalidInput(
+            f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one, or "
+            f"samples = [ … ] and dt; it has {sources or 'none of them'}"
+        )
+    (source,) = sources
+    if source == "synthetic":
+        settings["synthetic"] = check_table(
+            settings["synthetic"], SYNTHETIC_KEYS, f"{section}.synthetic"
+        )
+    # Keys that describe a file are errors beside another source; samples have a step.
+    of_files = {"file": set(), "synthetic": {"column", "units", "dt"}}
+    if unused := sorted(of_files.get(source, {"column", "units"}) & set(settings)):
+        raise InvalidInput(f"{section}.{unused[0]} belongs to a file, not to {source}")
+    if source == "samples" and "dt" not in settings:
+        raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
+    return settings
+
+
+def _build_vertical(source: str | Table, folder: Path) -> Motion:
+    """Return the vertical motion of a file, of samples, or synthetic with a peak of its own."""
+    settings = {"file": source} if isinstance(source, str) else source
+    if "synthetic" in settings:
+        # The vertical component of a synthetic motion: ratio 1 gives it the PGA of the table.
+        return Motion.synthetic(**settings["synthetic"], vertical_ratio=1.0)
+    return _build_source(settings, folder)
+
+
+def _build_source(settings: Table, folder: Path) -> Motion:
+    """Return the motion of samples, of a seed, or of a file with its keywords."""
+    if "samples" in settings:
+        return Motion(np.array(settings["samples"]), settings["dt"])
+    if "synthetic" in settings:
+        return Motion.synthetic(**settings["synthetic"])
+    options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}
+    return Motion.read(folder / settings["file"], **options)

@@ -1,0 +1,184 @@
+"""Report sections on the checks of each run, and on versions, hashes and inputs."""
+
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem.cases.case import Case
+from archfem.cases.report.report_data import ReportData, missing_note
+from archfem.dynamics.history import History
+from archfem.dynamics.recorder import library_versions
+from archfem.masonry.structure import Structure
+from archfem.view.pages.document import Grid, Section, TextBlock
+
+
+def build_check_section(data: ReportData) -> Section:
+    """Build the section on predicted error, energy balance and model."""
+    blocks: list[Any] = []
+    if data.runs:
+        head = ["run", "energy from nowhere", "supports bear", "Newton", "halved"]
+        head += ["predicted error", "end"]
+        rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
+        caption = (
+            "Checks of each run; energy relative to the largest exchanged, supports under dead load"
+        )
+        blocks += [Grid(head, rows, caption), *_list_warnings(data)]
+    else:
+        blocks.append(missing_note("a run to check", "A case with [motion] or [suite] has one."))
+    blocks.append(Grid((), _describe_model(data), "Model and mesh"))
+    if not any("predicted_error" in run.dataset.attrs for run in data.runs.values()):
+        remedy = 'fidelity = "auto" predicts one.'
+        blocks.append(missing_note("a predicted error of the model", remedy))
+    if (text := data.read_text("accuracy.txt")) is not None:
+        caption = "Speed against error over fidelities, meshes and steps."
+        blocks += [TextBlock(text, "lines"), *data.read_figure("accuracy.png", caption)]
+    else:
+        remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
+        blocks.append(missing_note("a comparison of meshes and steps", remedy))
+    return Section("Predicted error and checks", blocks)
+
+
+def _check_row(case: Case, name: str, run: History) -> list[str]:
+    """Row of the checks of a run."""
+    attrs = run.dataset.attrs
+    predicted = attrs.get("predicted_error")
+    iterations = run.dataset["iterations"].values if "iterations" in run.dataset else np.zeros(0)
+    ratio = supported_weight_ratio(case.structure, run.joints.isel(time=0, drop=True))
+    return [
+        name,
+        f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
+        f"{ratio:.4f} of the weight",
+        f"≤ {int(iterations.max())} a record" if len(iterations) else "–",
+        f"{int(attrs.get('halved_steps', 0))} steps",
+        "–" if predicted is None else f"{float(predicted):.2g} in |e|",
+        run.outcome,
+    ]
+
+
+def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
+    """Return the vertical reaction of the supports relative to the weight; 1 in equilibrium [-]."""
+    # Force on the higher block of each joint (j, 2).
+    force = joints["N"].values[:, None] * structure.normals
+    force -= joints["V"].values[:, None] * structure.tangents
+    reaction = 0.0
+    for (lower, higher), (_, vertical) in zip(structure.pairs, force, strict=True):
+        # A support bears the joint's force; a joint between two supports cancels.
+        below, above = (structure.blocks[number].fixed for number in (lower, higher))
+        reaction += vertical * (int(below) - int(above))
+    return float(reaction / structure.weight)
+
+
+def _list_warnings(
+    data: ReportData, max_energy_drift: float = 0.01, max_imbalance: float = 0.01
+) -> list[TextBlock]:
+    """List runs with an energy drift or an imbalance of the supports, or that did not finish."""
+    # The imbalance of equilibrium is not 0: arcs meshed as chords are 0.3 % lighter.
+    warnings = []
+    for name, run in data.runs.items():
+        drift = abs(float(run.dataset.attrs.get("energy_drift", 0.0)))
+        start = run.joints.isel(time=0, drop=True)
+        ratio = supported_weight_ratio(data.case.structure, start)
+        if not drift <= max_energy_drift:  # also NaN
+            warnings.append(
+                f"{name}: {drift:.1%} of the energy exchanged came from nowhere, or went nowhere: "
+                "try shorter steps."
+            )
+        if not abs(ratio - 1.0) <= max_imbalance:
+            warnings.append(
+                f"{name}: at its start the supports bear {ratio:.4f} of the weight: it did not "
+                "start at rest under dead load, or its mesh leaves too much out."
+            )
+        if not run.ending.is_complete:
+            warnings.append(f"{name}: {run.outcome}.")
+    return [TextBlock(warning, "doubt") for warning in warnings]
+
+
+def _describe_model(data: ReportData) -> list[tuple[str, str]]:
+    """Describe fidelity, mesh and quadrature."""
+    discretisation, rows = data.case.discretisation, []
+    for run in list(data.runs.values())[:1]:  # all runs have the same model
+        attrs, unknown = run.dataset.attrs, "unknown"
+        rows = [
+            ("fidelity of the model", str(attrs.get("fidelity", unknown))),
+            ("coordinates", str(run.dataset.sizes.get("coordinate", unknown))),
+            ("solver of the steps", str(attrs.get("method", unknown))),
+        ]
+    if data.case.selects_model:
+        return [*rows, ("mesh", "selected with the fidelity, and not saved in the results")]
+    rule = ("quadrature on joints", discretisation.rule.rule)
+    if discretisation.fidelity == "rigid":
+        return [*rows, ("mesh", "none, for blocks are rigid"), rule]
+    through, along = discretisation.cells
+    return [
+        *rows,
+        ("cells at least", f"{through} through the thickness, {along} along each block"),
+        ("elements", f"{discretisation.cell}s of degree {discretisation.degree}"),
+        rule,
+    ]
+
+
+def build_source_section(data: ReportData) -> Section:
+    """Build the section on versions, digests of inputs and files, and the case itself."""
+    runs = data.runs.items()
+    # Usually one line: all runs were computed with the same versions.
+    made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
+    rows = [
+        *(("computed with", text) for text in made),
+        ("report written with", library_versions()),
+    ]
+    rows += [
+        (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
+        for name, run in runs
+        if "inputs" in run.dataset.attrs
+    ]
+    rows.append(("SHA-256 of the case", hash_bytes(data.case.text().encode())))
+    blocks: list[Any] = [Grid((), rows)]
+    # Histories contain their case, which may have been changed in the folder since.
+    blocks += [
+        TextBlock(
+            f"{name}: the run carries another case than that of this report; its SHA-256 is "
+            f"{hash_bytes(str(run.dataset.attrs['case']).encode())}. Run the case again.",
+            "doubt",
+        )
+        for name, run in runs
+        if "case" in run.dataset.attrs and run.dataset.attrs["case"] != _case_text(data, name)
+    ]
+    if data.folder is not None:
+        files = sorted(path for path in data.folder.rglob("*") if _is_source(path))
+        table = [
+            [str(path.relative_to(data.folder)), f"{path.stat().st_size / 1e3:.1f}", _hash(path)]
+            for path in files
+        ]
+        caption = "Files that the report was written from"
+        blocks.append(Grid(["file", "kB", "SHA-256"], table, caption))
+    blocks.append(TextBlock(data.case.text(), "lines"))
+    return Section("Versions, hashes and the case as a file", blocks)
+
+
+def _case_text(data: ReportData, name: str) -> str:
+    """Return the case of one run as text: for a suite, with this pair alone."""
+    return data.case.text() if data.case.suite is None else data.case.alone(name).text()
+
+
+def hash_bytes(content: bytes) -> str:
+    """Return the SHA-256 of bytes."""
+    return sha256(content).hexdigest()
+
+
+def _is_source(path: Path) -> bool:
+    """Return whether a report is written from a file."""
+    figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy")
+    text = path.suffix in (".nc", ".toml", ".txt")
+    return path.is_file() and (text or (path.suffix == ".png" and path.stem in figures))
+
+
+def _hash(path: Path) -> str:
+    """Return the first 16 digits of the SHA-256 of a file, read in chunks."""
+    with path.open("rb") as file:
+        digest = sha256()
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()[:16]

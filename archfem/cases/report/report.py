@@ -1,0 +1,78 @@
+"""HTML reports of cases, result folders and single histories."""
+
+from pathlib import Path
+
+from archfem.cases.case import Case
+from archfem.cases.report.checks import build_check_section, build_source_section, hash_bytes
+from archfem.cases.report.report_data import ReportData, build_player
+from archfem.cases.report.sections import (
+    build_case_sections,
+    build_dead_load_sections,
+    build_ground_section,
+    build_run_sections,
+    list_facts,
+)
+from archfem.cases.result_folder import ResultFolder
+from archfem.cases.run import Run
+from archfem.cases.toml_file import parse_tables
+from archfem.dynamics.history import History
+from archfem.errors import InvalidInput
+from archfem.view.pages.document import Document
+from archfem.view.pages.player import Player, write_page
+
+
+def write_report(data: ReportData, path: str | Path) -> Path:
+    """Write a report atomically."""
+    case = data.case
+    sections = [
+        *build_case_sections(data),
+        *build_dead_load_sections(data),
+        build_ground_section(data),
+        *build_run_sections(data),
+        build_check_section(data),
+        build_source_section(data),
+    ]
+    subtitle = f"archfem report · case {hash_bytes(case.text().encode())[:12]}"
+    footer = (
+        "Written by archfem from the results named above; figures and numbers are theirs. On paper "
+        "a player shows the instant and the joint that it showed on the screen."
+    )
+    document = Document(case.title, subtitle, list_facts(data), sections, footer)
+    return write_page(path, document.page)
+
+
+def write_report_of_case(result: Run | ResultFolder, path: str | Path) -> Path:
+    """Write the report of the results of a case."""
+    return write_report(_collect_data(result), path)
+
+
+def write_report_of_history(run: History, path: str | Path) -> Path:
+    """Write the report of one run, with the case in its attributes."""
+    text = run.dataset.attrs.get("case")
+    if not text:
+        raise InvalidInput(
+            "this run was made in Python and keeps no case to report on: run.player(model) shows "
+            "it, and archfem.cases.run_case runs a case"
+        )
+    case = Case.of(parse_tables(text))
+    # A history that was read alone has no structure: that of its case is the same.
+    run = run if run.structure is not None else History(run.dataset, case.structure)
+    pairs, motion = list((case.suite or {}).get("pairs", ())), run.dataset.attrs.get("motion")
+    name = str(motion) if motion in pairs else "run"
+    missing = tuple(pair for pair in pairs if pair != name)
+    return write_report(ReportData(case, {name: run}, missing=missing), path)
+
+
+def player_of_case(result: Run | ResultFolder, run: str | None = None) -> Player:
+    """Return the player of one run of a case."""
+    data, names = _collect_data(result), list(result.runs)
+    name = names[0] if run is None and len(names) == 1 else run
+    if name is None or name not in names:
+        problem = "no run is named" if run is None else f"there is no run '{run}'"
+        raise InvalidInput(f"{problem}: there are {names}")
+    return build_player(data.case, data.runs[name], data.case.title)
+
+
+def _collect_data(result: Run | ResultFolder) -> ReportData:
+    """Return the data of a report on the results of a case."""
+    return ReportData(result.case, result.runs, result.folder, result.missing)

@@ -1,0 +1,110 @@
+"""Data of a report: case, runs, files of the folder, and the model rebuilt for the player."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from archfem.cases.case import Case
+from archfem.dynamics.history import History
+from archfem.errors import ArchfemError
+from archfem.models.builder import build
+from archfem.models.discretisation import MODEL_FIDELITIES, Discretisation
+from archfem.models.model import Model
+from archfem.motion.motion import Motion
+from archfem.view.pages.document import FigureBlock, TextBlock
+from archfem.view.pages.player import Player
+from archfem.view.pages.player_data import LARGEST, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class ReportData:
+    """Case, runs, and the folder with files of other commands."""
+
+    case: Case
+    runs: Mapping[str, History]  # by the names of their motions
+    folder: Path | None = None
+    missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
+
+    @cached_property
+    def dead(self) -> xr.Dataset | None:
+        """Joints under dead load (joint), where runs start; None without a run."""
+        for run in self.runs.values():
+            return run.joints.isel(time=0, drop=True)
+        return None
+
+    @cached_property
+    def motions(self) -> dict[str, Motion]:
+        """Ground motions as applied, from the recorded accelerations."""
+        return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
+
+    def read_text(self, name: str) -> str | None:
+        """Return the text of a file of the folder, or None."""
+        if self.folder is None or not (path := self.folder / name).is_file():
+            return None
+        return path.read_text(encoding="utf-8").strip()
+
+    def read_figure(self, name: str, caption: str) -> list[FigureBlock]:
+        """Return the picture of a file of the folder, or an empty list."""
+        if self.folder is None or not (path := self.folder / name).is_file():
+            return []
+        return [FigureBlock.read(path, caption)]
+
+
+def rebuild_motion(run: History, name: str) -> Motion:
+    """Return the recorded ground motion of a run, interpolated to even steps."""
+    times, ground = run.time, run.dataset["ground"].values
+    # Adaptive and event steps are uneven; the median is the step of the record.
+    dt = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    even = times[0] + dt * np.arange(round((times[-1] - times[0]) / dt) + 1)
+    horizontal, vertical = (np.interp(even, times, column) for column in ground.T)
+    return Motion(horizontal, dt, vertical if vertical.any() else None, name)
+
+
+def missing_note(what: str, remedy: str) -> TextBlock:
+    """Return the paragraph on a result that does not exist."""
+    return TextBlock(f"Not among the results: {what}. {remedy}", "missing")
+
+
+def build_player(
+    case: Case, run: History, title: str, players: int = 1, *, min_bytes: int = 800_000
+) -> Player:
+    """Return the player of a run; blocks stand still if it has no recorded displacements."""
+    model, reason = _rebuild_model(case, run)
+    # Players of one page share its size, but each stays legible.
+    max_bytes = max(LARGEST // players, min_bytes)
+    return Player(Scene(case.structure, run, model, title, max_bytes, reason))
+
+
+def _rebuild_model(case: Case, run: History) -> tuple[Model | None, str]:
+    """Return the model of the recorded coordinates; None and the reason if there is none."""
+    if "q" not in run.dataset:
+        return None, ""
+    try:
+        model = build(case.structure, _discretisation_of(case, run))
+    except (ArchfemError, ImportError) as error:
+        return None, f"Stones are drawn where they stand, for their model cannot be built: {error}"
+    # A case that was changed after its run may have another mesh.
+    if model.size != run.dataset.sizes["coordinate"]:
+        return None, (
+            "Stones are drawn where they stand: the run was made with a model of "
+            f"{run.dataset.sizes['coordinate']} coordinates, and its case gives one of "
+            f"{model.size}."
+        )
+    return model, ""
+
+
+def _discretisation_of(case: Case, run: History) -> Discretisation:
+    """Return the discretisation of a run; one selected by "auto" is read from its attributes."""
+    if not case.selects_model:
+        return case.discretisation
+    fidelity = str(run.dataset.attrs["fidelity"])
+    displacements = case.discretisation.displacements
+    if fidelity in MODEL_FIDELITIES:
+        return Discretisation(fidelity, displacements=displacements)
+    # "backfill: full, rest: faces", as `Discretisation.name` writes it.
+    by_part = dict(part.rsplit(": ", 1) for part in fidelity.split(", ") if ": " in part)
+    return Discretisation(by_part, displacements=displacements)

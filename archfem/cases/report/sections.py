@@ -1,0 +1,450 @@
+"""Report sections: case and geometry, dead load, modes, limit analysis, ground motion, response."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem.cases.case import Case
+from archfem.cases.report.report_data import ReportData, build_player, missing_note
+from archfem.cases.result_text import (
+    ResultTable,
+    format_ratio,
+    tabulate_joints,
+    tabulate_motions,
+    tabulate_runs,
+)
+from archfem.dynamics.history import SIGN_CONVENTION, History
+from archfem.dynamics.schemes import EffectiveDamping, Rayleigh
+from archfem.joints.criteria import assessed_joints
+from archfem.masonry.structure import Structure
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+from archfem.statics.stress import utilisation_text
+from archfem.units import MPa, kN
+from archfem.view.collapse import draw_fall
+from archfem.view.histories import draw_envelope
+from archfem.view.motions import draw_motion, draw_spectra, draw_suite
+from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
+from archfem.view.structure import draw_names, draw_structure
+from archfem.view.style import LINES
+
+# Kinematic assumption on blocks of each fidelity.
+BLOCK_ASSUMPTIONS = {
+    "rigid": "rigid; all compliance is in the joints",
+    "faces": "elastic; each face of a joint moves as a plane, the rest is condensed statically",
+    "condensed": "elastic; all nodes on joints are kept, the rest is condensed statically",
+    "full": "elastic finite elements, all nodes kept",
+    "monolithic": "elastic finite elements, all nodes kept, weak forms assembled each time",
+}
+
+
+def build_case_sections(data: ReportData) -> list[Section]:
+    """Build the sections on settings, assumptions, units, signs and geometry."""
+    case = data.case
+    described = ("title", "structure", "materials", "contacts")  # the geometry shows these
+    settings = [
+        row for key, table in case.settings.items() if key not in described
+        for row in _flatten(key, table)
+    ]  # fmt: skip
+    blocks: list[Any] = [Grid((), _list_assumptions(data), "Assumptions of the analysis")]
+    if settings:
+        blocks.append(Grid((), settings, "Settings of the case beside its structure"))
+    signs = [
+        ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
+        ("signs", SIGN_CONVENTION),
+        ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
+        ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
+    ]
+    return [
+        Section("Case and assumptions", blocks),
+        Section("Units and signs", [Grid((), signs)]),
+        Section("Geometry and materials", _build_geometry(case.structure)),
+    ]
+
+
+def _flatten(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Yield keys of nested tables, joined by dots, with their values as text."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _flatten(f"{name}.{key}", inner)
+    elif isinstance(value, list | tuple):
+        yield name, ", ".join(map(str, value))
+    elif isinstance(value, bool):
+        yield name, "yes" if value else "no"
+    else:
+        yield name, str(value)
+
+
+def _list_assumptions(data: ReportData) -> list[tuple[str, str]]:
+    """List the assumptions of the analysis."""
+    case, criteria = data.case, data.case.criteria
+    # Runs record the fidelity that "auto" selected.
+    recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in data.runs.values()}
+    fidelity = ", ".join(sorted(recorded)) if recorded else case.discretisation.name
+    large = case.discretisation.displacements == "large"
+    sliding = (
+        "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
+    )
+    dt = case.analysis.get("dt")
+    step = "steps of a length that the error chooses" if dt is None else f"steps of {1e3 * dt:g} ms"
+    return [
+        ("structure", "plane; forces are those of the whole width"),
+        ("blocks", BLOCK_ASSUMPTIONS.get(fidelity, f"by part: {fidelity}")),
+        ("joints", "dry: no tension but where a bond is given; Coulomb friction; no crushing"),
+        ("displacements", "of any size" if large else "small: equilibrium where blocks stood"),
+        ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
+        ("damping", _describe_damping(case)),
+        ("time steps", f"{type(case.scheme).__name__.lower()} scheme, {step}"),
+        ("a joint hinges", f"where |e| ≥ {criteria.hinge:g}"),
+        ("a joint slides", f"where |V| / N reaches {sliding}"),
+        (
+            "a mechanism by count",
+            f"{criteria.failures} joints of rings and piers that hinge or slide at once, for "
+            f"{criteria.duration:g} s at least",
+        ),
+    ]
+
+
+def _describe_damping(case: Case) -> str:
+    """Describe the damping of a case."""
+    damping = case.damping
+    if damping is None:
+        return "none but that of friction"
+    ratio, joints = f"{100.0 * damping.ratio:g} % of critical", f"joints {damping.joints}"
+    if isinstance(damping, EffectiveDamping):
+        return f"{ratio} at the effective modes, {damping.kind}, {joints}"
+    if isinstance(damping, Rayleigh):
+        low, high = damping.frequencies
+        return f"{ratio} at {low:.3g} and {high:.3g} Hz (Rayleigh), {joints}"
+    return f"{ratio} at {damping.frequency:.3g} Hz, proportional to stiffness, {joints}"
+
+
+def _build_geometry(structure: Structure) -> list[Any]:
+    """Build extent, figure with joint names, and tables of parts, materials and contacts."""
+    caption = "The structure, and the numbers of the joints that are judged."
+    points = np.concatenate([block.drawn() for block in structure.blocks])
+    length, height = np.ptp(points, axis=0)
+    extent = (
+        f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; "
+        f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
+        f"{len(structure.joints)} joints. Gravity is {structure.gravity:g} m/s²."
+    )
+    figure = FigureBlock.of(draw_names(structure), caption)
+    return [TextBlock(extent), figure, _tabulate_parts(structure), *_tabulate_materials(structure)]
+
+
+def _tabulate_parts(structure: Structure) -> Grid:
+    """Tabulate the parts of a structure."""
+    rows = []
+    for part in dict.fromkeys(block.part for block in structure.blocks):
+        blocks = [block for block in structure.blocks if block.part == part]
+        free = [block for block in blocks if not block.fixed]
+        depths = [joint.depth for joint in structure.joints if joint.part == part]
+        weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
+        rows.append(
+            [
+                part or "–",
+                blocks[0].role or "–",
+                str(len(blocks)),
+                str(len(blocks) - len(free)),
+                ", ".join(dict.fromkeys(block.material.name for block in blocks)),
+                f"{weight / kN:.4g}",
+                f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–",
+            ]
+        )
+    head = ["part", "role", "blocks", "of them fixed", "material", "weight [kN]", "joints [m]"]
+    return Grid(head, rows, "Parts; the last column is the depth of their joints")
+
+
+def _tabulate_materials(structure: Structure) -> list[Grid]:
+    """Tabulate the materials of blocks and the contacts of joints."""
+    materials = [
+        [
+            material.name,
+            f"{material.young / MPa:.6g}",
+            f"{material.poisson:g}",
+            f"{material.unit_weight / kN:g}",
+            "not known" if material.strength is None else f"{material.strength / MPa:g}",
+        ]
+        for material in dict.fromkeys(block.material for block in structure.blocks)
+    ]
+    contacts = [
+        [
+            contact.name,
+            f"{contact.normal_stiffness / 1e9:.3g}",
+            f"{contact.shear_stiffness / 1e9:.3g}",
+            f"{contact.coefficient:g}" if contact.slides else "never slides",
+            f"{contact.cohesion / 1e3:g}",
+            f"{contact.tension / 1e3:g}",
+            f"{contact.dilatancy:g}",
+        ]
+        for contact in dict.fromkeys(joint.contact for joint in structure.joints)
+    ]
+    material_head = ["material", "E [MPa]", "ν [–]", "weight [kN/m³]", "strength [MPa]"]
+    contact_head = ["contact", "normal [MPa/mm]", "shear [MPa/mm]", "μ [–]", "c [kPa]"]
+    contact_head += ["tension [kPa]", "dilatancy [–]"]
+    return [Grid(material_head, materials, "Blocks"), Grid(contact_head, contacts, "Joints")]
+
+
+def build_dead_load_sections(data: ReportData) -> list[Section]:
+    """Build the sections on dead load, modes and limit analysis."""
+    return [
+        Section("Dead load", _build_dead_load(data)),
+        Section("Modes", _build_modes(data)),
+        Section("Limit analysis", _build_limit(data)),
+    ]
+
+
+def _build_dead_load(data: ReportData) -> list[Any]:
+    """Build thrust line, table by part, stress and free body."""
+    case, blocks = data.case, list[Any]()
+    thrust = (
+        "Thrust line under dead load. It is drawn where the resultant of each joint crosses it; "
+        "within the middle third the joint is closed over its whole depth."
+    )
+    if data.dead is not None:
+        figure = draw_structure(case.structure, data.dead, criteria=case.criteria)
+        blocks += [FigureBlock.of(figure, thrust), _tabulate_dead_load(assessed_joints(data.dead))]
+    elif drawn := data.read_figure("dead.png", thrust):
+        blocks += drawn
+    else:
+        remedy = "`archfem run CASE.toml --out FOLDER` finds it."
+        blocks.append(missing_note("the dead load", remedy))
+    if (stress := data.read_text("dead_stress.txt")) is not None:
+        blocks += data.read_figure("dead_stress.png", "Principal compression under dead load.")
+        blocks.append(TextBlock(stress, "lines"))
+    elif case.model.get("fidelity") == "rigid":
+        remedy = 'A run with fidelity = "faces" or "full" has it.'
+        blocks.append(missing_note("stress in the blocks, for they are rigid", remedy))
+    else:
+        remedy = "A folder that `archfem run` wrote has it, unless rigid."
+        blocks.append(missing_note("stress in the blocks", remedy))
+    caption = "A block cut free: forces on it, and their closing."
+    return blocks + data.read_figure("free_body.png", caption)
+
+
+def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
+    """Tabulate the extremes of the joints of each part under dead load."""
+    rows, part_of_joint = [], joints["part"].values.astype(str)
+    for part in dict.fromkeys(part_of_joint.tolist()):
+        selected = joints.isel(joint=part_of_joint == part)
+        e, ratio, normal = (selected[key].values for key in ("eccentricity", "friction", "N"))
+        names = selected["name"].values.astype(str)
+        # e is undefined where a joint is open.
+        largest = int(np.nanargmax(np.abs(e))) if np.isfinite(e).any() else 0
+        rows.append(
+            [
+                part or "–",
+                f"{np.nanmax(np.abs(e), initial=0.0):.3f}",
+                names[largest],
+                f"{np.nanmax(ratio, initial=0.0):.3f}",
+                f"{normal.min() / kN:.4g}",
+                f"{normal.max() / kN:.4g}",
+                str(int(selected["open"].sum())),
+            ]
+        )
+    head = ["part", "max |e|", "in", "max V/N", "min N [kN]", "max N [kN]", "open joints"]
+    return Grid(head, rows, "Joints of rings and piers under dead load")
+
+
+def _build_modes(data: ReportData) -> list[Any]:
+    """Build table and shapes of the modes from the files of the folder."""
+    text = data.read_text("modes.txt")
+    if text is None:
+        remedy = "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
+        return [missing_note("modes", remedy)]
+    caption = "Shapes of the modes about dead load."
+    return [TextBlock(text, "lines"), *data.read_figure("modes.png", caption)]
+
+
+def _build_limit(data: ReportData) -> list[Any]:
+    """Build text and mechanism of limit analysis from the files of the folder."""
+    text = data.read_text("limit.txt")
+    if text is None:
+        remedy = "A case with a table [limit] includes it."
+        if data.case.limit is not None:
+            remedy = "The case includes it: `archfem run CASE.toml --out FOLDER` finds it."
+        return [missing_note("limit analysis", remedy)]
+    caption = "The mechanism of limit analysis, over the structure."
+    return [TextBlock(text, "lines"), *data.read_figure("collapse.png", caption)]
+
+
+def build_ground_section(data: ReportData) -> Section:
+    """Build the section on ground motions and spectra."""
+    motions = list(data.motions.values())
+    if not motions:
+        remedy = "The case has none."
+        if data.case.has_motion:
+            remedy = "`archfem run` shakes the structure."
+        return Section("Ground motion", [missing_note("a motion of the ground", remedy)])
+    caption = "Measures of the motions as applied, read at the steps that the runs recorded."
+    blocks: list[Any] = [Grid(*tabulate_motions(motions), caption)]
+    if data.case.suite is None:
+        blocks += [
+            FigureBlock.of(draw_motion(motion), "Ground motion as applied.") for motion in motions
+        ]
+    blocks += _build_spectra(data.case, motions)
+    return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
+
+
+def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
+    """Build the response spectra, beside the target spectrum if there is one."""
+    if case.suite is None:
+        caption = "Response spectra, 5 % damped, as applied."
+        figure = FigureBlock.of(draw_spectra(motions), caption)
+        return [figure, missing_note("a target spectrum", "A [suite] of motions may have one.")]
+    scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
+    # The suite multiplies by scale and divides by R; recorded motions are as applied.
+    pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
+    suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
+    caption = (
+        "Response spectra, 5 % damped, before they are divided by the reduction factor "
+        f"R = {reduction:g}; motions were applied divided by it."
+    )
+    blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
+    if case.target is None:
+        remedy = "suite.target = { code = …, … } gives one."
+        blocks.append(missing_note("a target spectrum", remedy))
+    elif not case.suite.get("matched", False):
+        text = "The motions were not matched to the target: suite.matched = false."
+        blocks.append(TextBlock(text))
+    return blocks
+
+
+def build_run_sections(data: ReportData) -> list[Section]:
+    """Build the sections on the response of one run, or of all pairs and of each."""
+    remedy = "`archfem run` again runs the pairs that are left."
+    missing = [missing_note(f"runs of {', '.join(data.missing)}", remedy)] if data.missing else []
+    if not data.runs:
+        none = [missing_note("a run", "A case with [motion] or [suite] has one.")]
+        return [Section("Response", missing or none)]
+    if data.case.suite is None:
+        (name,) = data.runs
+        return [
+            Section("Response", _build_response(data, name, 1)),
+            Section("Mechanism and collapse", _build_mechanism(data.runs[name])),
+        ]
+    sections = [
+        Section("Response: all pairs", [*_build_suite_response(data), *missing]),
+        Section("Response: pair by pair", []),
+    ]
+    for name, run in data.runs.items():
+        blocks = [*_build_response(data, name, len(data.runs)), *_build_mechanism(run)]
+        sections.append(Section(name, blocks, level=3))
+    return sections
+
+
+def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
+    """Build player, envelope, criteria per joint and use of strength of one run."""
+    case, run = data.case, data.runs[name]
+    title = case.title if case.suite is None else f"{case.title}: {name}"
+    blocks: list[Any] = []
+    if not run.ending.is_complete:
+        blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
+    blocks.append(build_player(case, run, title, players))
+    if case.suite is None:
+        blocks.append(_build_envelope({name: run}, data))
+    blocks.append(_shorten_joint_table(tabulate_joints(run.joints, data.dead)))
+    blocks.append(TextBlock(_sentence(utilisation_text(case.structure, run.joints))))
+    return blocks
+
+
+def _build_envelope(runs: Mapping[str, History], data: ReportData) -> FigureBlock:
+    """Draw the envelopes of runs."""
+    caption = "Least and largest eccentricity of each joint; dotted under dead load."
+    return FigureBlock.of(draw_envelope(runs, dead=data.dead), caption)
+
+
+def _shorten_joint_table(table: ResultTable) -> Grid:
+    """Return the table of joints without empty columns, which the caption names."""
+    head, rows = table
+    # Most joints neither slide nor open in most runs.
+    filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
+    empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
+    notes = {"hinge": "No joint hinged.", "slide": "No joint slid.", "open": "None came apart."}
+    caption = (
+        "Criteria per joint: eccentricity under dead load, least and largest, largest V / N, and "
+        "when and how long at most the joint hinged, slid and was open."
+    )
+    caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
+    return Grid([head[k] for k in filled], [[row[k] for k in filled] for row in rows], caption)
+
+
+def _build_mechanism(run: History) -> list[Any]:
+    """Build the verdict, and the fall of a run with large displacements."""
+    blocks: list[Any] = [TextBlock(_sentence(line)) for line in run.verdict.splitlines()]
+    if run.fall is None:
+        what = "what happens after blocks come loose, for displacements were taken as small"
+        blocks.append(missing_note(what, 'model.displacements = "large" follows them.'))
+    elif "fall_pose" in run.dataset:
+        caption = "Blocks on their way to the ground, over where they stood."
+        blocks.append(FigureBlock.of(draw_fall(run), caption))
+    return blocks
+
+
+def _build_suite_response(data: ReportData) -> list[Any]:
+    """Build the tables of all runs, and their envelopes."""
+    head, rows = tabulate_runs(data.runs)
+    # The mechanisms have too many columns for a page: a line of text for each run instead.
+    mechanisms = [
+        (
+            row[0],
+            "; ".join(
+                f"{title}: {cell}"
+                for title, cell in zip(head[7:], row[7:], strict=True)
+                if cell != "-"
+            ),
+        )
+        for row in rows
+    ]
+    caption = "PGA, and the critical joint of each run"
+    blocks: list[Any] = [
+        Grid([head[0], *head[1:8]], [[row[0], *row[1:8]] for row in rows], caption),
+        Grid([], mechanisms, "Mechanism and end of each run"),
+    ]
+    pairs, per_figure = list(data.runs.items()), len(LINES)  # as many runs as line styles
+    for first in range(0, len(pairs), per_figure):
+        blocks.append(_build_envelope(dict(pairs[first : first + per_figure]), data))
+    return blocks
+
+
+def list_facts(data: ReportData) -> list[tuple[str, str]]:
+    """List the principal results by name, which the report shows first."""
+    runs, structure = list(data.runs.values()), data.case.structure
+    facts = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
+    if not runs:
+        return [*facts, ("runs", "none")]
+    # Horizontal ground acceleration as recorded.
+    pga = max(float(np.abs(run.dataset["ground"].values[:, 0]).max()) for run in runs)
+    joints = [assessed_joints(run.joints) for run in runs]
+    eccentricity = max(float(abs(each["eccentricity"]).max()) for each in joints)
+    opened = " (joints came apart)" if any(bool(each["open"].any()) for each in joints) else ""
+    friction = max(float(each["friction"].max()) for each in joints)
+    facts += [
+        ("PGA", f"{pga:.2f} m/s²"),
+        ("largest |e|", f"{eccentricity:.3f}{opened}"),
+        ("largest V / N", format_ratio(friction)),
+        ("mechanism by count", _summarise_mechanisms(data)),
+    ]
+    # Only runs with large displacements are followed to rest.
+    falls = [run.fall for run in runs if run.fall is not None]
+    if falls:
+        fallen = f"{sum(fall.kind != 'stands' for fall in falls)} of {len(runs)} fall"
+        facts.append(("after the motion", falls[0].kind if data.case.suite is None else fallen))
+    return facts
+
+
+def _summarise_mechanisms(data: ReportData) -> str:
+    """Count the runs with a mechanism, or describe that of the only run."""
+    mechanisms = [run.mechanism for run in data.runs.values() if run.mechanism is not None]
+    if data.case.suite is not None:
+        return f"in {len(mechanisms)} of {len(data.runs)} runs"
+    return f"{mechanisms[0].kind}, at {mechanisms[0].time:.3f} s" if mechanisms else "none"
+
+
+def _sentence(text: str) -> str:
+    """Return a text with a capital at its beginning and a full stop at its end."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")

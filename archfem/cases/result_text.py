@@ -1,0 +1,235 @@
+"""Results as text: sentences, and tables which the command line prints and the report shows."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from archfem._files import align_columns
+from archfem.cases.run import DeadLoadResult
+from archfem.dynamics.accuracy import Accuracy
+from archfem.dynamics.history import Ending, History
+from archfem.joints.criteria import (
+    assessed_joints,
+    envelope,
+    first_time,
+    longest_duration,
+    with_failure_flags,
+)
+from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.mechanism_count import Mechanism, duration_text, episode
+from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.motion.intensity_measures import measure_intensity
+from archfem.motion.matching import Match
+from archfem.motion.motion import Motion
+from archfem.statics.stress import strength_use_text, utilisation_text
+from archfem.units import STANDARD_GRAVITY, kN, mm
+
+
+class ResultTable(NamedTuple):
+    """Titles of the columns, and rows of as many cells; "-" is an empty cell."""
+
+    head: list[str]
+    rows: list[list[str]]
+
+    @property
+    def text(self) -> str:
+        """The table with aligned columns, one line a row."""
+        return align_columns(*self)
+
+
+def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> ResultTable:
+    """Tabulate envelope and failures of the assessed joints: first time and longest duration."""
+    joints = assessed_joints(with_failure_flags(joints))
+    # Without dead load the column is undefined, which reads "open".
+    at_rest = np.full(joints.sizes["joint"], np.nan)
+    if dead is not None:
+        at_rest = assessed_joints(dead)["eccentricity"].values
+    extremes = envelope(joints)
+    flags = {"hinge": joints["hinge"] != 0, "slide": joints["slide"], "open": joints["open"]}
+    times = [(first_time(flag).values, longest_duration(flag).values) for flag in flags.values()]
+    head = ["joint", "e dead", "e min", "e max", "max V/N"]
+    head += [f"{flag} {column}" for flag in flags for column in ("from", "for")]
+    rows = []
+    for k, name in enumerate(joints["name"].values):
+        numbers = [extremes[key].values[k] for key in ("lowest", "highest", "friction")]
+        # A failure has a first time and a longest duration; both are empty if it never occurs.
+        cells = [str(name), *map(format_ratio, (at_rest[k], *numbers))]
+        for start, longest in times:
+            cells += [_seconds(start[k]), _seconds(longest[k]) if longest[k] > 0.0 else "-"]
+        rows.append(cells)
+    return ResultTable(head, rows)
+
+
+def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
+    """Tabulate the runs of a suite: ground motion, critical joint, mechanisms, and ending."""
+    head = ["pair", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"]
+    head += ["by count", "at", "for", "opens", "joints", "Demirel & Aldemir", "at"]
+    head += ["verified", "at", "for", "opens", "end"]
+    endings = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
+    rows = []
+    for name, run in runs.items():
+        joints = assessed_joints(run.joints)
+        size = abs(joints["eccentricity"])
+        apart = joints["open"].any("time")
+        largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
+        verified = ["unknown", "-", "-", "-"]  # without the structure, as of a file read alone
+        if run.structure is not None:
+            verified = _mechanism_cells(run.verified.moved if run.verified else None, run)
+        horizontal, vertical = np.abs(run.dataset["ground"].values).max(axis=0)
+        ending = f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"
+        rows.append(
+            [
+                name,
+                f"{horizontal:.2f} m/s²",
+                f"{vertical:.2f} m/s²",
+                format_ratio(float(size.max())),
+                str(joints["name"].values[int(largest.values.argmax())]),
+                format_ratio(float(joints["friction"].max())),
+                f"{int(apart.sum())} joints" if apart.any() else "-",
+                *_mechanism_cells(run.mechanism, run),
+                join_joint_names(run.mechanism.names) if run.mechanism else "-",
+                *_mechanism_cells(run.demirel_aldemir, run)[:2],
+                *verified,
+                ending if run.fall is None else f"{ending}, {run.fall.kind}",
+            ]
+        )
+    return ResultTable(head, rows)
+
+
+def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
+    """Tabulate time step and intensity measures of each component of some motions."""
+    head = ["motion", "component", "samples", "dt", "PGA", "PGV", "PGD", "Arias", "CAV"]
+    head += ["Housner", "D5-95", "length"]
+    rows = []
+    for motion in motions:
+        for component in motion.components:
+            measured = measure_intensity(motion, component)
+            rows.append(
+                [
+                    motion.name,
+                    # The only component of a record may have any direction.
+                    component if len(motion.components) > 1 else "only one",
+                    str(len(motion.component(component))),
+                    f"{motion.dt:g} s",
+                    f"{measured.pga / STANDARD_GRAVITY:.4f} g",
+                    f"{measured.pgv:.4f} m/s",
+                    f"{measured.pgd:.4f} m",
+                    f"{measured.arias:.3g} m/s",
+                    f"{measured.cav:.3g} m/s",
+                    f"{measured.housner:.3g} m",
+                    f"{measured.significant_duration:.2f} s",
+                    f"{measured.duration:.2f} s",
+                ]
+            )
+    return ResultTable(head, rows)
+
+
+def tabulate_matches(matches: Sequence[Match]) -> ResultTable:
+    """Tabulate misfit, drift, and measures before and after spectral matching."""
+    head = ["pair", "component", "misfit", "drift", "PGA", "matched", "Arias", "matched"]
+    head += ["D5-95", "matched"]
+    rows = []
+    for match in matches:
+        for component, misfit in match.misfit.items():
+            before, after = match.before[component], match.after[component]
+            # The drift is the final displacement, which a matched motion must not have.
+            cells = [match.motion.name, component, f"{misfit:.2%}"]
+            cells.append(f"{abs(match.motion.displacement(component)[-1]):.0e} m")
+            cells += [f"{each.pga / STANDARD_GRAVITY:.4f} g" for each in (before, after)]
+            cells += [f"{each.arias:.3g} m/s" for each in (before, after)]
+            cells += [f"{each.significant_duration:.2f} s" for each in (before, after)]
+            rows.append(cells)
+    return ResultTable(head, rows)
+
+
+def describe_dead_load(result: DeadLoadResult) -> str:
+    """Describe size and fidelity of the model, and the use of joints and blocks at rest."""
+    model, structure = result.dead.model, result.case.structure
+    joints = assessed_joints(result.dead.joints)
+    lines = [
+        f"model: {model.fidelity}, {len(structure.free)} blocks, {len(structure.joints)} joints, "
+        f"{model.size} coordinates ({result.seconds:.2f} s with the dead load)"
+    ]
+    lines += [] if model.prediction is None else [f"model: {model.prediction.text}"]
+    lines.append(
+        f"dead load: |e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
+        f"V/N ≤ {float(joints['friction'].max()):.3f}, "
+        f"N ≥ {float(joints['N'].min()) / kN:.2f} kN"
+    )
+    if result.strength_use is not None:
+        lines.append(f"dead load: {strength_use_text(result.strength_use)}")
+    return "\n".join([*lines, *(f"in doubt: {warning}" for warning in result.warnings)])
+
+
+def describe_collapse(structure: Structure, collapse: Collapse) -> str:
+    """Describe the result of limit analysis: outcome and factor, hinges, sliding joints."""
+    joints = structure.joints
+    outcome = f"limit analysis: {collapse.outcome.sentence}"
+    # Other outcomes have no finite factor.
+    if collapse.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
+        outcome += f", at a factor of {collapse.factor:.4g} on the load"
+    hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
+    sliding = [joints[number].name for number in collapse.sliding]
+    lines = [outcome]
+    lines += [f"hinges, by the face in contact: {join_names(hinges)}"] if hinges else []
+    lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
+    lines += [str(collapse.solutions)] if collapse.solutions else []
+    return "\n".join(lines)
+
+
+def describe_accuracy(accuracy: Accuracy) -> str:
+    """Describe a comparison of settings: table, reference, and the setting to choose."""
+    choice = accuracy.choice.setting.label if accuracy.choice else "none: a finer model is needed"
+    return (
+        f"{accuracy.table()}\n\n"
+        f"reference: {accuracy.reference.label}, in doubt by {accuracy.reference_error:.2g}\n"
+        f"chosen for an error of {accuracy.tolerance:g}: {choice}"
+    )
+
+
+def describe_run(structure: Structure, run: History, dead: xr.Dataset) -> str:
+    """Describe a run: verdict, quality of the numbers, joints, and use of strength."""
+    strength = utilisation_text(structure, run.joints)
+    table = tabulate_joints(run.joints, dead).text
+    return "\n\n".join([run.verdict, describe_run_quality(run), table, strength])
+
+
+def describe_run_quality(run: History) -> str:
+    """Describe how a run was computed, and the checks of its numbers."""
+    attrs = run.dataset.attrs
+    # Only fidelity "auto" predicts the error of its model and time step.
+    predicted = (
+        f"predicted to err by {attrs['predicted_error']:.2g} in the largest |e|"
+        if "predicted_error" in attrs
+        else 'its error in |e| was not predicted, as fidelity = "auto" does'
+    )
+    return (
+        f"outcome: {run.outcome}; {attrs['steps']} steps by '{attrs['method']}'\n"
+        f"energy: drifts by {attrs['energy_drift']:+.1e} of the largest exchanged at most\n"
+        f"displacements: no block farther than {attrs['largest_displacement'] / mm:.3g} mm\n"
+        f"model: fidelity '{attrs['fidelity']}', {predicted}\n"
+        f"warnings: {len(run.warnings) or 'none'}"
+    )
+
+
+def format_ratio(value: float) -> str:
+    """Format e or V / N, which is undefined at open joints and unbounded near opening."""
+    if np.isnan(value):
+        return "open"
+    return f"{value:.3f}" if value < 100.0 else "> 100"
+
+
+def _mechanism_cells(mechanism: Mechanism | None, run: History) -> list[str]:
+    """Four cells of a mechanism: kind, time, duration and opening."""
+    if mechanism is None or mechanism.time is None:
+        return ["none", "-", "-", "-"]
+    duration = episode(run.joints, mechanism)
+    opening = "-" if duration.opening is None else f"{duration.opening / mm:.3g} mm"
+    return [mechanism.kind, _seconds(mechanism.time), duration_text(duration.duration), opening]
+
+
+def _seconds(value: float) -> str:
+    """Format a time; "-" if undefined."""
+    return "-" if np.isnan(value) else f"{value:.3f} s"

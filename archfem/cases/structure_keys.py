@@ -1,0 +1,252 @@
+"""Structures of case files: [structure], [materials], [contacts] and [dead_load].
+
+The keys of a table are the arguments of the shape, part or material that it describes, so that
+each keyword of `archfem.shapes` is a key of the same name.
+"""
+
+import inspect
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from archfem.cases.provenance import hash_file, list_input_files
+from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_table
+from archfem.errors import InvalidInput
+from archfem.masonry.backfill import jointed_fill
+from archfem.masonry.construction import Stage, resolve_stages, usual_stages
+from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
+from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
+from archfem.masonry.shapes.bridges import arcade, bridge, buttressed_arch
+from archfem.masonry.shapes.rings import (
+    arch_along,
+    arch_on_piers,
+    circular_arch,
+    column,
+    elliptical_arch,
+    flat_arch,
+    pointed_arch,
+)
+from archfem.masonry.structure import Structure
+from archfem.masonry.survey.outlines import Layer, surveyed
+
+Described = TypeVar("Described")
+
+# Kind of each argument of shapes, parts, materials and contacts that is a key of a case file.
+KEY_KINDS: Table = {
+    **dict.fromkeys(("radius", "span", "rise", "thickness", "width", "breadth", "height"), "m"),
+    **dict.fromkeys(("course", "pier_breadth", "gap", "length", "above", "setback"), "m"),
+    **dict.fromkeys(("cover", "erosion", "hump", "spandrels", "snap"), "m"),
+    **{key: ["m"] for key in ("heights", "courses", "spans", "breadths", "thicknesses", "rises")},
+    **dict.fromkeys(("voussoirs", "chords"), int),
+    **dict.fromkeys(("material", "contact", "state", "unit"), str),
+    **dict.fromkeys(("part", "role"), str),
+    **dict.fromkeys(("arches", "piers", "sidewalls", "backfill", "paving"), dict),
+    **dict.fromkeys(("layers", "contacts"), dict),
+    **dict.fromkeys(("fixed", "ignore"), bool),
+    **dict.fromkeys(("embrace", "skewback"), "degree"),
+    "embraces": ["degree"],
+    "intrados": [["m"]],
+    "gravity": "m/s**2",
+    **dict.fromkeys(("young", "strength", "cohesion", "tension"), "Pa"),
+    **dict.fromkeys(("poisson", "dilatancy"), "1"),
+    "unit_weight": "N/m**3",
+    **dict.fromkeys(("normal_stiffness", "shear_stiffness"), "Pa/m"),
+    "friction": NumberOrWord("1", {"none": None}),  # "none": a joint that never slides
+}
+JOINTED_FILL_KEYS = {"law": str, "piece_size": "m", "friction_angle": "degree", "cohesion": "Pa"}
+DEAD_LOAD_KEYS = {"stages": str, "layers": int, "stage": [dict]}
+STAGE_KEYS = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
+
+_SHAPE_FUNCTIONS = (
+    *(circular_arch, pointed_arch, elliptical_arch, flat_arch, arch_along, buttressed_arch),
+    *(arcade, column, arch_on_piers, bridge),
+)
+SHAPES = {shape.__name__: shape for shape in _SHAPE_FUNCTIONS} | {"outlines": surveyed}
+# Parts of a bridge of which there may be several, from left to right, each under its name.
+NAMED_PARTS = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+
+_recent_structures: OrderedDict[str, Structure] = OrderedDict()
+
+
+def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8) -> Structure:
+    """Return the structure of a case under the case's title; recent ones are cached.
+
+    Structures are immutable, so that cases with the same tables and drawing share one.
+    """
+    # Only these sections describe the structure; the title is its name.
+    sections = ("title", "structure", "materials", "contacts")
+    tables = {name: settings[name] for name in sections if name in settings}
+    drawings = list_input_files({"structure": tables.get("structure")}, folder)
+    key = json.dumps([tables, [(str(path), hash_file(path)) for path in drawings]], default=repr)
+    if key not in _recent_structures:
+        structure = build_structure(settings, folder)
+        _recent_structures[key] = replace(structure, name=settings.get("title", structure.name))
+        # Studies alternate between few structures: the least recently used one is dropped.
+        while len(_recent_structures) > max_cached:
+            _recent_structures.popitem(last=False)
+    _recent_structures.move_to_end(key)
+    return _recent_structures[key]
+
+
+def build_structure(settings: Table, folder: Path = Path()) -> Structure:
+    """Build the structure of a case."""
+    table = settings.get("structure", {})
+    name = check_choice(table.get("shape"), SHAPES, "structure.shape")
+    keys = {**_keys_of(SHAPES[name]), "shape": str, "fill": dict}
+    if name == "arcade":  # one number of voussoirs for each of its arches
+        keys["voussoirs"] = [int]
+    elif name == "outlines":
+        keys["file"] = str
+    values = check_table(table, keys, "structure")
+    del values["shape"]
+    fill = values.pop("fill", {})
+    stone = _material(settings, values.pop("material", "stone"))
+    contact = _contact(settings, values.pop("contact", "stone to stone"))
+    # All tables are read, also unused ones: a misspelt name of a preset is an error then.
+    for material in settings.get("materials", {}):
+        _material(settings, material)
+    for joint in settings.get("contacts", {}):
+        _contact(settings, joint)
+    if name == "bridge":
+        values = _bridge_parts(values, settings)
+    elif name == "outlines":
+        values = _outline_arguments(values, settings, folder)
+    section = f"structure of shape {name!r}"
+    structure = _call(SHAPES[name], section, material=stone, contact=contact, **values)
+    return _divide_fill(structure, fill)
+
+
+def _keys_of(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return keys and kinds of the arguments of a shape, part or material."""
+    return {k: KEY_KINDS[k] for k in inspect.signature(function).parameters if k in KEY_KINDS}
+
+
+def _divide_fill(structure: Structure, table: Table) -> Structure:
+    """Divide the backfill of a structure into pieces, if the case says so."""
+    fill = check_table(table, JOINTED_FILL_KEYS, "structure.fill")
+    law = check_choice(fill.pop("law", "elastic"), ("elastic", "jointed"), "structure.fill.law")
+    if law == "elastic":
+        if fill:
+            raise InvalidInput(f"structure.fill has {sorted(fill)}: they need law = 'jointed'")
+        return structure
+    if missing := sorted({"piece_size", "friction_angle"} - set(fill)):
+        raise InvalidInput(f"structure.fill lacks {missing}: a jointed fill needs both")
+    cohesion = fill.get("cohesion", 0.0)
+    return jointed_fill(
+        structure, fill["piece_size"], angle=fill["friction_angle"], cohesion=cohesion
+    )
+
+
+def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
+    """Return the arguments of `bridge`, with the parts that its tables describe."""
+    parts = dict(values)
+    for key, part in NAMED_PARTS.items():
+        if key in parts:
+            parts[key] = _named_parts(part, parts[key], f"structure.{key}")
+    if "backfill" in parts:
+        fill = check_table(parts["backfill"], _keys_of(Backfill), "structure.backfill")
+        fill["material"] = _material(settings, fill.pop("material", "backfill"))
+        fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
+        parts["backfill"] = _call(Backfill, "structure.backfill", **fill)
+    if "paving" in parts:
+        paving = check_table(parts["paving"], _keys_of(Paving), "structure.paving")
+        parts["paving"] = _call(Paving, "structure.paving", **paving)
+    return parts
+
+
+def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) -> dict[str, Any]:
+    """Return the arguments of `surveyed`: drawing, layers, materials and contacts."""
+    if "file" not in values:
+        raise InvalidInput("structure of shape 'outlines' has no file: name the drawing")
+    drawn = dict(values)
+    drawn["path"] = folder / drawn.pop("file")
+    if "layers" in drawn:
+        drawn["layers"] = {
+            name: Layer(**check_table(table, _keys_of(Layer), f"structure.layers.{name}"))
+            for name, table in drawn["layers"].items()
+        }
+    # Stone and backfill have a contact of their own unless the case names another.
+    pairs = {"stone/backfill": "soil to stone"} | drawn.get("contacts", {})
+    contacts = check_table(pairs, dict.fromkeys(pairs, str), "structure.contacts")
+    drawn["contacts"] = {pair: _contact(settings, name) for pair, name in contacts.items()}
+    # Layers name their materials in the drawing, so that all materials are passed.
+    names = {*MATERIALS, *settings.get("materials", {})}
+    drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
+    return drawn
+
+
+def _named_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
+    """Return parts of one kind: common keys of the table, and a subtable for each part."""
+    subtables = {name: value for name, value in table.items() if isinstance(value, dict)}
+    if not subtables:
+        raise InvalidInput(
+            f'{section} names no part: write a table [{section}."its name"] for each'
+        )
+    keys = _keys_of(part)
+    common = check_table({k: v for k, v in table.items() if k not in subtables}, keys, section)
+    parts = []
+    for name, subtable in subtables.items():
+        place = f"{section}.{name}"
+        parts.append(_call(part, place, name=name, **common | check_table(subtable, keys, place)))
+    return parts
+
+
+def _call(function: Callable[..., Described], section: str, **values: Any) -> Described:
+    """Call a constructor with the values of a table; a missing value names the table."""
+    try:
+        return function(**values)
+    # Keys are checked before, so that a TypeError is a missing argument.
+    except TypeError as error:
+        raise InvalidInput(f"{section}: {error}") from error
+
+
+def _material(settings: Table, name: str) -> Material:
+    """Return a material: a preset, or described or changed by a table of the case."""
+    return _described(settings, "materials", name, MATERIALS, Material)
+
+
+def _contact(settings: Table, name: str) -> Contact:
+    """Return a contact: a preset, or described or changed by a table of the case."""
+    return _described(settings, "contacts", name, CONTACTS, Contact)
+
+
+def _described(
+    settings: Table, section: str, name: str, presets: Table, cls: Callable[..., Described]
+) -> Described:
+    """Return a named preset with the changes of its table, or the object of the table alone."""
+    tables = settings.get(section, {})
+    if name not in presets and name not in tables:
+        raise InvalidInput(
+            f"'{name}' is not among the {section} {sorted(set(presets) | set(tables))}: "
+            f'name one of them or write a table [{section}."{name}"]'
+        )
+    # A table changes a preset of its name key by key.
+    keys = _keys_of(cls)
+    values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
+    values |= check_table(tables.get(name, {}), keys, f"{section}.{name}")
+    return _call(cls, f"{section}.{name}", **values, name=name)
+
+
+def parse_stages(table: Any, structure: Structure) -> Sequence[Stage] | None:
+    """Return the construction stages of [dead_load]; None if the structure is built at once."""
+    values = check_table(table, DEAD_LOAD_KEYS, "dead_load")
+    stages = [
+        Stage(**{"name": f"stage {k}", **check_table(stage, STAGE_KEYS, f"dead_load.stage[{k}]")})
+        for k, stage in enumerate(values.get("stage", []))
+    ]
+    if stages and len(values) > 1:
+        raise InvalidInput("dead_load has stages of its own: take out stages and layers, or those")
+    if stages:
+        resolve_stages(
+            structure, stages
+        )  # refuses stages which leave a block out or place it twice
+        return stages
+    usual = (
+        check_choice(values.get("stages", "none"), ("none", "usual"), "dead_load.stages") == "usual"
+    )
+    if "layers" in values and not usual:
+        raise InvalidInput("dead_load.layers needs stages = 'usual': add that, or take layers out")
+    return usual_stages(structure, values.get("layers", 4)) if usual else None

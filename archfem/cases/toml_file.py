@@ -1,0 +1,225 @@
+"""TOML files: read safely, merged with their base, checked against tables of keys, and changed.
+
+A file is refused before it is parsed if it is too large or too deeply nested, since the parser of
+the standard library would take hours or exhaust the memory.
+
+A table of keys gives for each key the kind of its value: a unit such as "m" for a number or a
+quantity, `NumberOrWord`, a Python type or several, or a list of one kind for a list of values.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from archfem._files import read_text
+from archfem._validation import short_repr
+from archfem.errors import InvalidInput
+from archfem.masonry.structure import suggest_name
+from archfem.units import in_degrees, in_unit
+
+Table = Mapping[str, Any]
+
+# Limit of tables and lists inside each other [-].
+MAX_TABLE_DEPTH = 20
+
+# One part of a dotted key: bare or quoted. Possessive quantifiers (++, *+) keep matching linear.
+_KEY_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_DEEP_KEY = re.compile(
+    rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{MAX_TABLE_DEPTH}}}"
+)
+_DEEP_VALUE = re.compile(rf"(?:[\[{{]\s*+(?:{_KEY_PART}\s*+=\s*+)?+){{{MAX_TABLE_DEPTH}}}")
+# A path and a value on both sides of an equals sign that is not in quotes.
+_CHANGE = re.compile(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", re.DOTALL)
+# A dot between names that is not in quotes.
+_DOT = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")
+
+
+@dataclass(frozen=True)
+class NumberOrWord:
+    """Kind of a key that takes a number, or one of some words."""
+
+    unit: str  # of the number
+    words: Mapping[str, Any]  # value that each word stands for
+
+
+def read_with_base(path: Path, above: Sequence[Path] = ()) -> dict[str, Any]:
+    """Return the tables of a case file, merged over those of its base."""
+    max_bases = 20  # a chain of bases that is longer is an error of the user
+    settings = read_tables(path, "case file")
+    # Links may give one file two names.
+    if path.resolve() in above:
+        raise InvalidInput(f"{path} is its own base: base must name another file")
+    if len(above) >= max_bases:
+        raise InvalidInput(f"{path} is the base of {max_bases} files, one on another: merge them")
+    # `base` and `remove` are directives, which are not settings of the merged case.
+    base = settings.pop("base", None)
+    if base is None:
+        return settings
+    if not isinstance(base, str):
+        raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
+    below = read_with_base(path.parent / base, (*above, path.resolve()))
+    removed = settings.pop("remove", [])
+    if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
+        raise InvalidInput(f'{path}: remove = {short_repr(removed)}: write ["section.key", …]')
+    for key in removed:
+        remove_key(below, key)
+    return merge_tables(below, settings)
+
+
+def read_tables(path: Path, what: str) -> dict[str, Any]:
+    """Return the tables of a file."""
+    text = read_text(path, what, max_bytes=2**20)  # a thousand times the size of a long case
+    try:
+        return parse_tables(text)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path} is not TOML: {error}") from error
+
+
+def parse_tables(text: str) -> dict[str, Any]:
+    """Return the tables of a text in TOML."""
+    # Deep nesting is detected before parsing, whose time and memory would explode.
+    for pattern in (_DEEP_KEY, _DEEP_VALUE):
+        if match := pattern.search(text):
+            line = text.count("\n", 0, match.start()) + 1
+            raise InvalidInput(
+                f"more than {MAX_TABLE_DEPTH} tables or lists in each other (line {line})"
+            )
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(str(error)) from error
+    _check_nesting(tables, "", 0)
+    return tables
+
+
+def _check_nesting(value: Any, key: str, depth: int) -> None:
+    """Refuse integers beyond 64 bits and values that are nested too deeply."""
+    if depth > MAX_TABLE_DEPTH:
+        raise InvalidInput(
+            f"{key:.80} has more than {MAX_TABLE_DEPTH} tables or lists in each other"
+        )
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:  # range of integers in TOML
+        raise InvalidInput(f"{key} is a whole number beyond ±2⁶³")
+    if isinstance(value, list):
+        value = dict(enumerate(value))
+    for name, inner in value.items() if isinstance(value, Mapping) else ():
+        _check_nesting(inner, f"{key}.{name}".removeprefix("."), depth + 1)
+
+
+def merge_tables(below: Table, above: Table) -> dict[str, Any]:
+    """Return the tables of one case over those of another, key by key."""
+    merged = dict(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        if isinstance(under, Mapping) and isinstance(value, Mapping):
+            value = merge_tables(under, value)
+        merged[key] = value
+    return merged
+
+
+def remove_key(settings: dict[str, Any], path: str) -> None:
+    """Remove the table or value at "section.key"."""
+    *parents, last = split_key_path(path)
+    table: Any = settings
+    for parent in parents:
+        table = table.get(parent, {}) if isinstance(table, dict) else {}
+    if not isinstance(table, dict) or last not in table:
+        raise InvalidInput(f"remove = '{path}': the base has no such key")
+    del table[last]
+
+
+def apply_change(settings: dict[str, Any], text: str) -> None:
+    """Set one value from "section.key=value", read as TOML, or else as a word."""
+    match = _CHANGE.fullmatch(text)
+    if not match or not match[1].strip():
+        raise InvalidInput(f"'{text}' is not a change: write section.key=value")
+    path, word = match.groups()
+    # Shells strip quotes: `model.fidelity=rigid` is not TOML, but a word.
+    try:
+        value = parse_tables(f"value = {word}")["value"]
+    except InvalidInput:
+        value = word.strip()
+    set_value(settings, path, value)
+
+
+def set_value(settings: dict[str, Any], path: str, value: Any) -> None:
+    """Set the value at "section.key"; missing tables of the path are added."""
+    *parents, last = split_key_path(path)
+    table: Any = settings
+    for parent in parents:
+        table = table.setdefault(parent, {})
+        if not isinstance(table, dict):
+            raise InvalidInput(f"'{path}' = {value!r}: {parent} is not a table")
+    table[last] = value
+
+
+def split_key_path(path: str) -> list[str]:
+    """Split "section.key" into the names of the tables and the key."""
+    names = [name.strip() for name in _DOT.split(path)]
+    names = [name[1:-1] if re.fullmatch(r"""".*"|'.*'""", name) else name for name in names]
+    if not all(names) or any(mark in name for name in names for mark in "\"'"):
+        raise InvalidInput(
+            f"'{path}' names no key: write section.key, and names with dots in quotes, as in "
+            'contacts."stone to stone".friction'
+        )
+    return names
+
+
+def check_table(table: Any, keys: Table, section: str) -> dict[str, Any]:
+    """Check the keys of a table, and convert its values to their kinds."""
+    if not isinstance(table, Mapping):
+        raise InvalidInput(f"{section} = {table!r} is not a table")
+    refuse_unknown(table, keys, section)
+    return {key: _convert(value, keys[key], f"{section}.{key}") for key, value in table.items()}
+
+
+def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None:
+    """Refuse keys that are not among those of a section."""
+    for key in table:
+        if key not in keys:
+            hint = suggest_name(key, keys) or f"the keys are {sorted(keys)}"
+            raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
+
+
+def check_choice(value: Any, choices: Iterable[str], key: str) -> str:
+    """Return a word that must be one of several."""
+    words = list(choices)
+    if value not in words:
+        raise InvalidInput(f"{key} = {value!r} is not known: use one of {words}")
+    return str(value)
+
+
+def _convert(value: Any, kind: Any, key: str) -> Any:
+    """Convert one value to the kind of its key."""
+    if kind == "degree":
+        number = in_degrees(value, key)
+        # A quantity keeps its unit: "5 degree" confirms a small angle, a bare 5 may be radians.
+        return value if isinstance(value, str) else number
+    if isinstance(kind, str):
+        return in_unit(value, kind, key)
+    if isinstance(kind, NumberOrWord):
+        return _convert_number_or_word(value, kind, key)
+    if isinstance(kind, list):
+        if not isinstance(value, list):
+            raise InvalidInput(f"{key} = {value!r} is not a list: write [a, b, …]")
+        return [_convert(item, kind[0], f"{key}[{n}]") for n, item in enumerate(value)]
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    # bool is a subclass of int, and `voussoirs = true` is an error.
+    if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+        words = {int: "a whole number", str: "a word", bool: "true or false", dict: "a table"}
+        raise InvalidInput(f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}")
+    return value
+
+
+def _convert_number_or_word(value: Any, kind: NumberOrWord, key: str) -> Any:
+    """Convert a value to a number, or to the value of its word."""
+    if isinstance(value, str) and value in kind.words:
+        return kind.words[value]
+    try:
+        return in_unit(value, kind.unit, key)
+    except InvalidInput as error:
+        words = " or ".join(f'"{word}"' for word in kind.words)
+        raise InvalidInput(f"{error}, or {words}") from error

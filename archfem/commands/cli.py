@@ -1,0 +1,231 @@
+"""Argument parser and exit codes of the command line, such as `archfem run CASE.toml --out DIR`."""
+
+import argparse
+import logging
+import os
+import resource
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from io import TextIOWrapper
+from typing import Any
+
+from archfem.errors import ArchfemError, InvalidInput
+
+Command = Callable[[argparse.Namespace], int | None]
+
+# Exit codes: a shell expects 128 + the number of a signal that ended a command.
+EXIT_DOUBTFUL = 3
+EXIT_INTERRUPTED = 130
+EXIT_TERMINATED = 143
+
+EXIT_CODES = (
+    "exit codes: 0, an answer; 1, an error in words, no answer; 2, the arguments are not "
+    f"understood; {EXIT_DOUBTFUL}, an answer that is in doubt: summary.txt begins with why "
+    "(energy that drifts, displacements that are not small, a fidelity that is wrong or errs "
+    f"by more than is permitted); {EXIT_INTERRUPTED}, ended by Ctrl-C, and {EXIT_TERMINATED}, "
+    "by SIGTERM: what was computed is kept."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code.
+
+    Args:
+        arguments: arguments after `archfem`; by default those of the process.
+
+    Returns:
+        The exit code of `exit_code`, or 143 if SIGTERM ended the command; the process exits with 2
+        if the arguments are not understood.
+    """
+    options = _build_parser().parse_args(arguments)
+    if isinstance(sys.stdout, TextIOWrapper):  # print lines at once, also into a pipe
+        sys.stdout.reconfigure(line_buffering=True)
+    # Warnings of the library are logged, and printed to stderr.
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    with _interrupt_on_sigterm() as signals:
+        code = exit_code(lambda: _run_command(options))
+    return EXIT_TERMINATED if signals and code == EXIT_INTERRUPTED else code
+
+
+def _run_command(options: argparse.Namespace) -> int | None:
+    """Run a command, if the memory suffices."""
+    _check_memory()
+    return options.command(options)
+
+
+@contextmanager
+def _interrupt_on_sigterm() -> Iterator[list[int]]:
+    """Raise KeyboardInterrupt on SIGTERM, as Ctrl-C does; yield the received signals."""
+    received: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        received.append(number)  # so that the exit code differs from that of Ctrl-C
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _check_memory(min_bytes: int = 3 * 2**29) -> None:
+    """Refuse a memory limit at which libraries crash or block while they are imported."""
+    # 1.5 GiB is the address space of a run of a small ring, libraries included.
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < min_bytes:
+        raise InvalidInput(
+            f"memory is limited to {limit / 2**30:.2f} GiB, and libraries alone take "
+            f"{min_bytes / 2**30:.2f} GiB: raise the limit (ulimit -v)"
+        )
+
+
+def exit_code(command: Callable[[], int | None]) -> int:
+    """Run a command, print its error if there is one, and return its exit code."""
+    try:
+        return command() or 0
+    except ArchfemError as error:
+        print(f"archfem: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("archfem: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of the output has ended, as in `archfem … | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:  # a folder that cannot be made, a full disk
+        print(f"archfem: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _build_parser() -> argparse.ArgumentParser:
+    """Build the parser of all commands."""
+    description = "Does a dry-stone arch or bridge survive an earthquake?"
+    parser = argparse.ArgumentParser(prog="archfem", description=description, epilog=EXIT_CODES)
+    release = import_module("archfem").__version__
+    parser.add_argument("--version", action="version", version=f"archfem {release}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_case_commands(commands)
+    _add_report(commands.add_parser("report", help="one HTML page of a result folder, to print"))
+    about = "many cases: a table of results, on all cores or a cluster"
+    _add_study(commands.add_parser("study", help=about, description=about))
+    ready = commands.add_parser("compile", help="compile the time steps once: about a minute")
+    ready.add_argument("--jobs", type=int, help="processes that compile (one a core)")
+    ready.set_defaults(command=_load_command("run", "compile_steps"))
+    examples = commands.add_parser("examples", help="the cases that archfem brings, a line each")
+    examples.set_defaults(command=_load_command("tools", "examples"))
+    _add_example(commands.add_parser("example", help="print one of them, or copy it"))
+    doctor = commands.add_parser("doctor", help="what is installed, what is missing, how to get it")
+    doctor.set_defaults(command=_load_command("tools", "doctor"))
+    about = "film the history of a run"
+    _add_film(commands.add_parser("animate", help=about, description=about))
+    _add_motion(commands.add_parser("motion", help="measures and pictures of ground motions"))
+    return parser
+
+
+def _add_case_commands(commands: Any) -> None:
+    """Add the commands that take a case file."""
+
+    def add(name: str, about: str, out: str | None = "DIR") -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=about, description=about, epilog=EXIT_CODES)
+        command.set_defaults(command=_load_command("run", name))
+        command.add_argument("case", metavar="CASE.toml", help="the case file")
+        _add_changes(command)
+        if out is not None:
+            target = "folder for the results" if out == "DIR" else "the mesh file"
+            command.add_argument("--out", required=True, metavar=out, help=target)
+        return command
+
+    run = add("run", "dead load, time histories, tables and pictures")
+    run.add_argument("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
+    add("check", "read a case, build its model and find its dead load", None)
+    modes = add("modes", "frequencies, masses and shapes of vibrations about dead load")
+    modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
+    add("mesh", "write the mesh of a case as a gmsh file", "FILE.msh")
+    about = "speed against error over fidelities, meshes, quadratures and steps"
+    accuracy = add("accuracy", about)
+    accuracy.add_argument("--workers", type=int, default=1, help="processes for settings (1)")
+
+
+def _load_command(module: str, name: str) -> Command:
+    """Return a command that is imported when it is called, since most import all rooms."""
+
+    def command(options: argparse.Namespace) -> int | None:
+        return getattr(import_module(f"archfem.commands.{module}"), name)(options)
+
+    return command
+
+
+def _add_changes(command: argparse.ArgumentParser) -> None:
+    """Add the option that changes values of a case."""
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.KEY=VALUE",
+        dest="changes",
+        help="use this value instead of the file's; may be given again",
+    )
+
+
+def _add_report(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem report`."""
+    command.description = "Write one self-contained HTML page of what a result folder holds."
+    command.add_argument("folder", metavar="FOLDER", help="that `archfem run` has written")
+    command.add_argument("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
+    command.add_argument("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
+    command.set_defaults(command=_load_command("run", "report"))
+
+
+def _add_study(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem study`."""
+    command.add_argument("case", nargs="?", metavar="STUDY.toml", help="the study's file")
+    _add_changes(command)
+    command.add_argument("--out", metavar="DIR", help="folder for the results")
+    command.add_argument("--workers", type=int, help="processes (one a core)")
+    command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="of Dask, for a cluster")
+    command.add_argument(
+        "--own-code", action="store_true", help="let `compute` of the study run its own function"
+    )
+    command.add_argument("--status", metavar="DIR", help="say how far the study in a folder is")
+    command.set_defaults(command=_load_command("study", "study"))
+
+
+def _add_example(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem example`."""
+    command.description = "Print a case, as in `archfem example ring > ring.toml`, or copy it."
+    command.add_argument("name", metavar="NAME", help="as `archfem examples` lists them")
+    command.add_argument("--out", metavar="DIR", help="copy it there, with all that it refers to")
+    command.set_defaults(command=_load_command("tools", "example"))
+
+
+def _add_film(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem animate`."""
+    command.add_argument("history", metavar="HISTORY.nc", help="the history, which has fields")
+    command.add_argument("--case", metavar="CASE.toml", help="its case (the one beside it)")
+    command.add_argument("--out", metavar="FILM.mp4", help="the film, or a .gif (beside it)")
+    command.add_argument(
+        "--window", metavar="auto|FROM,TO", help="slow motion around the mechanism, or a time [s]"
+    )
+    command.add_argument("--colour", help="displacement or stress (displacement)")
+    command.add_argument("--magnification", type=float, help="of displacements (chosen)")
+    command.add_argument("--fps", type=float, help="frames a second, at most (20)")
+    command.add_argument("--seconds", type=float, help="how long the film lasts (as the run)")
+    command.add_argument("--size", metavar="WIDTHxHEIGHT", help="in pixels (1280x720)")
+    command.set_defaults(command=_load_command("tools", "animate"))
+
+
+def _add_motion(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `archfem motion`."""
+    command.description = "Print the measures of records, draw them, their integrals and spectra."
+    command.add_argument("files", nargs="+", metavar="FILE", help="a record")
+    command.add_argument("--column", type=int, help="component or plain column, counted from 1")
+    command.add_argument("--units", help="of plain columns: g, m/s2, cm/s2 or gal")
+    command.add_argument("--dt", type=float, help="time between samples of plain columns [s]")
+    command.add_argument(
+        "--out", default="out/motions", metavar="DIR", help="folder for the pictures"
+    )
+    command.set_defaults(command=_load_command("run", "motion"))

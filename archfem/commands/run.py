@@ -1,0 +1,257 @@
+"""Commands on cases: run, check, modes, mesh, accuracy and report; motion and compile."""
+
+import argparse
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from archfem._files import create_result_folder
+from archfem.cases.case import Case
+from archfem.cases.result_text import (
+    describe_accuracy,
+    describe_collapse,
+    describe_dead_load,
+    describe_run,
+    tabulate_matches,
+    tabulate_motions,
+    tabulate_runs,
+)
+from archfem.cases.run import DeadLoadResult, Result, Run, run_case
+from archfem.commands.cli import EXIT_DOUBTFUL
+from archfem.dynamics.history import Ending, History
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
+from archfem.limit.collapse import Collapse
+from archfem.motion.motion import Motion
+from archfem.motion.suite import Suite
+from archfem.statics.modes import Modes
+
+# Modules that import matplotlib or pyvista, which are slow, are imported where they are needed.
+
+
+def run(options: argparse.Namespace) -> int:
+    """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
+    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
+    (folder / "case.toml").write_text(case.text(), encoding="utf-8")
+    print(case.title)
+    if options.workers > 1 and case.suite is not None:
+        from archfem.studies.comparison_run import run_pairs
+
+        # Workers save the histories, which `run_case` reuses below.
+        run_pairs(case, folder, workers=options.workers)
+    return EXIT_DOUBTFUL if print_results(case, run_case(case, folder), folder) else 0
+
+
+def check(options: argparse.Namespace) -> int:
+    """Read a case and its motions, and compute limit analysis and dead load."""
+    case = Case.read(options.case, options.changes)
+    print(case.title)
+    if case.limit is not None:
+        print(describe_collapse(case.structure, case.limit.solve(case.structure)))
+    # Unreadable records are errors before the dead load is computed.
+    case.check_ground()
+    at_rest = DeadLoadResult.of(case)
+    print(describe_dead_load(at_rest))
+    if case.suite is not None:
+        print_motions(case.ground_suite())
+    elif case.motion is not None:
+        motion = case.ground_motion()
+        print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
+    ready = f"in doubt, {len(at_rest.warnings)} times, as above" if at_rest.warnings else "ready"
+    print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
+    return EXIT_DOUBTFUL if at_rest.warnings else 0
+
+
+def modes(options: argparse.Namespace) -> None:
+    """Compute the modes of a case about its dead load: table, picture, film of the first two."""
+    from archfem.view.films.film import film_modes
+
+    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
+    print(case.title)
+    at_rest = DeadLoadResult.of(case)
+    print(describe_dead_load(at_rest))
+    computed = print_modes(at_rest, options.count, folder)
+    first = range(1, min(len(computed.frequencies), 2) + 1)
+    print_written([film_modes(computed, folder / "modes.gif", first)])
+
+
+def mesh(options: argparse.Namespace) -> None:
+    """Write the mesh of a case as a gmsh file."""
+    from archfem.models.fem.mesh import write_mesh
+
+    case = Case.read(options.case, options.changes)
+    write_mesh(case.structure, options.out, case.discretisation)
+    print(f"wrote {options.out}")
+
+
+def accuracy(options: argparse.Namespace) -> None:
+    """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
+    from archfem.cases.result_folder import write_accuracy
+    from archfem.studies.convergence import case_accuracy
+
+    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
+    compared = case_accuracy(case, folder / "settings", workers=options.workers)
+    text = describe_accuracy(compared)
+    print(text)
+    print_written(write_accuracy(compared, text, folder))
+
+
+def report(options: argparse.Namespace) -> None:
+    """Write the report of a result folder."""
+    from archfem.cases.result_folder import open_results
+
+    path = open_results(options.folder, inputs=options.inputs).report(options.out)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def motion(options: argparse.Namespace) -> None:
+    """Print the measures of records and draw them."""
+    from archfem.cases.result_folder import with_unique_names, write_motions
+
+    folder = create_result_folder(options.out)
+    read, refused = _read_records(options.files, options.column, options.units, options.dt)
+    motions = with_unique_names(list(read.values()), [Path(path).name for path in read])
+    print(tabulate_motions(motions).text)
+    print_written(write_motions(motions, folder))
+    if refused:
+        raise InvalidInput(
+            f"{len(refused)} of {len(options.files)} files were refused, as said above"
+        )
+
+
+def _read_records(
+    files: Sequence[str], column: int | None, units: str | None, dt: float | None
+) -> tuple[dict[str, Motion], list[InvalidInput]]:
+    """Read records: motions by file, and the errors of refused files, which are printed."""
+    read, refused = {}, []
+    for path in files:
+        try:
+            read[path] = Motion.read(path, column=column, units=units, dt=dt)
+        except InvalidInput as error:
+            refused.append(error)
+            if len(files) > 1:
+                print(f"archfem: {error}", file=sys.stderr)
+    # A single refused record is the error of the command.
+    if not read:
+        raise refused[0]
+    return read, refused
+
+
+def compile_steps(options: argparse.Namespace) -> None:
+    """Compile the kernels of time steps, so that no run waits for it."""
+    from archfem.dynamics.warm_up import compile_all
+
+    for kind, seconds in compile_all(options.jobs):
+        print(f"{seconds:5.0f} s: {kind}", flush=True)
+
+
+def print_results(case: Case, results: Iterable[Result], folder: Path) -> bool:
+    """Print results as they are computed, write their files, and return whether any is in doubt."""
+    from archfem.cases.result_folder import write_dead_load, write_limit, write_suite
+
+    # `run_case` yields limit analysis, dead load, suite and runs in this order.
+    runs: dict[str, History] = {}
+    for result in results:
+        if isinstance(result, Collapse):
+            text = describe_collapse(case.structure, result)
+            print(text)
+            print_written(write_limit(case, result, text, folder))
+        elif isinstance(result, DeadLoadResult):
+            at_rest = result
+            print(describe_dead_load(at_rest))
+            print_written(write_dead_load(at_rest, folder))
+            if case.has_motion:
+                _print_first_modes(at_rest, folder)
+        elif isinstance(result, Suite):
+            suite = result
+            print_motions(suite)
+            print_written(write_suite(suite, case.target, folder))
+        else:
+            _print_run(result, at_rest)
+            runs[result.motion.name] = result.history
+    if case.suite is not None:
+        _print_pairs(suite, runs, at_rest, folder)
+    return bool(at_rest.warnings) or any(run.warnings for run in runs.values())
+
+
+def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:
+    """Print the first modes; a state without modes can be run nevertheless."""
+    # With open joints the tangent stiffness may be singular.
+    try:
+        print_modes(at_rest, min(max_modes, at_rest.dead.model.size), folder)
+    except ArchfemError as error:
+        print(f"no modes about dead load: {error}\n{at_rest.damping[1]}")
+
+
+def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
+    """Print the first modes about dead load and the damping, and write table and shapes."""
+    from archfem.cases.result_folder import write_modes
+    from archfem.statics.modes import modes as compute_modes
+
+    computed = compute_modes(at_rest.dead.model, count, about=at_rest.dead)
+    text = f"{computed.table()}\n\n{at_rest.damping[1]}"
+    print(text)
+    print_written(write_modes(computed, text, folder))
+    return computed
+
+
+def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
+    """Print the result of a run and write its files, unless an earlier command has."""
+    from archfem.cases.result_folder import is_written, write_run
+
+    assert run.path is not None  # `archfem run` always has a folder
+    motion, history = run.motion, run.history
+    if run.reused:
+        print(f"{motion.name}: finished before, kept {run.path}")
+        if is_written(run):
+            return
+    elif run.error is not None:
+        print(f"what was computed is kept in {run.path}", file=sys.stderr)
+        if run.case.suite is None:
+            raise run.error
+        # The other pairs of a suite are run nevertheless.
+        print(f"archfem: {motion.name}: {run.error}", file=sys.stderr)
+    else:
+        print(
+            f"time history: {motion.name}, PGA {motion.pga:.2f} m/s², "
+            f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
+        )
+        print_written([run.path])
+    text = describe_run(run.case.structure, history, at_rest.dead.joints)
+    print(text)
+    print_written(write_run(run, at_rest, text, run.path.parent))
+    if history.ending is Ending.INTERRUPTED and run.case.suite is None:
+        raise KeyboardInterrupt
+
+
+def _print_pairs(
+    suite: Suite, runs: dict[str, History], at_rest: DeadLoadResult, folder: Path
+) -> None:
+    """Print the table of a suite; interrupted or failed runs end the command with an error."""
+    from archfem.cases.result_folder import write_pairs
+
+    text = tabulate_runs(runs).text
+    if doubtful := [name for name, run in runs.items() if run.warnings]:
+        text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
+    print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
+    print_written(write_pairs(runs, at_rest, text, folder))
+    if any(run.ending is Ending.INTERRUPTED for run in runs.values()):
+        print("run the same command again to compute the pairs that are left", file=sys.stderr)
+        raise KeyboardInterrupt
+    failed = [name for name, run in runs.items() if not run.ending.is_complete]
+    if failed:
+        raise DidNotConverge(
+            f"{len(failed)} of {len(runs)} pairs have no equilibrium at some step: "
+            f"{', '.join(failed)}; what was computed is kept"
+        )
+
+
+def print_motions(suite: Suite) -> None:
+    """Print the result of spectral matching, or the measures of the motions."""
+    table = tabulate_matches(suite.matches) if suite.matches else tabulate_motions(suite.motions)
+    print(table.text)
+
+
+def print_written(files: Iterable[Path]) -> None:
+    """Print the names of written files."""
+    for path in files:
+        print(f"wrote {path}")

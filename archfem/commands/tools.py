@@ -1,0 +1,218 @@
+"""Commands animate, examples, example and doctor: films, shipped cases, and the installation."""
+
+import argparse
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from importlib import import_module, metadata
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from archfem import _numba, _optional
+from archfem.cases.case import Case
+from archfem.cases.examples import copy_example, list_example_titles, read_example
+from archfem.cases.run import dead_load_of_case
+from archfem.dynamics.history import History
+from archfem.errors import InvalidInput, NotInstalled
+
+PIP_INSTALL = f"{sys.executable} -m pip install"
+
+
+def animate(options: argparse.Namespace) -> None:
+    """Film the history of a run."""
+    path = Path(options.history)
+    if not path.is_file():
+        raise InvalidInput(f"there is no history file {path}")
+    case = Case.read(options.case or _find_case(path))
+    run = History.read(path, case.structure)
+    names = ("magnification", "colour", "fps", "seconds")
+    settings = {key: getattr(options, key) for key in names}
+    settings |= {"window": _parse_window(options.window), "size": _parse_size(options.size)}
+    from archfem.view.films.film import film  # pyvista and the encoder are slow to import
+
+    # Options that were not given keep the defaults of `film`.
+    target = Path(options.out) if options.out is not None else path.with_suffix(".mp4")
+    settings = {key: value for key, value in settings.items() if value is not None}
+    print(f"wrote {film(dead_load_of_case(case).model, run, target, **settings)}")
+
+
+def _find_case(path: Path, name: str = "case.toml") -> Path:
+    """Return the case of a run: beside its history, or beside the folder of its pair."""
+    for folder in (path.parent, path.absolute().parent.parent):
+        if (folder / name).is_file():
+            return folder / name
+    raise InvalidInput(
+        f"there is no {name} beside {path}, as `archfem run` writes one: give the case of the "
+        "run, --case CASE.toml"
+    )
+
+
+def _parse_window(text: str | None) -> str | tuple[float, float] | None:
+    """Parse "auto", or two times "8.0,9.5" [s]."""
+    if text is None or text == "auto":
+        return text
+    try:
+        start, end = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InvalidInput(
+            f"--window {text}: give 'auto', or two times in seconds such as 8.0,9.5"
+        ) from error
+    return start, end
+
+
+def _parse_size(text: str | None) -> tuple[int, int] | None:
+    """Parse a width and a height such as "1280x720" [pixels]."""
+    if text is None:
+        return None
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError as error:
+        raise InvalidInput(f"--size {text}: give width and height, such as 1280x720") from error
+    return width, height
+
+
+def examples(options: argparse.Namespace) -> None:
+    """Print names and titles of the example cases."""
+    titles = list_example_titles()
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        print(f"{name.ljust(width)}  {title}")
+
+
+def example(options: argparse.Namespace) -> None:
+    """Print an example case, or copy it with the files that it names."""
+    if options.out is not None:
+        for path in copy_example(options.name, Path(options.out)):
+            print(f"wrote {path}")
+        return
+    text, companions = read_example(options.name)
+    # The text goes to stdout, to be saved; the note does not.
+    print(text, end="")
+    if companions:
+        names = ", ".join(path.name for path in companions)
+        print(
+            f"archfem: it refers to {names} where archfem is installed; "
+            f"`archfem example {options.name} --out DIR` copies all of them",
+            file=sys.stderr,
+        )
+
+
+class Diagnosis(NamedTuple):
+    """State of one part of the installation."""
+
+    item: str
+    state: str
+    remedy: str = ""  # empty if all is well
+
+
+def doctor(options: argparse.Namespace) -> None:
+    """Print installed and missing packages, and the commands that install them."""
+    diagnoses = list(diagnose_installation())
+    width = max(len(diagnosis.item) for diagnosis in diagnoses)
+    for diagnosis in diagnoses:
+        print(f"{diagnosis.item.ljust(width)}  {diagnosis.state}")
+    faults = [diagnosis for diagnosis in diagnoses if diagnosis.remedy]
+    for fault in faults:
+        print(f"\n{fault.item}: {fault.remedy}")
+    # An error, so that scripts and CI see the exit code 1.
+    if faults:
+        raise NotInstalled(f"not all is well: {', '.join(fault.item for fault in faults)}")
+    print("\nall is well")
+
+
+def diagnose_installation() -> Iterator[Diagnosis]:
+    """Diagnose archfem, Python, required packages, FEniCSx, libraries and compiled code."""
+    package = import_module("archfem")
+    folder = Path(package.__file__ or "").parent
+    yield Diagnosis("archfem", f"{package.__version__} in {folder}")
+    yield Diagnosis("Python", f"{sys.version.split()[0]}, {sys.executable}")
+    yield from _diagnose_requirements()
+    yield from _diagnose_fenicsx()
+    if _optional.can_draw():
+        yield Diagnosis("library of the viewer", "found")
+    else:
+        remedy = _optional.OPTIONAL_PACKAGES["EGL"].remedy
+        yield Diagnosis("library of the viewer", "missing", remedy)
+    yield _diagnose_ffmpeg()
+    yield _diagnose_compiled_code()
+    if find_spec("distributed") is None:
+        remedy = f"{PIP_INSTALL} 'archfem[cluster]'"
+        yield Diagnosis("distributed", f"none; only clusters need it: {remedy}")
+
+
+def _diagnose_requirements() -> Iterator[Diagnosis]:
+    """Diagnose the packages that pip installs with archfem."""
+    try:
+        requirements = metadata.requires("archfem") or []
+    except metadata.PackageNotFoundError:
+        yield Diagnosis("packages", "archfem itself is not installed", f"{PIP_INSTALL} archfem")
+        return
+    for line in requirements:
+        # Requirements of extras have a marker behind the version, and do not match.
+        if match := re.match(r"([\w.-]+)(?:\[.*\])?>=([\d.]+)$", line):
+            yield _diagnose_package(*match.groups())
+
+
+def _diagnose_package(name: str, min_version: str) -> Diagnosis:
+    """Diagnose a package that must have a minimum version."""
+    remedy = f"{PIP_INSTALL} '{name}>={min_version}'"
+    # These are also imported, since libraries of the system may be missing.
+    imports = {"numba": "numba", "gmsh": "gmsh", "netCDF4": "netCDF4"}
+    imports["matplotlib"] = "matplotlib.figure"
+    try:
+        version = metadata.version(name)
+        if _numbers(version) < _numbers(min_version):
+            return Diagnosis(name, f"{version}, older than {min_version}", remedy)
+        if name in imports:
+            import_module(imports[name])
+    except metadata.PackageNotFoundError:
+        return Diagnosis(name, "missing", remedy)
+    except Exception as error:  # imports of other packages may raise errors of any class
+        if name in _optional.OPTIONAL_PACKAGES:
+            remedy = _optional.OPTIONAL_PACKAGES[name].remedy
+        return Diagnosis(name, f"does not load: {error}", remedy)
+    return Diagnosis(name, version)
+
+
+def _diagnose_fenicsx() -> Iterator[Diagnosis]:
+    """Diagnose FEniCSx, and the C compiler for its forms."""
+    try:
+        # These modules import dolfinx, petsc4py and slepc4py with a message of their own.
+        import_module("archfem.models.fem")
+        import_module("archfem.statics.slepc_eigensolver")
+    except ImportError as error:
+        state = "missing" if find_spec("dolfinx") is None else f"does not load: {error.__cause__}"
+        remedy = _optional.OPTIONAL_PACKAGES["FEniCSx"].remedy
+        remedy += "; without it rigid stones can be stepped, and limit analysis done"
+        yield Diagnosis("FEniCSx", state, remedy)
+        return
+    for name in _optional.FENICSX_PACKAGES:
+        yield Diagnosis(name, str(import_module(name).__version__))
+    compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
+    remedy = "'apt-get install gcc libc6-dev', elsewhere 'conda install -c conda-forge c-compiler'"
+    yield Diagnosis("C compiler", compiler or "missing", "" if compiler else remedy)
+
+
+def _diagnose_ffmpeg() -> Diagnosis:
+    """Diagnose the program that encodes films."""
+    try:
+        return Diagnosis("ffmpeg", import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except Exception as error:  # the package is missing, or its program
+        return Diagnosis("ffmpeg", str(error), f"{PIP_INSTALL} 'imageio[ffmpeg]'")
+
+
+def _diagnose_compiled_code() -> Diagnosis:
+    """Diagnose the cache of compiled kernels."""
+    _numba.prepare_cache()
+    count, folders = _numba.count_cached_functions(), _numba.cache_folders()
+    if not count:
+        return Diagnosis("compiled code", "none yet: the first run, or 'archfem compile', makes it")
+    return Diagnosis("compiled code", f"{count} functions in {', '.join(map(str, folders))}")
+
+
+def _numbers(version: str) -> list[int]:
+    """Return the first three numbers of a version."""
+    return [int(part) for part in re.findall(r"\d+", version)[:3]]

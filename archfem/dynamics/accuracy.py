@@ -1,0 +1,222 @@
+"""Processor time against error of a run, over fidelities, meshes, quadratures and time steps."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from time import process_time
+
+import numpy as np
+from tqdm import tqdm
+
+from archfem._files import align_columns
+from archfem._typing import Array
+from archfem.dynamics.error_estimation import largest_difference, peak_eccentricities
+from archfem.dynamics.history import Ending
+from archfem.dynamics.model_selection import (
+    MODEL_LEVELS,
+    DampingChoice,
+    discretisation_label,
+    reference_discretisation,
+    resolve_damping,
+    stone_fidelity,
+)
+from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.time_history import time_history
+from archfem.errors import DidNotConverge
+from archfem.masonry.structure import Structure
+from archfem.models.builder import build
+from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
+from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
+
+# Settings tried by default; quadratures with their points on a facet (None: default), steps in [s]
+TRIED_FIDELITIES = ("rigid", "faces", "condensed")
+TRIED_MESHES = ((2, 2), (4, 4), (8, 8))
+TRIED_QUADRATURES = (("nodal", None), ("lobatto", None), ("gauss", None), ("exact", None))
+TRIED_TIME_STEPS = (0.01, 0.005, 0.0025)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A discretisation and a time step."""
+
+    discretisation: Discretisation
+    dt: float  # time step [s]
+
+    @property
+    def label(self) -> str:
+        """Short text."""
+        return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
+
+
+@dataclass(frozen=True)
+class TimedRun:
+    """Size, processor time and peaks of a run."""
+
+    size: int  # number of coordinates
+    seconds: float  # processor time of the time steps, without building the model [s]
+    peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
+
+
+@dataclass(frozen=True)
+class SettingResult:
+    """A setting, its processor time and its error."""
+
+    setting: Setting
+    size: int  # number of coordinates
+    seconds: float  # processor time of the time steps, without building the model [s]
+    error: float  # of the largest |e| of the worst joint [-]; infinite for a failed run
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Results of all settings of one structure and motion."""
+
+    trials: tuple[SettingResult, ...]  # in the order tried
+    reference: Setting  # with which all are compared
+    # error of the reference, from twice its time step and half its cells [-]; errors much below it
+    # are not significant
+    reference_error: float
+    duration: float  # of the motion [s]
+    tolerance: float  # on the error, for `choice` [-]
+
+    @property
+    def front(self) -> tuple[SettingResult, ...]:
+        """Pareto front of time and error, the fastest first."""
+        front: list[SettingResult] = []
+        for trial in sorted(self.trials, key=lambda trial: (trial.seconds, trial.error)):
+            if not front or trial.error < front[-1].error:
+                front.append(trial)
+        return tuple(front)
+
+    @property
+    def choice(self) -> SettingResult | None:
+        """The fastest setting within the tolerance, or None."""
+        return next((trial for trial in self.front if trial.error <= self.tolerance), None)
+
+    def table(self) -> str:
+        """Return all settings as aligned text, the fastest first; a star marks the front."""
+        front = set(self.front)
+        head = ["setting", "coordinates", "time [s]", "× real time", "error in |e|", "front"]
+        rows = [
+            [
+                trial.setting.label,
+                str(trial.size),
+                f"{trial.seconds:.3f}",
+                f"{self.duration / trial.seconds:.0f}",
+                f"{trial.error:.5f}" if np.isfinite(trial.error) else "failed",
+                "*" if trial in front else "",
+            ]
+            for trial in sorted(self.trials, key=lambda trial: trial.seconds)
+        ]
+        return align_columns(head, rows)
+
+
+def accuracy(
+    structure: Structure,
+    motion: Motion,
+    *,
+    damping: DampingChoice = None,
+    rungs: Sequence[str] = TRIED_FIDELITIES,
+    cells: Sequence[tuple[int, int]] = TRIED_MESHES,
+    rules: Sequence[tuple[str, int | None]] = TRIED_QUADRATURES,
+    steps: Sequence[float] = TRIED_TIME_STEPS,
+    tolerance: float = 0.005,
+) -> Accuracy:
+    """Compare processor time and error of fidelities, meshes, quadratures and time steps.
+
+    The error of a setting is the largest difference, over the joints, of the largest |e| to that of
+    a converged reference.
+
+    Args:
+        structure: structure of blocks and joints.
+        motion: ground motion.
+        damping: damping of all runs, or a function that returns it for the reference model.
+        rungs: fidelities to try.
+        cells: meshes to try; "rigid" takes the first number as facets on a joint.
+        rules: quadratures to try, each with its points on a facet (None: 3).
+        steps: time steps to try [s].
+        tolerance: tolerance on the error, by which one setting is chosen [-].
+
+    Returns:
+        All settings with times and errors, the reference and the error of the reference.
+
+    Raises:
+        InvalidInput: a fidelity, rule or step is out of range.
+        DidNotConverge: the reference itself failed.
+    """
+    references = reference_settings(structure)
+    damping = resolve_damping(build(structure, references[0].discretisation), damping)
+    settings = [*references, *candidate_settings(structure, rungs, cells, rules, steps)]
+    runs = [
+        time_run(build(structure, setting.discretisation), motion, damping, setting.dt)
+        for setting in tqdm(settings, unit="setting", disable=None, leave=False)
+    ]
+    return compare_runs(settings, runs, motion.duration, tolerance)
+
+
+def reference_settings(structure: Structure, dt: float = 0.00125) -> tuple[Setting, Setting]:
+    """Return the reference, and a coarser setting for the error of the reference."""
+    finest = reference_discretisation(structure, MODEL_LEVELS[-1])
+    halved = replace(finest, cells=(finest.through // 2, finest.along // 2))
+    return Setting(finest, dt), Setting(halved, 2.0 * dt)
+
+
+def candidate_settings(
+    structure: Structure,
+    fidelities: Sequence[str] = TRIED_FIDELITIES,
+    meshes: Sequence[tuple[int, int]] = TRIED_MESHES,
+    quadratures: Sequence[tuple[str, int | None]] = TRIED_QUADRATURES,
+    steps: Sequence[float] = TRIED_TIME_STEPS,
+) -> Iterator[Setting]:
+    """Yield all combinations without duplicates."""
+    for name in fidelities:
+        fidelity = stone_fidelity(structure, name)
+        for rule, points in quadratures:
+            # rigid joints with exact facets have no mesh
+            meshless = fidelity == "rigid" and rule == "exact"
+            for cells in [(1, 1)] if meshless else meshes:
+                settings = Discretisation(fidelity, cells, quadrature=rule, points=points)
+                yield from (Setting(settings, dt) for dt in steps)
+
+
+def time_run(
+    model: Model,
+    motion: Motion,
+    damping: Viscous | None,
+    dt: float,
+    start: Equilibrium | None = None,
+) -> TimedRun:
+    """Run a model and measure the processor time."""
+    # two steps beforehand, so that compilation is not measured
+    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
+    begin = process_time()
+    try:
+        run = time_history(model, motion, damping=damping, dt=dt, start=start)
+    except DidNotConverge:
+        return TimedRun(model.size, process_time() - begin, None)
+    if run.ending is Ending.INTERRUPTED:
+        raise KeyboardInterrupt
+    return TimedRun(model.size, process_time() - begin, peak_eccentricities(run))
+
+
+def compare_runs(
+    settings: Sequence[Setting], runs: Sequence[TimedRun], duration: float, tolerance: float
+) -> Accuracy:
+    """Return the errors of runs; the first two are the reference and the coarser one."""
+    reference = runs[0].peaks
+    if reference is None:
+        raise DidNotConverge(
+            f"the reference, {settings[0].label}, did not reach the end of the motion: there is "
+            "nothing to compare with; take a weaker motion (motion.scale) or a shorter one"
+        )
+    trials = [
+        SettingResult(
+            setting,
+            run.size,
+            run.seconds,
+            np.inf if run.peaks is None else largest_difference(run.peaks, reference),
+        )
+        for setting, run in zip(settings, runs, strict=True)
+    ]
+    return Accuracy(tuple(trials[2:]), settings[0], trials[1].error, duration, tolerance)

@@ -1,0 +1,239 @@
+"""Energy balance and validity of a run, checked after every step.
+
+The work of the ground must be stored or dissipated. With T the kinetic energy, E the potential
+energy of blocks and joints and p the weight, over a step
+
+    Δ(T + E(u) - p·u) = W - D,
+    W = -Δu · M r ½ Σ a_g,    D = Δu · ½ Σ (C v + f(u + β v) - f(u)),
+
+with sums over both ends of the step. Average acceleration satisfies this balance exactly while no
+joint opens or closes. Across such an event the trapezoidal rule has an error, and over thousands of
+impacts the errors may add up. The difference of both sides, summed from the start, is the energy
+drift. It is negative for a scheme with numerical damping, such as HHT.
+
+The checks do not depend on how many steps a solver takes at a time: bounds are evaluated at each
+step of a batch.
+"""
+
+import logging
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.dynamics.state import Batch, State
+from archfem.errors import DidNotConverge
+from archfem.models.model import Model
+
+logger = logging.getLogger("archfem")
+
+# Energy drift, relative to the largest energy exchanged, above which the user is warned [-]:
+# amplitudes, which vary with the root of energy, are then off by 2.5 %
+ENERGY_DRIFT_WARNING = 0.05
+
+# Energy drift above which a run is wrong [-]: half of the energy comes from the scheme
+ENERGY_DRIFT_ERROR = 0.5
+
+# Joint rotation above which small displacements are doubtful [rad]: beyond it the largest |e| of
+# six arches and columns was wrong by 0.01 to 0.03
+SMALL_ROTATION_LIMIT = 0.01
+
+# Steps between two checks of the displacements of all points
+DISPLACEMENT_CHECK_INTERVAL = 32
+
+
+class EnergyMeter:
+    """Kinetic and potential energy, work and loss of the steps of a model."""
+
+    def __init__(
+        self, model: Model, weight: Array, damping: sparse.csr_matrix, damping_lag: float
+    ) -> None:
+        self.model = model
+        self.weight = weight
+        self.damping = damping
+        self.damping_lag = damping_lag
+        self._last: tuple[Array, Array, float, float, Array] | None = None
+
+    def measure_step(
+        self, before: tuple[Array, Array], after: tuple[Array, Array], ground: Array
+    ) -> Array:
+        """Return kinetic and potential energy at the end of a step, its work and its loss (4,)."""
+        first, last = self._measure_state(*before), self._measure_state(*after)
+        increment = after[0] - before[0]
+        work = -float(increment @ (self.model.mass_influence @ ground))
+        loss = 0.5 * float(increment @ (first[4] + last[4]))
+        return np.array([last[2], last[3], work, loss])
+
+    def _measure_state(self, q: Array, velocity: Array) -> tuple[Array, Array, float, float, Array]:
+        """Return a state, its kinetic and potential energy, and its damping forces."""
+        # the end of one step is the start of the next, by identity of the arrays
+        if self._last is not None and self._last[0] is q and self._last[1] is velocity:
+            return self._last
+        kinetic = 0.5 * float(velocity @ (self.model.mass @ velocity))
+        potential = self.model.energy(q) - float(self.weight @ q)
+        forces = self.damping @ velocity
+        if self.damping_lag:
+            delayed = self.model.force(q + self.damping_lag * velocity)
+            forces += delayed - self.model.force(q)
+        self._last = (q, velocity, kinetic, potential, forces)
+        return self._last
+
+
+class EnergyBalance:
+    """Sum of the energies of a run, its drift, and the largest energy exchanged so far [J]."""
+
+    def __init__(self, kinetic: float, potential: float) -> None:
+        self._stored = kinetic + potential
+        self._work = self._loss = 0.0
+        # Smaller exchanges than 1e-3 of the energy stored under self-weight are neglected: forces
+        # vary with its root, that is by 3 % of the weight
+        self.largest_exchange = max(kinetic, 1e-3 * abs(potential), 1e-300)
+
+    def add(self, steps: Array) -> tuple[Array, Array]:
+        """Add steps; return the drift at each [J], and relative to the largest exchange [-]."""
+        kinetic, potential, work, loss = steps.T
+        change = kinetic + potential - self._stored
+        works, losses = self._work + np.cumsum(work), self._loss + np.cumsum(loss)
+        drift: Array = change - works + losses
+        self._work, self._loss = works[-1], losses[-1]
+        exchanged = np.max([kinetic, np.abs(change), np.abs(works), losses], axis=0)
+        largest = np.maximum.accumulate(np.maximum(exchanged, self.largest_exchange))
+        self.largest_exchange = float(largest[-1])
+        return drift, drift / largest
+
+
+class RunMonitor:
+    """Validity checks of a run: one warning per kind, and an error once the run is wrong."""
+
+    def __init__(self, model: Model, start: Batch, *, damps: bool = False) -> None:
+        self.model = model
+        # largest drift at any step, relative to the largest exchange until then [-]
+        self.worst_drift, self._worst_time = 0.0, 0.0
+        # of the middle of any block at any step, and of any point at the periodic checks [m]
+        self.largest_displacement = 0.0
+        self.largest_turn = 0.0  # of any joint at any step [rad]
+        self._balance = EnergyBalance(*start.energy[0, :2])
+        self._damps = damps  # whether the scheme has numerical damping, so that losses are expected
+        self._drift_error: tuple[float, float] | None = None  # first time [s] and drift beyond it
+        self._observer = model.observer()
+        self._small = not model.large_displacements
+        self._mismatch = (0.0, "")  # slip over facet length, and the joint
+        self._depth = float(model.structure.depths.min())
+        self._last, self._before = start.state(0), start.state(0)
+        self._steps = 0
+        self._warnings = {f"model {k}": words for k, words in enumerate(model.warnings)}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings so far, those of the model included, one sentence each."""
+        return tuple(self._warnings.values())
+
+    def add(self, batch: Batch, readings: Array) -> Array:
+        """Add the next steps and return the energy drift at each (steps,) [J]."""
+        drift, fractions = self._balance.add(batch.energy)
+        worst = int(np.abs(fractions).argmax())  # a NaN is the largest
+        if not abs(fractions[worst]) <= abs(self.worst_drift):
+            self.worst_drift = float(fractions[worst])
+            self._worst_time = float(batch.times[worst])
+        if self._drift_error is None:
+            signed = fractions if self._damps else np.abs(fractions)
+            beyond = np.flatnonzero(signed > ENERGY_DRIFT_ERROR)
+            if len(beyond):
+                first = int(beyond[0])
+                self._drift_error = float(batch.times[first]), float(fractions[first])
+        largest = float(np.linalg.norm(self._observer.middles(readings), axis=-1).max())
+        self.largest_displacement = max(self.largest_displacement, largest)
+        if self._small:
+            rotation = float(np.abs(self._observer.faces(readings)[:, 1]).max())
+            self.largest_turn = max(self.largest_turn, rotation)
+        # displacements of all points cost a sparse product, hence not at every step
+        offset = -self._steps % DISPLACEMENT_CHECK_INTERVAL
+        for k in range(offset, len(batch.times), DISPLACEMENT_CHECK_INTERVAL):
+            self._measure_points(batch.state(k))
+        self._steps += len(batch.times)
+        self._before, self._last = self._last, batch.state(len(batch.times) - 1)
+        return drift
+
+    def _measure_points(self, state: State) -> None:
+        """Update the largest displacement of any point, and the slip of paired facets."""
+        largest = np.abs(self.model.cells.displacement(state.q)).max()
+        self.largest_displacement = max(self.largest_displacement, float(largest))
+        self._mismatch = max(self._mismatch, self.model.face_mismatch(state.q))
+
+    def check_run(self) -> None:
+        """Raise an error if the steps added are wrong, and warn if they are doubtful."""
+        time, size = self._last.time, self.model.structure.size
+        if not np.isfinite(self.worst_drift):
+            raise DidNotConverge(
+                f"by t = {time:.4g} s displacements or speeds are not numbers any more: the start "
+                "is unphysical, or the run needs damping or a smaller dt",
+                last=self._before,
+            )
+        if self._drift_error is not None:
+            when, share = self._drift_error
+            raise DidNotConverge(
+                f"by t = {when:.4g} s {abs(share):.0%} of the energy had "
+                f"{'come from' if share > 0.0 else 'gone'} nowhere, so the history is wrong: use "
+                "the scheme Conserving, or damping and a smaller dt",
+                last=self._before,
+            )
+        if self._small and self.largest_displacement > size:
+            raise DidNotConverge(
+                f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
+                f"than the size of the structure, {size:.3g} m: it has fallen apart; end the run "
+                "at its mechanism, with until=CountedMechanism(), or let displacements be large",
+                last=self._before,
+            )
+        self._check_facets(time)
+        self._check_energy()
+        if self._small:
+            self._check_small_displacements(time)
+
+    def _check_energy(self) -> None:
+        """Warn of energy drift."""
+        if abs(self.worst_drift) > ENERGY_DRIFT_WARNING:
+            change = "had come from nowhere" if self.worst_drift > 0.0 else "was lost to the scheme"
+            self._warn(
+                "energy",
+                f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst_drift):.0%} of "
+                f"the largest exchanged {change}; compare with the scheme Conserving, with a "
+                "smaller dt, or with more damping",
+            )
+
+    def _check_small_displacements(self, time: float) -> None:
+        """Warn of rotations and displacements that are not small."""
+        if self.largest_turn > SMALL_ROTATION_LIMIT:
+            self._warn(
+                "turn",
+                f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
+                "displacements as small errs by 0.01 and more in |e| there; compare with "
+                "build(…, displacements='large')",
+            )
+        if self.largest_displacement > self._depth:
+            self._warn(
+                "displacement",
+                f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
+                f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
+                "displacements that this model assumes; read it as collapse, or follow it with "
+                "build(…, displacements='large')",
+            )
+
+    def _check_facets(self, time: float, doubtful: float = 0.1) -> None:
+        """Warn of facets that have slid by a share of their length; refuse a whole length."""
+        slip, name = self._mismatch
+        if slip <= doubtful:
+            return
+        words = (
+            f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
+            "they are paired as meshed: take fewer cells, fidelity 'faces' or 'rigid' for stones, "
+            "or cut the fill with jointed_fill"
+        )
+        if slip > 1.0:
+            raise DidNotConverge(words, last=self._before)
+        self._warn("facets", words)
+
+    def _warn(self, kind: str, words: str) -> None:
+        """Log the first warning of a kind in a run, and store the latest."""
+        if kind not in self._warnings:
+            logger.warning("%s", words)
+        self._warnings[kind] = words

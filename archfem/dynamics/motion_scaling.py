@@ -1,0 +1,404 @@
+"""Scale of a ground motion at the first mechanism, or at collapse of the structure.
+
+Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
+bracketed, then at the geometric mean of the widest bracket.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf, sqrt
+
+import numpy as np
+from tqdm import tqdm
+
+from archfem._files import align_columns
+from archfem._validation import validate_arguments
+from archfem.dynamics.events import EveryMechanism, applicable_definitions
+from archfem.dynamics.fall import FALLEN_STATES, CollapseState
+from archfem.dynamics.history import (
+    MECHANISM_DEFINITIONS,
+    Ending,
+    first_mechanisms,
+    partial_history,
+)
+from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.solvers.integrator import Stepper
+from archfem.dynamics.time_history import time_history
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.joints.criteria import Criteria
+from archfem.limit.mechanism_count import Mechanism
+from archfem.models.model import Model, check_model
+from archfem.motion.motion import Motion
+from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
+from archfem.statics.equilibrium import Equilibrium, dead_load
+
+logger = logging.getLogger("archfem")
+
+# Limit state of large displacements, in place of a definition of mechanisms
+COLLAPSE_DEFINITION = "collapse"
+
+
+@dataclass(frozen=True)
+class ScaledRun:
+    """Result of one run of a search."""
+
+    scale: float  # factor on the motion [-]
+    mechanisms: dict[str, Mechanism | None]  # the first mechanism by each definition, or None
+    ending: Ending
+    outcome: str  # ending in words
+    fall: CollapseState | None = None  # state of collapse; None for small displacements
+
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether Ctrl-C ended the run; later mechanisms are then unknown."""
+        return self.ending is Ending.INTERRUPTED
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether a step had no equilibrium."""
+        return self.ending is Ending.FAILED
+
+    @property
+    def has_fallen(self) -> bool:
+        """Whether blocks of the structure have fallen."""
+        return self.fall is not None and self.fall.kind in FALLEN_STATES
+
+    def fails(self, definition: str) -> bool:
+        """Return whether the limit state was met, or a step had no equilibrium."""
+        if definition == COLLAPSE_DEFINITION:
+            return self.has_fallen or self.has_failed
+        return self.mechanisms[definition] is not None or self.has_failed
+
+    def survives(self, definition: str) -> bool:
+        """Return whether the whole motion passed without the limit state."""
+        return not self.fails(definition) and not self.is_interrupted
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Scales between which a limit state is first met.
+
+    Failure need not be monotonic in the scale: the smallest failing scale counts.
+    """
+
+    lower: float  # largest surviving scale below `upper` [-]; 0 for none
+    upper: float  # smallest failing scale [-]; infinite for none
+    run: ScaledRun | None  # that at `upper`, or None
+    above: tuple[float, ...]  # surviving scales beyond `upper`
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the bounds [-]; infinite where one is missing."""
+        return self.upper / self.lower if self.lower > 0.0 else inf
+
+
+@dataclass(frozen=True)
+class MechanismScales:
+    """Runs of a search for the scales at first mechanism; `scales[definition]` is a bracket."""
+
+    definitions: tuple[str, ...]  # for which the structure has enough joints
+    runs: tuple[ScaledRun, ...] = ()  # in order of their scales
+    interrupted: bool = False  # whether Ctrl-C ended the search
+
+    def with_run(self, run: ScaledRun) -> "MechanismScales":
+        """Return the search with one more run."""
+        runs = sorted([*self.runs, run], key=lambda each: each.scale)
+        return MechanismScales(self.definitions, tuple(runs), run.is_interrupted)
+
+    def __getitem__(self, definition: str) -> Bracket:
+        """Bracket of a definition; without bounds if the structure has too few joints for it."""
+        if definition not in self.definitions:
+            return Bracket(0.0, inf, None, ())
+        failing = [run for run in self.runs if run.fails(definition)]
+        surviving = [run.scale for run in self.runs if run.survives(definition)]
+        upper = failing[0].scale if failing else inf
+        return Bracket(
+            max((scale for scale in surviving if scale < upper), default=0.0),
+            upper,
+            failing[0] if failing else None,
+            tuple(scale for scale in surviving if scale > upper),
+        )
+
+    def table(self) -> str:
+        """Return a line per definition: its bracket, and the mechanism at the upper bound."""
+        head = ["mechanism", "survives", "fails", "class", "at", "part", "note"]
+        return align_columns(head, [self._row(definition) for definition in MECHANISM_DEFINITIONS])
+
+    def _row(self, definition: str) -> list[str]:
+        bracket = self[definition]
+        mechanism = bracket.run.mechanisms[definition] if bracket.run else None
+        notes = []
+        if bracket.run and mechanism is None:
+            notes.append(bracket.run.outcome)
+        if definition not in self.definitions:
+            notes.append("has no such joints")
+        if bracket.above:
+            notes.append("survives also " + ", ".join(f"{scale:.3g}" for scale in bracket.above))
+        return [
+            definition,
+            f"{bracket.lower:.3g}" if bracket.lower else "-",
+            f"{bracket.upper:.3g}" if bracket.run else "-",
+            mechanism.kind if mechanism else "-",
+            f"{mechanism.time:.3f} s" if mechanism and mechanism.time is not None else "-",
+            mechanism.part if mechanism else "-",
+            "; ".join(notes) or "-",
+        ]
+
+
+@validate_arguments
+def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the search)
+    model: Model,
+    motion: Motion,
+    *,
+    start: Equilibrium | None = None,
+    damping: Viscous | None = None,
+    dt: float | None = None,
+    criteria: Criteria | None = None,
+    precision: float = 0.05,
+    between: tuple[float, float] = (0.05, 5.0),
+    method: str | Callable[[Motion], Stepper] = "auto",
+) -> MechanismScales:
+    """Find the smallest scale of a motion at which each definition of a mechanism is first met.
+
+    Incremental dynamic analysis: scales decrease from 1 by a factor √2 until nothing is met and
+    increase until everything is, then brackets are bisected. Each run covers all definitions and
+    ends once all are met. A run without equilibrium counts as failed. Ctrl-C ends the search and
+    returns the runs made so far.
+
+    Args:
+        model: model of any fidelity.
+        motion: motion to scale, vertical component included.
+        start: dead load, computed if not given.
+        damping: as for `time_history`.
+        dt: time step [s], as for `time_history`.
+        criteria: as for `time_history`.
+        precision: relative width of the final brackets [-].
+        between: smallest and largest scale [-]; no ground motion may exceed 5 g.
+        method: as for `time_history`, or a function from a scaled motion to its solver.
+
+    Returns:
+        Brackets, mechanisms and runs; at most 40 runs are made.
+
+    Raises:
+        InvalidInput: precision or scales are out of range.
+        DidNotConverge: the structure does not stand under dead load.
+
+    References:
+        Vamvatsikos and Cornell, Earthq. Eng. Struct. Dyn. 31 (2002) 491-514.
+    """
+    if not _valid_search(precision, between):
+        raise InvalidInput(
+            f"precision {precision:g} between scales {between}: give 0.0001 to 1, and two scales "
+            "above 0, the smaller first"
+        )
+    start = start or dead_load(model)
+
+    def run_scaled(scale: float) -> ScaledRun:
+        scaled = motion.scaled(scale)
+        try:
+            run = time_history(
+                model,
+                scaled,
+                start=start,
+                damping=damping,
+                dt=dt,
+                until=EveryMechanism(),
+                criteria=criteria,
+                method=method if isinstance(method, str) else method(scaled),
+            )
+        except DidNotConverge as error:
+            run = partial_history(error)
+        return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
+
+    definitions = (*applicable_definitions(model.structure, criteria), "verified")
+    return search_scales(run_scaled, definitions, precision, _admissible_range(between, motion))
+
+
+def _valid_search(precision: float, between: tuple[float, float]) -> bool:
+    return 1e-4 <= precision <= 1.0 and 0.0 < between[0] <= between[1]
+
+
+def _admissible_range(between: tuple[float, float], motion: Motion) -> tuple[float, float]:
+    """Return a range of scales cut off at the largest admissible scale of a motion."""
+    smallest, largest = between
+    return smallest, max(smallest, min(largest, largest_allowed_scale(motion)))
+
+
+def largest_allowed_scale(motion: Motion) -> float:
+    """Return the scale at which the peak acceleration of a motion is 5 g [-]."""
+    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
+    return MAX_PEAK_ACCELERATION / peak if peak > 0.0 else inf
+
+
+def search_scales(
+    run_scaled: Callable[[float], ScaledRun],
+    definitions: tuple[str, ...],
+    precision: float,
+    between: tuple[float, float],
+) -> MechanismScales:
+    """Make runs until all brackets are within the precision."""
+    scales = MechanismScales(definitions)
+    try:
+        with tqdm(unit="run", disable=None, leave=False, desc="scales") as bar:
+            while (scale := _next_scale(scales, precision, between)) is not None:
+                bar.set_postfix_str(f"× {scale:.3g}")
+                scales = scales.with_run(run_scaled(scale))
+                bar.update()
+    except KeyboardInterrupt:
+        scales = replace(scales, interrupted=True)
+    if scales.interrupted:
+        logger.warning("interrupted after %d runs: their results are returned", len(scales.runs))
+    return scales
+
+
+def _next_scale(
+    scales: MechanismScales,
+    precision: float,
+    between: tuple[float, float],
+    ratio: float = sqrt(2.0),
+    max_runs: int = 40,
+) -> float | None:
+    """Return the next scale, or None; `ratio` is that of two scales before bisection."""
+    runs, (smallest, largest) = scales.runs, between
+    if not runs:
+        return min(max(1.0, smallest), largest)
+    # four definitions to five per cent take about fifteen runs
+    if len(runs) >= max_runs or scales.interrupted:
+        return None
+    brackets = [scales[definition] for definition in scales.definitions]
+    if runs[0].scale > smallest and any(bracket.lower == 0.0 for bracket in brackets):
+        return max(runs[0].scale / ratio, smallest)
+    if runs[-1].scale < largest and any(bracket.run is None for bracket in brackets):
+        return min(runs[-1].scale * ratio, largest)
+    wide = [bracket for bracket in brackets if 1.0 + precision < bracket.ratio < inf]
+    if not wide:
+        return None
+    widest = max(wide, key=lambda bracket: bracket.ratio)
+    return sqrt(widest.lower * widest.upper)
+
+
+@dataclass(frozen=True)
+class CollapseScale:
+    """Scales between which a structure falls, by several time steps.
+
+    A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". The response
+    need not be monotonic: it may survive a motion stronger than one that brought it down.
+
+    Attributes:
+        searches: runs made, by time step [s].
+    """
+
+    searches: dict[float, MechanismScales]
+
+    def bracket(self, dt: float) -> Bracket:
+        """Return the bracket of collapse by one time step.
+
+        Args:
+            dt: time step [s].
+
+        Returns:
+            Its `lower` and `upper` scales [-].
+        """
+        return self.searches[dt][COLLAPSE_DEFINITION]
+
+    @property
+    def lower(self) -> float:
+        """Largest scale up to which the structure stood by every time step [-]."""
+        return min(self.bracket(dt).lower for dt in self.searches)
+
+    @property
+    def upper(self) -> float:
+        """Smallest scale of falls by every time step [-]; infinite if by one it did not."""
+        return max(self.bracket(dt).upper for dt in self.searches)
+
+    @property
+    def above(self) -> tuple[float, ...]:
+        """Scales at which it stood although it fell at a smaller one [-]."""
+        return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).above}))
+
+    def falls(self, dt: float) -> tuple[tuple[float, CollapseState | None], ...]:
+        """Return the scale and the state of collapse of each run by one time step.
+
+        Args:
+            dt: time step [s].
+
+        Returns:
+            Pairs in order of the scales; the state is None where the run was broken off.
+        """
+        return tuple((run.scale, run.fall) for run in self.searches[dt].runs)
+
+    def table(self) -> str:
+        """Return a line per run: step, scale, state of collapse, time and residual displacement."""
+        rows = [
+            [
+                f"{1e3 * dt:g} ms",
+                f"{scale:.3g}",
+                fall.kind if fall else "-",
+                f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
+                f"{fall.residual:.3g} m" if fall else "-",
+            ]
+            for dt in self.searches
+            for scale, fall in self.falls(dt)
+        ]
+        return align_columns(["step", "scale", "the structure", "at", "residual"], rows)
+
+
+@validate_arguments
+def collapse_scale(
+    model: Model,
+    motion: Motion,
+    *,
+    start: Equilibrium | None = None,
+    damping: Viscous | None = None,
+    dt: Sequence[float] = (0.005, 0.0025),
+    precision: float = 0.05,
+    between: tuple[float, float] = (0.1, 10.0),
+) -> CollapseScale:
+    """Find the smallest scale of a motion at which a structure falls.
+
+    Scales are searched as by `mechanism_scales`, once for each time step: a fall under a record is
+    sensitive to all parameters, and a result on which two steps disagree is not reliable.
+
+    Args:
+        model: model of large displacements, `build(…, displacements="large")`.
+        motion: motion to scale, vertical component included.
+        start: dead load, computed if not given.
+        damping: as for `time_history`.
+        dt: time steps [s].
+        precision: relative width of the final brackets [-].
+        between: smallest and largest scale [-]; no ground motion may exceed 5 g.
+
+    Returns:
+        All runs, with the scales between which the structure falls by each step.
+
+    Raises:
+        InvalidInput: displacements are small, or precision, steps or scales are out of range.
+        DidNotConverge: the structure does not stand under dead load.
+    """
+    check_model(model)
+    if not model.large_displacements:
+        raise InvalidInput(
+            f"model '{model.fidelity}' has small displacements: build it with displacements='large'"
+        )
+    if not _valid_search(precision, between) or not dt:
+        raise InvalidInput(
+            f"precision {precision:g} between scales {between} by steps {tuple(dt)}: give 0.0001 "
+            "to 1, two scales above 0, the smaller first, and a step or two"
+        )
+    begin = start or dead_load(model)
+
+    def run_scaled(step: float, scale: float) -> ScaledRun:
+        try:
+            run = time_history(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
+        except DidNotConverge as error:
+            run = partial_history(error)
+        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall)
+
+    limits = _admissible_range(between, motion)
+    searches = {}
+    for step in dt:
+        run_at = partial(run_scaled, step)
+        searches[step] = search_scales(run_at, (COLLAPSE_DEFINITION,), precision, limits)
+    return CollapseScale(searches)

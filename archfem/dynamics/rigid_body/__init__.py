@@ -1,0 +1,12 @@
+"""Free rigid blocks with contact detection, impacts and friction, until they rest.
+
+    bodies             convex pieces, masses, friction, poses and velocities
+    contact_detection  contact points by a sorted sweep and separating axes
+    time_stepping      Moreau-Jean time stepping
+
+Start reading at `time_stepping`.
+"""
+
+from archfem import _numba
+
+_numba.prepare_cache()

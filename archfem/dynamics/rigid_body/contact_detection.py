@@ -1,0 +1,308 @@
+"""Contact points between convex pieces, by a sorted sweep and separating axes; warm start.
+
+Pieces are sorted along x, so that only pairs with overlapping intervals are tested. The axis of
+largest separation, or of smallest overlap, of two convex polygons is normal to an edge of one of
+them, the reference edge. The edge of the other that faces it most, the incident edge, is clipped to
+its length, and up to two points remain. Cuts between the pieces of a body separate too, but are
+never reference edges. (Separating axes: Gottschalk, Lin and Manocha, SIGGRAPH 1996.)
+
+Impulses of a step are stored by the pair of pieces in a hash table, as initial guess of the next.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem._typing import Array
+from archfem.dynamics.rigid_body.bodies import Bodies
+
+
+class PlacedPieces(NamedTuple):
+    """Workspace: pieces in the present positions of their bodies."""
+
+    points: Array  # vertices (k, 2) [m]
+    normals: Array  # outward, of their edges (k, 2)
+    boxes: Array  # smallest x, largest x, smallest y, largest y of each piece (p, 4) [m]
+    order: NDArray[np.int64]  # pieces in order of their smallest x (p,)
+
+
+class Contacts(NamedTuple):
+    """Contact points and their impulses, of which the first `count` are filled."""
+
+    bodies: NDArray[np.int64]  # the two bodies; the ground is the last of all (c, 2)
+    key: NDArray[np.int64]  # of the two pieces (c,)
+    point: Array  # position (c, 2) [m]
+    normal: Array  # from the first body to the second (c, 2)
+    gap: Array  # negative for overlap (c,) [m]
+    impulse: Array  # along the normal, and along the normal turned by +90° (c, 2) [N s]
+
+
+class StoredImpulses(NamedTuple):
+    """Impulses of the previous step, with a hash table of their keys."""
+
+    key: NDArray[np.int64]  # of the two pieces at each contact (c,)
+    place: Array  # of the contact along the tangent, from the first body's centroid (c,) [m]
+    impulse: Array  # (c, 2) [N s]
+    slots: NDArray[np.int64]  # number of a contact by hash of its key, -1 for none (2^m,)
+
+
+def allocate_pieces(bodies: Bodies) -> PlacedPieces:
+    """Return the workspace of the pieces."""
+    pieces = len(bodies.owner)
+    return PlacedPieces(
+        np.empty_like(bodies.arms),
+        np.empty_like(bodies.normals),
+        np.empty((pieces, 4)),
+        np.arange(pieces),
+    )
+
+
+def allocate_contacts(pieces: int) -> Contacts:
+    """Return the workspace of the contacts, twice the largest number in the plane."""
+    # Pieces and touching pairs make a planar graph: n pieces have fewer than 3 n pairs, and n more
+    # with the ground, at two points each
+    capacity = 16 * pieces + 16
+    return Contacts(
+        np.zeros((capacity, 2), dtype=np.int64),
+        np.zeros(capacity, dtype=np.int64),
+        np.zeros((capacity, 2)),
+        np.zeros((capacity, 2)),
+        np.zeros(capacity),
+        np.zeros((capacity, 2)),
+    )
+
+
+def allocate_stored_impulses(contacts: Contacts) -> StoredImpulses:
+    """Return an empty store of impulses, whose table is at most a quarter full."""
+    capacity = len(contacts.key)
+    return StoredImpulses(
+        np.zeros(capacity, dtype=np.int64),
+        np.zeros(capacity),
+        np.zeros((capacity, 2)),
+        np.full(1 << int(2 * capacity).bit_length(), -1, dtype=np.int64),
+    )
+
+
+@numba.njit(cache=True)
+def place_pieces(bodies, q, world):  # type: ignore
+    """Move the pieces to the poses of their bodies, and sort them along x."""
+    points, normals, boxes, _ = world
+    for piece in range(len(bodies.owner)):
+        # rotation about the centroid, then translation
+        body = bodies.owner[piece]
+        c, s = np.cos(q[body, 2]), np.sin(q[body, 2])
+        x, y = bodies.centre[body, 0] + q[body, 0], bodies.centre[body, 1] + q[body, 1]
+        box = boxes[piece]
+        box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
+        for k in range(bodies.piece_starts[piece], bodies.piece_starts[piece + 1]):
+            arm, normal = bodies.arms[k], bodies.normals[k]
+            points[k, 0] = x + c * arm[0] - s * arm[1]
+            points[k, 1] = y + s * arm[0] + c * arm[1]
+            normals[k, 0] = c * normal[0] - s * normal[1]
+            normals[k, 1] = s * normal[0] + c * normal[1]
+            # bounding box, for the sweep
+            box[0], box[1] = min(box[0], points[k, 0]), max(box[1], points[k, 0])
+            box[2], box[3] = min(box[2], points[k, 1]), max(box[3], points[k, 1])
+    _sort(world)
+
+
+@numba.njit(cache=True)
+def _sort(world):  # type: ignore
+    """Sort the pieces by their smallest x."""
+    order, boxes = world.order, world.boxes
+    # insertion sort is linear, since the order of the previous step is nearly right
+    for k in range(1, len(order)):
+        piece = order[k]
+        low = boxes[piece, 0]
+        place = k - 1
+        while place >= 0 and boxes[order[place], 0] > low:
+            order[place + 1] = order[place]
+            place -= 1
+        order[place + 1] = piece
+
+
+@numba.njit(cache=True)
+def find_contacts(bodies, world, contacts):  # type: ignore
+    """Find all contact points; return their number, or -1 where the workspace is too small."""
+    count, capacity = 0, len(contacts.key) - 4  # a pair and the ground add up to four points
+    order, boxes, margin = world.order, world.boxes, bodies.contact_gap
+    for k in range(len(order)):
+        one = order[k]
+        body = bodies.owner[one]
+        free = bodies.inverse_mass[body, 0] > 0.0
+        if free and boxes[one, 2] <= bodies.level + margin:
+            count = _touch_ground(bodies, world, one, contacts, count)
+        for later in range(k + 1, len(order)):
+            two = order[later]
+            # all further pieces begin beyond this one
+            if boxes[two, 0] > boxes[one, 1] + margin:
+                break
+            apart = boxes[one, 2] > boxes[two, 3] + margin or boxes[two, 2] > boxes[one, 3] + margin
+            other = bodies.owner[two]
+            # pieces of one body, and of two fixed bodies, have no contact
+            if not apart and body != other and (free or bodies.inverse_mass[other, 0] > 0.0):
+                count = _touch(bodies, world, min(one, two), max(one, two), contacts, count)
+            if count > capacity:
+                return -1
+    return count
+
+
+@numba.njit(cache=True)
+def _touch_ground(bodies, world, piece, contacts, count):  # type: ignore
+    """Add the outermost vertices of a piece that touch the ground, one or two."""
+    left, right = -1, -1
+    for k in range(bodies.piece_starts[piece], bodies.piece_starts[piece + 1]):
+        if world.points[k, 1] <= bodies.level + bodies.contact_gap:
+            if left < 0 or world.points[k, 0] < world.points[left, 0]:
+                left = k
+            if right < 0 or world.points[k, 0] > world.points[right, 0]:
+                right = k
+    pieces, ground = len(bodies.owner), len(bodies.mass)
+    for k in (left, right):
+        gap = world.points[k, 1] - bodies.level
+        # the normal points from the piece, the first body, to the ground, the second: downward
+        contacts.bodies[count, 0], contacts.bodies[count, 1] = bodies.owner[piece], ground
+        contacts.key[count] = piece * (pieces + 1) + pieces
+        contacts.point[count, 0], contacts.point[count, 1] = world.points[k, 0], bodies.level
+        contacts.normal[count, 0], contacts.normal[count, 1] = 0.0, -1.0
+        contacts.gap[count] = gap
+        count += 1
+        if left == right:
+            break
+    return count
+
+
+@numba.njit(cache=True)
+def _separation(bodies, world, one, two):  # type: ignore
+    """Return the largest separation of two pieces along normals of the first, and its edge."""
+    best, edge = -np.inf, -1
+    for k in range(bodies.piece_starts[one], bodies.piece_starts[one + 1]):
+        # distance of the nearest vertex of the second piece from the line of the edge
+        nx, ny = world.normals[k, 0], world.normals[k, 1]
+        nearest = np.inf
+        for j in range(bodies.piece_starts[two], bodies.piece_starts[two + 1]):
+            nearest = min(nearest, nx * world.points[j, 0] + ny * world.points[j, 1])
+        nearest -= nx * world.points[k, 0] + ny * world.points[k, 1]
+        # any separating edge ends the test, but only outer edges can be the reference
+        if nearest > bodies.contact_gap:
+            return nearest, k
+        if bodies.outer[k] and nearest > best:
+            best, edge = nearest, k
+    return best, edge
+
+
+@numba.njit(cache=True)
+def _touch(bodies, world, one, two, contacts, count):  # type: ignore
+    """Add the contact points of two pieces."""
+    here, edge = _separation(bodies, world, one, two)
+    if here > bodies.contact_gap:
+        return count
+    there, other = _separation(bodies, world, two, one)
+    if there > bodies.contact_gap:
+        return count
+    # the reference edge is that of the larger separation
+    if there > here:
+        return _clip(bodies, world, two, other, one, -1.0, contacts, count)
+    return _clip(bodies, world, one, edge, two, 1.0, contacts, count)
+
+
+@numba.njit(cache=True)
+def _next_vertex(bodies, piece, k):  # type: ignore
+    """Return the vertex after one of a piece."""
+    return k + 1 if k + 1 < bodies.piece_starts[piece + 1] else bodies.piece_starts[piece]
+
+
+@numba.njit(cache=True)
+def _clip(bodies, world, one, edge, two, sign, contacts, count):  # type: ignore
+    """Add the end points of the incident edge, clipped to the reference edge, that touch it."""
+    n, start = world.normals[edge], world.points[edge]
+    along = world.points[_next_vertex(bodies, one, edge)] - start
+    length = np.sqrt(along[0] ** 2 + along[1] ** 2)
+    # the incident edge has the normal most opposite to that of the reference edge
+    incident, lowest = -1, np.inf
+    for k in range(bodies.piece_starts[two], bodies.piece_starts[two + 1]):
+        facing = n[0] * world.normals[k, 0] + n[1] * world.normals[k, 1]
+        if bodies.outer[k] and facing < lowest:
+            incident, lowest = k, facing
+    # its ends in coordinates along (x) and away from (y) the reference edge
+    a, b = world.points[incident], world.points[_next_vertex(bodies, two, incident)]
+    tx, ty = along[0] / length, along[1] / length
+    xa = (a[0] - start[0]) * tx + (a[1] - start[1]) * ty
+    xb = (b[0] - start[0]) * tx + (b[1] - start[1]) * ty
+    ya = (a[0] - start[0]) * n[0] + (a[1] - start[1]) * n[1]
+    yb = (b[0] - start[0]) * n[0] + (b[1] - start[1]) * n[1]
+    low, high = max(0.0, min(xa, xb)), min(length, max(xa, xb))
+    if low > high:
+        return count
+    first, second = (one, two) if sign > 0.0 else (two, one)
+    for x in (low, high):
+        # gap by linear interpolation along the incident edge
+        y = ya if xb == xa else ya + (yb - ya) * (x - xa) / (xb - xa)
+        if y <= bodies.contact_gap:
+            contacts.bodies[count, 0] = bodies.owner[first]
+            contacts.bodies[count, 1] = bodies.owner[second]
+            contacts.key[count] = first * (len(bodies.owner) + 1) + second
+            # the contact point is midway between both edges
+            for axis in range(2):
+                t = tx if axis == 0 else ty
+                contacts.point[count, axis] = start[axis] + x * t + 0.5 * y * n[axis]
+                contacts.normal[count, axis] = sign * n[axis]
+            contacts.gap[count] = y
+            count += 1
+        if low == high:
+            break
+    return count
+
+
+@numba.njit(cache=True)
+def store_impulses(bodies, q, contacts, count, stored):  # type: ignore
+    """Store the impulses of a step."""
+    slots = stored.slots
+    slots[:] = -1
+    for k in range(count):
+        stored.key[k] = contacts.key[k]
+        stored.place[k] = _tangential_position(bodies, q, contacts, k)
+        stored.impulse[k] = contacts.impulse[k]
+        # open addressing: the next free slot after the hash
+        slot = _hash_slot(contacts.key[k], len(slots))
+        while slots[slot] >= 0:
+            slot = (slot + 1) % len(slots)
+        slots[slot] = k
+
+
+@numba.njit(cache=True)
+def restore_impulses(bodies, q, contacts, count, stored):  # type: ignore
+    """Set impulses to those of the nearest contacts of the same pieces, each used once."""
+    slots = stored.slots
+    for k in range(count):
+        contacts.impulse[k] = 0.0
+        place, best, nearest = _tangential_position(bodies, q, contacts, k), -1, np.inf
+        slot = _hash_slot(contacts.key[k], len(slots))
+        # up to two contacts of a pair share a chain of slots
+        while slots[slot] >= 0:
+            old = slots[slot]
+            distance = abs(stored.place[old] - place)
+            if stored.key[old] == contacts.key[k] and distance < nearest:
+                best, nearest = old, distance
+            slot = (slot + 1) % len(slots)
+        if best >= 0:
+            contacts.impulse[k] = stored.impulse[best]
+            stored.key[best] = -1
+
+
+@numba.njit(cache=True)
+def _hash_slot(key, size):  # type: ignore
+    """Return the first slot of a key, by multiplicative hashing."""
+    # the multiplier is 2³² over the golden ratio
+    return ((key * 0x9E3779B1) >> 16) & (size - 1)
+
+
+@numba.njit(cache=True)
+def _tangential_position(bodies, q, contacts, k):  # type: ignore
+    """Return the position of a contact along its tangent, from the first body's centroid [m]."""
+    body = contacts.bodies[k, 0]
+    rx = contacts.point[k, 0] - bodies.centre[body, 0] - q[body, 0]
+    ry = contacts.point[k, 1] - bodies.centre[body, 1] - q[body, 1]
+    return ry * contacts.normal[k, 0] - rx * contacts.normal[k, 1]

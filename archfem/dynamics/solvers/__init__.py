@@ -1,0 +1,27 @@
+"""Solvers of time steps, which all give the history of equilibrium solves by SNES.
+
+`equation` is the equation of motion; `snes` solves it step by step. `integrator` takes many steps
+at a time in the compiled loop of `base` by one of two solvers, which `selection` selects by a rule,
+and SNES takes the steps at which they fail.
+
+    equation           equation of motion, its damping and time discretisation
+    snes               every scheme, step by step by PETSc's SNES
+    integrator         batches of steps by a solver, with fall-back to SNES or shorter steps
+    adaptive           steps of a length that an error controls
+    selection          rule that selects a solver
+    base               protocol of a solver, and the compiled loop over steps
+    newmark            formulas of all schemes
+    joint_law          gaps of the joints, and forces released as they open and slide
+    linear_step        step of a structure that is linear but for its joints
+    newton             solver "newton": Newton's method on all coordinates
+    band_lu            its factor where the tangent is a narrow band
+    compliance         solver "compliance": one sparse factor, and unknowns in active joint rows
+    active_rows        their dense problem
+    active_compliance  its matrix and workspace
+    supernodal_lu      sparse factors in dense panels
+    sparse_products    products of sparse matrices
+"""
+
+from archfem import _numba
+
+_numba.prepare_cache()

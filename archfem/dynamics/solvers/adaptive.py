@@ -1,0 +1,133 @@
+"""Steps of adaptive length, controlled by an error in the eccentricity of the joints.
+
+The mean force over a step is its value at the middle, but for ¹/₂₄ Δt² of its curvature in time. So
+the second difference of the resultants from step to step estimates the error, at no cost. It is
+taken of M / (N h), with N at least half of that under dead load; the worst joint of rings and piers
+counts. Steps with too large an error are repeated at half the length; where the error is small the
+length is doubled. Lengths are those of the record, halved or doubled: steps end between two samples
+only if they are shorter than these are apart.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem.dynamics.solvers.integrator import Stepper
+from archfem.dynamics.state import Batch, State
+
+# Lengths that are not halved, and not doubled, any more [s]
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 2e-2
+
+# Steps between two checks of the error
+STEPS_PER_CHECK = 32
+
+# Least compression of joints in the error, relative to dead load [-]
+MIN_COMPRESSION = 0.5
+
+
+@dataclass(eq=False)
+class AdaptiveStepper:
+    """Steps of adaptive length by a stepper."""
+
+    stepper: Stepper
+    tolerance: float  # of |e| of every joint of rings and piers [-]
+    first: Batch  # the start, as a batch of one
+    unmet: int = 0  # shortest steps so far with a larger error
+    taken: int = 0  # steps so far
+    _last: list[tuple[float, Array]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        structure = self.stepper.equation.model.structure
+        judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
+        self._judged, self._depths = np.flatnonzero(judged), structure.depths[judged]
+        rest = self.first.resultants[0, self._judged, 0]
+        self._least = MIN_COMPRESSION * np.maximum(rest, MIN_COMPRESSION * np.mean(np.abs(rest)))
+
+    @property
+    def unmet_share(self) -> float:
+        """Share of the steps whose error exceeds the tolerance at the shortest length."""
+        return self.unmet / max(self.taken, 1)
+
+    def batches(self, start: State, end: float) -> Iterator[Batch]:
+        """Yield the steps from a state to a time [s], some at a time."""
+        sample = self.stepper.equation.motion.dt
+        finest = int(np.floor(np.log2(SHORTEST_STEP / sample) + 0.5))
+        coarsest = max(int(np.floor(np.log2(LONGEST_STEP / sample))), finest)
+        tick, level, done = sample * 2.0**finest, 0, 0
+        level = min(max(-finest - 1, 0), coarsest - finest)
+        total, state = round((end - start.time) / tick), start
+        while done < total:
+            while level > 0 and (done % 2**level or done + 2**level > total):
+                level -= 1
+            count = min(STEPS_PER_CHECK, (total - done) // 2**level)
+            ends = start.time + tick * (done + 2**level * np.arange(1, count + 1))
+            batch, worst = self._tried(state, tick * 2**level, ends, level == 0)
+            if batch is None:
+                level -= 1
+                continue
+            done += 2**level * len(batch.times)
+            state = batch.state(len(batch.times) - 1)
+            yield batch
+            if len(batch.times) < count and level > 0:
+                level -= 1
+            elif worst < 0.1 * self.tolerance and level < coarsest - finest:
+                level += 1
+
+    def _tried(
+        self, state: State, dt: float, ends: Array, last: bool
+    ) -> tuple[Batch | None, float]:
+        """Return the steps before the first with too large an error, and their largest error.
+
+        All are returned if they are the `last`, which cannot be shorter; None without any.
+        """
+        batch = self._taken(state, dt, ends, last)
+        if batch is None:
+            return None, np.inf
+        errors = self._errors(batch)
+        good = len(errors) if last else int(np.argmax(np.append(errors, np.inf) > self.tolerance))
+        if good == 0:
+            return None, np.inf
+        self.taken += good
+        self.unmet += int(np.sum(errors[:good] > self.tolerance))
+        middles = batch.times - 0.5 * dt
+        scaled = self._scaled(batch.resultants[max(good - 2, 0) : good])
+        self._last += list(zip(middles[max(good - 2, 0) : good], scaled, strict=True))
+        self._last = self._last[-2:]
+        return batch.cut(good), float(errors[:good].max())
+
+    def _taken(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
+        """Return steps by the solver, or a fall-back step; None where shorter ones may converge."""
+        stepper = self.stepper
+        if stepper.solver is not None:
+            batch = stepper.advance_batch(state, dt, ends)
+            if len(batch.times):
+                return batch
+            if not last:
+                return None
+            return replace(stepper.fallback_step(state, dt), times=ends[:1])
+        (batch,) = stepper.exact.batches(state, dt, state.time + dt)
+        return replace(batch, times=ends[:1])
+
+    def _scaled(self, resultants: Array) -> Array:
+        """Return M / (N h) of the joints of rings and piers (steps, joints)."""
+        normal, moment = resultants[:, self._judged, 0], resultants[:, self._judged, 2]
+        e: Array = moment / (np.maximum(normal, self._least) * self._depths)
+        return e
+
+    def _errors(self, batch: Batch) -> Array:
+        """Return the error of each step in |e| of the worst joint (steps,)."""
+        dt = batch.smallest_step[0]
+        middles = batch.times - 0.5 * dt
+        before, values = self._last, self._scaled(batch.resultants)
+        times = np.append([time for time, _ in before], middles)
+        values = np.concatenate([*(value[None] for _, value in before), values])
+        errors = np.zeros(len(times))
+        if len(times) > 2:
+            slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+            # the second difference is 2 to 30 times the error of the largest |e| in the rings,
+            # columns and bridge examined
+            bends = 2.0 * np.diff(slopes, axis=0) / (times[2:] - times[:-2])[:, None]
+            errors[2:] = dt**2 * np.abs(bends).max(axis=1) / 6.0
+        return errors[len(before) :]

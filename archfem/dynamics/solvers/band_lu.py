@@ -1,0 +1,126 @@
+"""A tangent in a band: assembled from the rates of the joints, factorised with row exchanges.
+
+Row i of a band of half-width b holds columns i - b … i + 2 b of a matrix, as row exchanges fill b
+more to the right. Rows overlap in memory by their shift, so that column j of row i lies at
+b + i (w - 1) + j, w entries a row: loops then run over columns of the matrix itself.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from archfem._numba import kernel, summing_kernel, view_kernel
+from archfem._typing import Array
+
+Indices = NDArray[np.int64]
+
+
+class Band(NamedTuple):
+    """A matrix of which some entries change, as a band, and its factor."""
+
+    half: int  # half-width b
+    base: Array  # entries without changes (n w,)
+    entries: Array  # of the matrix, then of its triangles, pivots inverted (n w,)
+    pivots: Indices  # row with which each was exchanged, and entries right of it (2, n)
+
+
+def band_of(matrix: sparse.csr_matrix, half: int) -> Band:
+    """Return a matrix as a band of at least its own half-width."""
+    entries, size = matrix.tocoo(), matrix.shape[0]
+    base = np.zeros(size * (3 * half + 1))
+    band = Band(half, base, np.zeros_like(base), np.zeros((2, size), np.int64))
+    base[band_places(band, entries.row, entries.col)] = entries.data
+    band.entries[:] = base
+    return band
+
+
+def band_places(band: Band, rows: Any, columns: Any) -> Indices:
+    """Return which entry belongs to each row and column (k,)."""
+    return np.asarray(band.half + 3 * band.half * rows + columns)
+
+
+def half_width(matrix: sparse.csr_matrix) -> int:
+    """Return the half-width of a sparse matrix in its order."""
+    entries = matrix.tocoo()
+    return int(np.abs(entries.row - entries.col).max(initial=0))
+
+
+def narrow_order(pattern: sparse.csr_matrix) -> tuple[Any, int]:
+    """Return the order of coordinates with the narrower band, and its half-width."""
+    natural = np.arange(pattern.shape[0])
+    orders = natural, reverse_cuthill_mckee(pattern, symmetric_mode=True)
+    widths = [half_width(pattern[order][:, order]) for order in orders]
+    best = int(np.argmin(widths))
+    return orders[best], widths[best]
+
+
+@view_kernel
+def _rows(band):  # type: ignore
+    """Return the band such that indices are those of the matrix; columns exceed the shape."""
+    half, size = band.half, band.pivots.shape[1]
+    return band.entries[half : half + 3 * half * size].reshape((size, 3 * half))
+
+
+@summing_kernel
+def factorise_band(band):  # type: ignore
+    """Factorise the matrix in `entries` in place; returns whether it is regular."""
+    matrix, half, size = _rows(band), band.half, band.pivots.shape[1]
+    far = 0  # last column in which any row so far has an entry
+    for k in range(size):
+        last = min(k + half, size - 1)
+        pivot = _choose_pivot(matrix, k, last)
+        if pivot < 0:
+            return False
+        if pivot != k:
+            for j in range(k, min(k + 2 * half, size - 1) + 1):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        far = min(max(far, pivot + half), size - 1)
+        band.pivots[0, k], band.pivots[1, k] = pivot, far
+        inverse = 1.0 / matrix[k, k]
+        matrix[k, k] = inverse
+        for i in range(k + 1, last + 1):
+            multiplier = matrix[i, k] * inverse
+            matrix[i, k] = multiplier
+            if multiplier != 0.0:
+                for j in range(k + 1, far + 1):
+                    matrix[i, j] -= multiplier * matrix[k, j]
+    return True
+
+
+@kernel
+def _choose_pivot(matrix, k, last):  # type: ignore
+    """Return the row to become row k, -1 if its column is zero.
+
+    Threshold pivoting: the diagonal serves unless it is below a tenth of the largest entry, as
+    exchanges widen the band and inertia makes the diagonal large.
+    """
+    pivot, own = k, abs(matrix[k, k])
+    largest = own
+    for i in range(k + 1, last + 1):
+        if abs(matrix[i, k]) > largest:
+            pivot, largest = i, abs(matrix[i, k])
+    if not 0.0 < largest < np.inf:
+        return -1
+    return k if own >= 0.1 * largest else pivot
+
+
+@summing_kernel
+def solve_band(band, vector):  # type: ignore
+    """Solve in place by the factor."""
+    matrix, half, size = _rows(band), band.half, len(vector)
+    for k in range(size):
+        # row exchanges are interleaved with the elimination, as they were in the factor
+        pivot = band.pivots[0, k]
+        if pivot != k:
+            vector[k], vector[pivot] = vector[pivot], vector[k]
+        value = vector[k]
+        for i in range(k + 1, min(k + half, size - 1) + 1):
+            vector[i] -= matrix[i, k] * value
+    for k in range(size - 1, -1, -1):
+        value = vector[k]
+        for j in range(k + 1, band.pivots[1, k] + 1):
+            value -= matrix[k, j] * vector[j]
+        vector[k] = value * matrix[k, k]

@@ -1,0 +1,80 @@
+"""The protocol of a solver of time steps, and the one compiled loop over steps.
+
+A solver's system is a NamedTuple. For its type `start_run`, `solve_step` and `evaluate_step` are
+overloaded (`numba.extending.overload`), and numba picks them when it compiles `advance`. The loop
+itself has no matrices and no joints, so that only the code of the solver at hand is compiled. It
+makes no arrays: a system contains its workspace.
+"""
+
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+from numpy.typing import NDArray
+
+from archfem._numba import delete_stale_cache, entry
+from archfem.dynamics.solvers.equation import Equation
+
+# Iterations over the joints in a step before it is given up
+MAX_ITERATIONS = 40
+
+
+class StepSolver(Protocol):
+    """A compiled solver of time steps, whose history equals that of `SnesSolver` to rounding.
+
+    A further solver provides this class, and for the type of its systems overloads of `start_run`,
+    `solve_step` and `evaluate_step`. A structure that is linear but for its joints needs only an
+    overload of `linear_step.solve_contact`, and a field `linear` in its system.
+    """
+
+    name: ClassVar[str]  # value of `method=` that selects it
+    order: NDArray[Any]  # coordinates of the model in the order of the solver's vectors (n,)
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """Return the solver for an equation of motion, or None where it does not apply."""
+
+    def system(self, dt: float) -> NamedTuple:
+        """Return the data of steps of one length [s] for the compiled loop."""
+
+    def copy_system(self, system: Any) -> Any:
+        """Return a copy of the data for another run, of which no step has been taken."""
+
+
+def start_run(system: Any, state: Any, memory: Any) -> None:
+    """Fill the workspace of a system from a state (3, n) and the joints' memory; overloaded."""
+    raise NotImplementedError
+
+
+def solve_step(system: Any, step: Any, states: Any, ground: Any) -> Any:
+    """Solve for the state at the end of a step; overloaded."""
+    raise NotImplementedError
+
+
+def evaluate_step(
+    system: Any, step: Any, states: Any, ground: Any, results: Any, memory: Any
+) -> Any:
+    """Evaluate resultants, energies and memory of a step that has converged; overloaded."""
+    raise NotImplementedError
+
+
+delete_stale_cache(Path(__file__).parent, Path(__file__).parents[2] / "joints" / "moving")
+
+
+@entry
+def advance(series, memories, results, ground, system):  # type: ignore
+    """Take steps until the end, or until one does not converge; returns how many were taken."""
+    resultants, iterations, energies = results
+    start_run(system, series[0], memories[0])
+    for step in range(len(resultants)):
+        states = series[step : step + 2]
+        iterations[step] = solve_step(system, step, states, ground[0, step])
+        if iterations[step] < 0:
+            return step
+        filled = resultants[step], energies[step]
+        evaluate_step(system, step, states, ground[1, step], filled, memories[step + 1])
+    return len(resultants)
+
+
+def is_system(system: Any, kind: type) -> bool:
+    """Return whether numba types a system as a kind of NamedTuple."""
+    return getattr(system, "instance_class", None) is kind

@@ -1,0 +1,412 @@
+"""A step of a structure that is linear but for its joints: small displacements.
+
+With w = u + β v the contact displacement where the equation of a step is written, C = α M + R,
+
+    (K + μ M + ν R) w = p + M y + R x + Gᵀ λ,    z = G w + z₀,    λ = λ(z),
+
+K with all joints closed and stuck, y and x from the state before, λ the released forces
+(`joint_law`). A solver overloads `solve_contact`. The rest is common to all: images of the state
+under M, K and R follow by Newmark's formulas and give energies without further products.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+from scipy import sparse
+
+from archfem._numba import KERNEL_OPTIONS, kernel, summing_kernel
+from archfem._typing import Array
+from archfem.dynamics.solvers.base import evaluate_step, solve_step, start_run
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.joint_law import (
+    GUESS,
+    OFFSET,
+    SPEED,
+    START,
+    JointLaw,
+    between,
+    collect_released,
+    evaluate_openings,
+    evaluate_slips,
+    joint_law,
+    open_forces,
+)
+from archfem.dynamics.solvers.newmark import StepNumbers, add_combination, update_images
+from archfem.dynamics.solvers.sparse_products import (
+    SparseRows,
+    add_rows,
+    multiply,
+    sparse_rows,
+    without_round_off,
+)
+from archfem.joints.large.overlap_law import facet_means, point_means
+
+
+class LinearSystem(NamedTuple):
+    """A structure that is linear but for its joints, coordinates in the order of a solver."""
+
+    mass: SparseRows  # M
+    closed: SparseRows  # K, with all joints closed and stuck
+    rest: SparseRows  # R, the part of C not proportional to M; may have no entries
+    gaps: SparseRows  # G, rows of openings and slips (r, n)
+    shear: SparseRows  # shear resultants of joints that cannot slide (n_joints, n), else no rows
+    weight: Array  # forces of gravity, and of joints in the undisplaced structure (n,)
+    body: Array  # forces per unit ground acceleration (2, n)
+    numbers: StepNumbers
+    law: JointLaw
+    places: Any  # numbers of all rows, whose begin are those of all segments, too (r,)
+
+
+# Rows of the workspace: z, z of the step before, λ, gaps at the end of a step and where the law of
+# an instant sees them there, and scratch.
+Z, Z_BEFORE, LAMBDA, Z_END, Z_SEEN, SPARE = range(6)
+
+# Vectors of the workspace: w, the right side of a step, and the product of a matrix and w.
+W, RIGHT_SIDE, PRODUCT = range(3)
+
+
+class LinearStepWorkspace(NamedTuple):
+    """Arrays that persist from step to step; the ends of a step alternate in `images`."""
+
+    images: Array  # of u, v and a under M, K and R (2, 3, 3, n)
+    rows: Array  # of gaps, as named above (6, r)
+    vectors: Array  # of coordinates, as named above (3, n)
+    released: Array  # by openings at an instant, and how much more with the lag (2, o)
+
+
+class JointRows(NamedTuple):
+    """Rows of gaps, shear resultants of joints that cannot slide, loads, law and its pairs."""
+
+    gaps: sparse.csr_matrix
+    shear: sparse.csr_matrix
+    weight: Array
+    law: JointLaw
+    pairs: Any
+
+
+def tangent_pattern(equation: Equation) -> sparse.csr_matrix:
+    """Return a matrix with all entries that the tangent may have."""
+    model = equation.model
+    if equation.joints is None:  # entries that are zero now are not, once blocks have turned
+        return model.closed_tangent()
+    parts = (model.mass, model.closed_tangent(), equation.rest)
+    pattern = sum(abs(without_round_off(part)) for part in parts)
+    # joints couple what moves a released force with what moves the gaps it depends on
+    rows = joint_rows(equation, 1.0)
+    touched, pairs = abs(without_round_off(rows.gaps)), rows.pairs
+    coupled = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), 2 * (touched.shape[0],))
+    return sparse.csr_matrix(pattern + touched.T @ (coupled + coupled.T) @ touched)
+
+
+def joint_rows(equation: Equation, dt: float) -> JointRows:
+    """Return gaps, loads and law of the joints for steps of one length."""
+    joints = equation.joints
+    assert joints is not None
+    law, rows, pairs = joint_law(joints, equation.numbers(dt), dt, equation.conserving)
+    shear, weight = joints.shear_resultants(), equation.weight
+    if joints.gap_offset is not None:
+        weight = weight - joints.generalised_force(*joints.closed_forces(joints.gap_offset))
+    # shear of joints that can slide is summed up point by point instead
+    return JointRows(rows, shear[:0] if joints.slides else shear, weight, law, pairs)
+
+
+def linear_system(equation: Equation, order: NDArray[Any], dt: float) -> LinearSystem:
+    """Return the matrices of an equation of motion by rows, its coordinates in another order."""
+    model, rows = equation.model, joint_rows(equation, dt)
+    mass, closed, rest = (
+        sparse_rows(without_round_off(matrix[order][:, order]))
+        for matrix in (model.mass, model.closed_tangent(), equation.rest)
+    )
+    gaps, shear = (
+        sparse_rows(without_round_off(each[:, order])) for each in (rows.gaps, rows.shear)
+    )
+    places = np.arange(len(rows.law.stiffness))
+    body, numbers = np.ascontiguousarray(model.mass_influence[order].T), equation.numbers(dt)
+    weight = rows.weight[order]
+    return LinearSystem(mass, closed, rest, gaps, shear, weight, body, numbers, rows.law, places)
+
+
+def effective_matrix(equation: Equation, order: NDArray[Any], dt: float) -> sparse.csr_matrix:
+    """Return K + μ M + ν R, with all joints closed and stuck (n, n)."""
+    model, numbers = equation.model, equation.numbers(dt)
+    parts = (
+        without_round_off(each) for each in (model.closed_tangent(), model.mass, equation.rest)
+    )
+    closed, mass, rest = parts
+    return (closed + numbers.inertia * mass + numbers.rate * rest)[order][:, order].tocsr()
+
+
+def linear_workspace(linear: LinearSystem) -> LinearStepWorkspace:
+    """Allocate the workspace of runs."""
+    size, rows = len(linear.weight), linear.law.rows.shape[1]
+    released = np.zeros((2, linear.law.openings))
+    return LinearStepWorkspace(
+        np.zeros((2, 3, 3, size)), np.zeros((6, rows)), np.zeros((3, size)), released
+    )
+
+
+def solve_contact(system: Any) -> Any:
+    """Solve a step for w, z and λ in the workspace of a system from its right side; overloaded."""
+    raise NotImplementedError
+
+
+def _is_linear(system: Any) -> bool:
+    """Return whether numba types a system as one with a field `linear`."""
+    return "linear" in getattr(system, "fields", ())
+
+
+@overload(start_run, jit_options=KERNEL_OPTIONS)
+def _start_run(system, state, memory):  # type: ignore
+    return _start_linear_run if _is_linear(system) else None
+
+
+@overload(solve_step, jit_options=KERNEL_OPTIONS)
+def _solve_step(system, step, states, ground):  # type: ignore
+    return _solve_linear_step if _is_linear(system) else None
+
+
+@overload(evaluate_step, jit_options=KERNEL_OPTIONS)
+def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
+    return _evaluate_linear_step if _is_linear(system) else None
+
+
+def _start_linear_run(system, state, memory):  # type: ignore
+    """Fill the workspace with images and gaps of a state, and the memory of the joints."""
+    linear, law, images, values = (
+        system.linear,
+        system.linear.law,
+        system.work.images,
+        system.work.rows,
+    )
+    lag, released, start, speed = (
+        linear.numbers.lag,
+        system.work.released,
+        law.rows[START],
+        law.rows[SPEED],
+    )
+    for k in range(3):
+        multiply(linear.mass, state[k], images[0, 0, k])
+        multiply(linear.closed, state[k], images[0, 1, k])
+        multiply(linear.rest, state[k], images[0, 2, k])
+    # gaps and their rates
+    multiply(linear.gaps, state[0], start)
+    multiply(linear.gaps, state[1], speed)
+    for point in range(len(memory)):
+        law.points[point].slip = memory[point]
+    for row in range(len(start)):
+        start[row] += law.rows[OFFSET, row]
+        # at an instant the law sees gaps ahead by the lag of damping
+        values[Z, row] = start[row] + (lag * speed[row] if law.gain == 0.0 else 0.0)
+        speed[row] *= 2.0 / linear.numbers.velocity[1]
+        values[Z_BEFORE, row] = values[Z, row] - (speed[row] if law.gain > 0.0 else 0.0)
+        values[LAMBDA, row] = 0.0
+    if law.gain == 0.0:
+        force = values[LAMBDA][: law.openings]
+        open_forces(law, values[Z], force)
+        open_forces(law, start, released[0])
+        for row in range(law.openings):
+            released[1, row] = force[row] - released[0, row]
+
+
+def _solve_linear_step(system, step, states, ground):  # type: ignore
+    """Solve a step and update state and images."""
+    linear, work, numbers = system.linear, system.work, system.linear.numbers
+    old, new, right = work.images[step % 2], work.images[(step + 1) % 2], work.vectors[RIGHT_SIDE]
+    # right side: gravity and ground, inertia, damping, and joints that slid before the step
+    for k in range(len(right)):
+        ground_force = ground[0] * linear.body[0, k] + ground[1] * linear.body[1, k]
+        right[k] = linear.weight[k] - ground_force
+    add_combination(right, old[0], numbers.inertia_load)
+    if len(linear.rest[2]) > 0:
+        add_combination(right, old[2], numbers.damping_load)
+    _add_irreversible_slips(linear.law, linear.gaps, right)
+    iterations = solve_contact(system)
+    if iterations > 0:
+        _update_images(linear, work, (old, new))
+        update_images(work.vectors[W], states[0], states[1], numbers)
+    return iterations
+
+
+@kernel
+def _add_irreversible_slips(law, gaps, right):  # type: ignore
+    """Add forces k s of irreversible slips before the step: stuck joints act about these."""
+    indptr, indices, data = gaps
+    for k in range(len(law.points)):
+        point = law.points[k]
+        if point.slip_row >= 0 and point.slip != 0.0:
+            for entry in range(indptr[point.slip_row], indptr[point.slip_row + 1]):
+                right[indices[entry]] += data[entry] * point.shear * point.slip
+
+
+@kernel
+def _update_images(linear, work, ends):  # type: ignore
+    """Update the images of the state after a step; K w follows from the balance of the step."""
+    (old, new), numbers = ends, linear.numbers
+    right, image = work.vectors[RIGHT_SIDE], work.vectors[PRODUCT]
+    add_rows(linear.gaps, work.rows[LAMBDA], right)
+    multiply(linear.mass, work.vectors[W], image)
+    update_images(image, old[0], new[0], numbers)
+    for k in range(len(right)):
+        right[k] -= numbers.inertia * image[k]
+    if len(linear.rest[2]) > 0:
+        multiply(linear.rest, work.vectors[W], image)
+        update_images(image, old[2], new[2], numbers)
+        for k in range(len(right)):
+            right[k] -= numbers.rate * image[k]
+    update_images(right, old[1], new[1], numbers)
+
+
+def _evaluate_linear_step(system, step, states, ground, results, memory):  # type: ignore
+    """Evaluate resultants, energies and memory of a step."""
+    linear, law, work, (resultants, energy) = system.linear, system.linear.law, system.work, results
+    images = work.images[step % 2], work.images[(step + 1) % 2]
+    if law.gain == 0.0:
+        _gaps_at_end(linear, work, states[1])
+    _sum_resultants(law, linear.shear, work.vectors[W], resultants)
+    loads = linear.weight, linear.body[0], linear.body[1]
+    damping = linear.numbers.drag, linear.numbers.lag
+    _closed_energies(states, images, loads, damping, ground, energy)
+    if law.gain == 0.0:
+        _instant_energies(law, linear.numbers.lag, work.rows, work.released, energy)
+    else:
+        _path_energies(law, work.rows[Z], energy, memory)
+        open_forces(law, law.rows[START], work.released[0])
+    # elastic energy that open joints do not store
+    for row in range(work.released.shape[1]):
+        energy[1] -= 0.5 * law.rows[START, row] * work.released[0, row]
+
+
+@kernel
+def _gaps_at_end(linear, work, state):  # type: ignore
+    """Find the gaps at the end of a step, and forces where the law of an instant sees them."""
+    law, numbers, now, seen = linear.law, linear.numbers, work.rows[Z_END], work.rows[Z_SEEN]
+    multiply(linear.gaps, state[0], now)
+    if numbers.share == 1.0:
+        for row in range(len(seen)):
+            seen[row] = work.rows[Z, row]
+    else:  # HHT writes the equation before the end: evaluate the joints there
+        multiply(linear.gaps, state[1], seen)
+        for row in range(len(seen)):
+            seen[row] = now[row] + numbers.lag * seen[row]
+        for k in range(len(work.vectors[W])):
+            work.vectors[W, k] = state[0, k] + numbers.lag * state[1, k]
+        evaluate_openings(law, seen, linear.places[: len(law.segments)])
+
+
+@kernel
+def _sum_resultants(law, shear, contact, resultants):  # type: ignore
+    """Sum up N, V, M of every joint from the forces of its points."""
+    for joint in range(len(resultants)):
+        resultants[joint, 0] = resultants[joint, 1] = resultants[joint, 2] = 0.0
+        if len(shear[0]) > 1:
+            for entry in range(shear[0][joint], shear[0][joint + 1]):
+                resultants[joint, 1] += shear[2][entry] * contact[shear[1][entry]]
+    for k in range(len(law.points)):
+        point, state = law.points[k], law.point_states[k]
+        resultants[point.joint, 0] -= state.normal
+        resultants[point.joint, 2] -= state.normal * point.lever
+        if point.slip_row >= 0:
+            resultants[point.joint, 1] += state.shear
+
+
+@summing_kernel
+def _closed_energies(states, images, loads, damping, ground, energy):  # type: ignore
+    """Evaluate energies of a step as if all joints were closed and stuck, from the images."""
+    (old, new), (weight, across, up), (drag, lag) = images, loads, damping
+    before, u, v = states[0, 0], states[1, 0], states[1, 1]
+    kinetic, potential, work, lost = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(u)):
+        moved = u[k] - before[k]
+        # ½ v·M v; ½ u·K u - u·p; work of the ground; damping by mass, by K and by R
+        kinetic += 0.5 * v[k] * new[0, 1, k]
+        potential += u[k] * (0.5 * new[1, 0, k] - weight[k])
+        work -= moved * (ground[0] * across[k] + ground[1] * up[k])
+        viscous = drag * (old[0, 1, k] + new[0, 1, k])
+        viscous += lag * (old[1, 1, k] + new[1, 1, k]) + old[2, 1, k] + new[2, 1, k]
+        lost += 0.5 * moved * viscous
+    energy[0], energy[1], energy[2], energy[3] = kinetic, potential, work, lost
+
+
+@kernel
+def _instant_energies(law, lag, rows, released, energy):  # type: ignore
+    """Subtract damping that open joints do not provide, by the trapezoidal rule."""
+    now, force, late = rows[Z_END], rows[SPARE][: law.openings], released[1]
+    open_forces(law, now, released[0])
+    if lag > 0.0:
+        # how much more is released where the law sees the joints than at the gaps themselves
+        open_forces(law, rows[Z_SEEN], force)
+        for row in range(len(late)):
+            more = force[row] - released[0, row]
+            energy[3] -= 0.5 * (now[row] - law.rows[START, row]) * (late[row] + more)
+            late[row] = more
+    for row in range(len(now)):
+        law.rows[START, row] = now[row]
+
+
+@kernel
+def _path_energies(law, gap, energy, memory):  # type: ignore
+    """Add dissipation of the joints over their path, and go to the start of the next step.
+
+    Energies are as if joints held tension and were stuck: what open ones do not damp is subtracted,
+    and what friction dissipates is added.
+    """
+    start, speed, gain = law.rows[START], law.rows[SPEED], law.gain
+    if law.damping_lag > 0.0:
+        energy[3] += _open_damping(law, gap)
+        for point in law.points:
+            if point.slip_row >= 0:
+                slip = gain * (gap[point.slip_row] - start[point.slip_row])
+                energy[3] -= law.damping_lag * point.shear * slip**2
+    for row in range(len(start)):
+        # the midpoint rule: gaps and rates at the end of the step
+        moved = gain * (gap[row] - start[row])
+        start[row] += moved
+        speed[row] = 2.0 * moved - speed[row]
+    for k in range(len(law.points)):
+        point, state = law.points[k], law.point_states[k]
+        if point.slip_row >= 0:
+            energy[3] += state.lost
+            point.slip += state.slip
+            memory[k] = point.slip
+            # elastic energy of the slip, instead of that of a stuck point
+            elastic, slip = start[point.slip_row] - point.slip, start[point.slip_row]
+            energy[1] += 0.5 * point.shear * (elastic**2 - slip**2)
+    energy[1] += law.stored
+
+
+@kernel
+def _open_damping(law, gap):  # type: ignore
+    """Return the energy dissipated by the lag on openings, less that of closed joints [J]."""
+    start, points, lost = law.rows[START], law.points, 0.0
+    for number in range(len(law.segments)):
+        part, state = law.segments[number], law.segment_states[number]
+        first = start[part.near], start[part.far]
+        moved = law.gain * (gap[part.near] - first[0]), law.gain * (gap[part.far] - first[1])
+        last = first[0] + moved[0], first[1] + moved[1]
+        # work of the released forces, which contain the lag ...
+        lost -= moved[0] * state.near + moved[1] * state.far
+        if max(first[0], first[1], last[0], last[1]) <= 0.0:
+            continue
+        # ... less that of the same forces without lag
+        for point in range(part.begin, part.end):
+            stiffness, share = points[point].stiffness, points[point].share
+            a, b, change = between(first, share), between(last, share), between(moved, share)
+            if not law.facets:
+                lost += change * stiffness * point_means(a, b, 0.0, 0.0)[1]
+            elif point % 2 == 0:
+                other = points[point + 1].share
+                ends = (a, between(first, other), b, between(last, other))
+                opened = facet_means(ends, 0.0, 0.0)[1]
+                lost += stiffness * (change * opened[0] + between(moved, other) * opened[1])
+    return lost
+
+
+@kernel
+def evaluate_released(law, places, released):  # type: ignore
+    """Evaluate the released forces of all rows at the guess of z."""
+    segments, slips = places[: len(law.segments)], places[law.openings :]
+    evaluate_openings(law, law.rows[GUESS], segments)
+    evaluate_slips(law, law.rows[GUESS], slips)
+    collect_released(law, (places, segments, slips), released)

@@ -1,0 +1,655 @@
+"""Solver "newton": Newton's method on the whole structure, for small and large displacements.
+
+One driver serves both: an initial guess, the assembled tangent, points that reverse their slip held
+once, and a line search. The tangent is a band where coordinates can be ordered so (`band_lu`), else
+it is sparse (`supernodal_lu`). Small displacements (`linear_step`) solve in every iteration
+
+    (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
+
+the residual is the difference of λ(z) from the λ that w is in balance with. Large displacements
+solve for Δq, with f̄ the mean force of the joints over the step (`joints.moving`),
+
+    (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
+"""
+
+import itertools
+from copy import deepcopy
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from numba.extending import overload
+from scipy import sparse
+
+from archfem._numba import KERNEL_OPTIONS, kernel, summing_kernel
+from archfem._typing import Array
+from archfem.dynamics.solvers.band_lu import (
+    Band,
+    band_of,
+    band_places,
+    factorise_band,
+    narrow_order,
+    solve_band,
+)
+from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.joint_law import (
+    GUESS,
+    OFFSET,
+    collect_derivatives,
+    largest_force,
+    predict_gaps,
+)
+from archfem.dynamics.solvers.linear_step import (
+    LAMBDA,
+    RIGHT_SIDE,
+    Z_BEFORE,
+    LinearStepWorkspace,
+    LinearSystem,
+    W,
+    Z,
+    effective_matrix,
+    evaluate_released,
+    joint_rows,
+    linear_system,
+    linear_workspace,
+    solve_contact,
+    tangent_pattern,
+)
+from archfem.dynamics.solvers.sparse_products import (
+    SparseRows,
+    add_rows,
+    row_times,
+    sparse_rows,
+    without_round_off,
+)
+from archfem.dynamics.solvers.supernodal_lu import (
+    Elimination,
+    Indices,
+    eliminate,
+    panel_places,
+    panels_of,
+    solve_panels,
+)
+from archfem.joints.large.forces import (
+    JointStepForces,
+    LargeDisplacementJoints,
+    allocate_step_forces,
+    compute_step_forces,
+    joint_energy,
+)
+from archfem.joints.large.rates import assemble_rates, find_rate_pairs
+
+
+class Tolerances(NamedTuple):
+    """When iterations end."""
+
+    residual: float  # largest residual [N]
+    stalled: float  # the same where it does not fall any more, by rounding [N]
+    round_off: float  # correction that changes nothing [m]
+    rounded: float  # largest residual after such a correction [N]
+    reduction: float  # of the residual in an iteration, to which the last factor serves again [-]
+
+
+def factorise(tangent: Any) -> Any:
+    """Factorise a tangent in its entries; returns whether it is regular; overloaded."""
+    raise NotImplementedError
+
+
+def solve(tangent: Any, vector: Any) -> Any:
+    """Solve in place by the factor of a tangent; overloaded."""
+    raise NotImplementedError
+
+
+@overload(factorise, inline="always")
+def _factorise(tangent):  # type: ignore
+    if is_system(tangent, Band):
+        return lambda tangent: factorise_band(tangent)
+    return lambda tangent: eliminate(tangent)
+
+
+@overload(solve, inline="always")
+def _solve(tangent, vector):  # type: ignore
+    if is_system(tangent, Band):
+        return lambda tangent, vector: solve_band(tangent, vector)
+    return lambda tangent, vector: solve_panels(tangent, vector)
+
+
+def newton_driver(evaluate_residual: Any, find_correction: Any, apply_correction: Any) -> Any:
+    """Return the compiled driver of iterations for small or for large displacements."""
+
+    @kernel
+    def newton_solve(system, work, tolerances, full_steps):  # type: ignore
+        """Iterate until the residual vanishes; returns evaluations, negative if it does not.
+
+        Semismooth Newton: a point that the first correction takes from sliding one way to sliding
+        the other is held in the second, as no derivative sees the range in which it sticks.
+        The first `full_steps` iterations take whole corrections, later ones use a line search.
+        """
+        error, norm, reverses = evaluate_residual(system, work, 0)
+        previous, change, evaluations, reusable = np.inf, np.inf, 0, False
+        for iteration in range(60):
+            stalled = error >= previous and error <= tolerances.stalled
+            rounded = change <= tolerances.round_off and error <= tolerances.rounded
+            if iteration > 0 and (error <= tolerances.residual or stalled or rounded):
+                return evaluations
+            # a factor serves again if one more step by it should suffice, or while it reduces the
+            # residual by more than a new factor is worth
+            hold = iteration == 1 and reverses
+            suffices = error**2 <= previous * tolerances.residual
+            reuse = suffices or error <= tolerances.reduction * previous
+            reuse = reuse and reusable and not hold
+            if evaluations > 150 or not find_correction(system, work, iteration, reuse, hold):
+                return -evaluations - 1
+            share, reusable, before = 1.0, not hold, norm
+            change, previous = apply_correction(system, work, share), error
+            while True:
+                error, norm, reverses = evaluate_residual(system, work, iteration + 1)
+                evaluations += 1
+                if norm < before or hold or iteration < full_steps or share <= 1.0 / 64.0:
+                    break
+                share *= 0.5
+                apply_correction(system, work, share)
+            change *= share
+            if not error < np.inf:
+                return -evaluations
+        return -evaluations
+
+    return newton_solve
+
+
+class NewtonSolver:
+    """Steps by Newton's method on all coordinates."""
+
+    name: ClassVar[str] = "newton"
+
+    def __init__(self, equation: Equation, max_half_width: int = 40) -> None:
+        self._equation = equation
+        pattern = tangent_pattern(equation)
+        self.order, self.half_width = narrow_order(pattern)
+        # a band is factorised faster than the joint law is evaluated, a sparse tangent is not
+        self._elimination, self._reduction = None, 0.0
+        if self.half_width > max_half_width:
+            self._elimination, self._reduction = Elimination.of(pattern), 0.03
+            self.order = self._elimination.order
+
+    @classmethod
+    def of(cls, equation: Equation) -> Self | None:
+        """Return the solver, or None where no compiled law covers joints and scheme."""
+        large = equation.model.large_displacements and equation.conserving
+        return cls(equation) if large or equation.joints is not None else None
+
+    def system(self, dt: float) -> "SmallSystem | LargeSystem":
+        """Return the data of steps of one length [s]."""
+        large = self._equation.model.large_displacements
+        return self._large_system(dt) if large else self._small_system(dt)
+
+    def copy_system(self, system: Any) -> Any:
+        """Return a copy for another run."""
+        return deepcopy(system)
+
+    def _tangent(self, matrix: sparse.csr_matrix, rows: Any, columns: Any) -> tuple[Any, Indices]:
+        """Return a tangent, and which of its entries rows and columns of changes belong to."""
+        if self._elimination is None:
+            band = band_of(matrix, self.half_width)
+            return band, band_places(band, rows, columns)
+        panels = panels_of(matrix, self._elimination, rows, columns)
+        return panels, panel_places(panels, rows, columns)
+
+    def _small_system(self, dt: float) -> "SmallSystem":
+        """Return the data of steps with small displacements."""
+        linear = linear_system(self._equation, self.order, dt)
+        effective, law = effective_matrix(self._equation, self.order, dt), linear.law
+        pairs = joint_rows(self._equation, dt).pairs
+        begin, *ends = _pair_blocks(linear.gaps, pairs)
+        tangent, places = self._tangent(effective, *ends)
+        widest = int(np.diff(linear.gaps[0]).max(initial=0))
+        blocks = np.zeros(widest), np.zeros(widest**2)
+        entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
+        factored = np.zeros(len(pairs), np.int64), np.zeros(len(pairs)), np.full(1, -1)
+        rows, contact = np.zeros((7, law.rows.shape[1])), np.zeros((3, len(linear.weight)))
+        return SmallSystem(
+            linear,
+            linear_workspace(linear),
+            tangent,
+            begin,
+            places.astype(np.uint64),  # compiled indices without a sign need no check of it
+            blocks,
+            entries,
+            factored,
+            rows,
+            contact,
+            self._reduction,
+        )
+
+    def _large_system(self, dt: float) -> "LargeSystem":
+        """Return the data of steps with large displacements."""
+        equation, order, lag = self._equation, self.order, self._equation.lag / dt
+        model: Any = equation.model  # of large displacements, with kinematics of its joints
+        mass, blocks, viscous = (
+            each[order][:, order].tocsr()
+            for each in (model.mass, model.block_stiffness, equation.viscous)
+        )
+        effective = ((2.0 / dt**2) * mass + viscous / dt + (0.5 + lag) * blocks).tocsr()
+        place, sides, forces = (
+            np.argsort(order),
+            model.joints.kinematics,
+            allocate_step_forces(model.joints),
+        )
+        sides = sides._replace(index=place[sides.index])
+        tangent, places = self._tangent(effective, *find_rate_pairs(sides))
+        # energy then drifts by 1e-8 of what is exchanged; reused factors round ten times as much
+        balance = 1e-9 if self._elimination is None else 1e-8
+        balance *= float(np.linalg.norm(equation.weight))
+        round_off, reduction = 1e-13 * model.structure.size, self._reduction
+        tolerances = Tolerances(balance, balance, round_off, 1e4 * balance, reduction)
+        return LargeSystem(
+            model.joints._replace(kinematics=sides),
+            LargeStepWorkspace(*np.zeros((7, model.size))),
+            forces,
+            np.zeros_like(forces.irreversible_slip),
+            sparse_rows(without_round_off(mass)),
+            sparse_rows(without_round_off(blocks)),
+            sparse_rows(without_round_off(viscous)),
+            sparse_rows(effective),
+            tangent,
+            places,
+            np.zeros((2, 2, 4, sides.shapes.shape[3])),
+            equation.weight[order],
+            np.ascontiguousarray(model.mass_influence[order].T),
+            (dt, lag),
+            tolerances,
+        )
+
+
+def _pair_blocks(gaps: SparseRows, pairs: Indices) -> tuple[Indices, Any, Any]:
+    """Return begin of the block of each pair of gap rows, and rows and columns of all blocks.
+
+    Rows that move with the same coordinates, as those of one joint, share a block.
+    """
+    indptr, indices, _ = gaps
+    moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
+    blocks: dict[Any, int] = {}
+    begin, ends, count = [], [], 0
+    for i, j in pairs:
+        key = moved[i], moved[j]
+        if key not in blocks:
+            blocks[key] = count
+            ends.append([end.ravel() for end in np.meshgrid(*key, indexing="ij")])
+            count += len(ends[-1][0])
+        begin.append(blocks[key])
+    rows, columns = np.concatenate(ends, axis=1).astype(np.int64)
+    return np.array(begin), rows, columns
+
+
+# ---- small displacements
+
+
+# Rows of iterations with small displacements: λ(z), the same of the evaluation before, λ that w is
+# in balance with, its change by the correction, the change of the gaps, and gaps and balanced λ
+# before the correction.
+RELEASED, LAST, BALANCED, MOVE, ALONG, GAP_ORIGIN, BALANCED_ORIGIN = range(7)
+
+
+class SmallSystem(NamedTuple):
+    """A structure of small displacements."""
+
+    linear: LinearSystem
+    work: LinearStepWorkspace
+    tangent: Any  # K + μ M + ν R, to which joints add
+    begin: Indices  # begin of the block of each pair of gap rows (q,)
+    places: Any  # entries of the tangent in the blocks, row by row
+    blocks: tuple[Array, Array]  # workspace for a row of a block, and for a block
+    entries: tuple[Any, Array]  # derivatives: row, column and pair (m, 3), and values (m,)
+    factored: tuple[Any, Array, Any]  # pairs and values in the factor, and their number (1,)
+    rows: Array  # of iterations, as named above (7, r)
+    contact: Array  # w, w before the correction, and the correction (3, n)
+    reduction: float  # as of `Tolerances`
+
+
+@kernel
+def _small_residual(system, work, iteration):  # type: ignore
+    """Evaluate λ(z) at the trial gaps, and its difference from the λ in balance."""
+    released, last, force = system.rows[RELEASED], system.rows[LAST], system.rows[BALANCED]
+    largest, square, reverses = 0.0, 0.0, False
+    for row in range(len(released)):
+        last[row] = released[row]
+    evaluate_released(system.linear.law, system.linear.places, released)
+    if iteration == 0:  # nothing is in balance with the guess
+        return np.inf, np.inf, False
+    for row in range(len(released)):
+        error = abs(released[row] - force[row])
+        square += error**2
+        if not error <= largest:  # also where it is not a number
+            largest = error
+        reverses = reverses or last[row] * released[row] < 0.0
+    return largest, square, reverses
+
+
+@kernel
+def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
+    """Find the corrections of w, and of z and λ as the derivatives predict them."""
+    gaps, rows, law, begin = system.linear.gaps, system.rows, system.linear.law, iteration == 0
+    released, along, move, origin = rows[RELEASED], rows[ALONG], rows[MOVE], rows[BALANCED_ORIGIN]
+    contact, change, right = system.contact, system.contact[2], work.vectors[RIGHT_SIDE]
+    if not (reuse or _renew_factor(system, hold)):
+        return False
+    # right side: at the guess all of it, r + Gᵀ (λ - λ′ (z - z₀)); later, as w is in balance with a
+    # λ, only the residual of that, which rounds less
+    for row in range(len(move)):
+        rows[GAP_ORIGIN, row] = law.rows[GUESS, row]
+        origin[row] = 0.0 if begin else rows[BALANCED, row]
+        move[row] = released[row] - origin[row]
+        along[row] = law.rows[OFFSET, row] - law.rows[GUESS, row]
+    if begin:
+        _add_derivatives(system.entries, system.factored[2][0], along, move)
+    for k in range(len(change)):
+        contact[1, k] = 0.0 if begin else contact[0, k]
+        change[k] = right[k] if begin else 0.0
+    add_rows(gaps, move, change)
+    solve(system.tangent, change)
+    # change of the gaps, and of λ: the balance holds for any share of both
+    for row in range(len(move)):
+        moved = row_times(gaps, row, change)
+        along[row] = moved + along[row] if begin else moved
+        move[row] = released[row] - origin[row]
+    _add_derivatives(system.entries, system.factored[2][0], along, move)
+    return True
+
+
+@kernel
+def _renew_factor(system, hold):  # type: ignore
+    """Factorise the tangent, unless it equals that of the last factor; returns its regularity."""
+    tangent, (rows, values) = system.tangent, system.entries
+    pairs, factored, number = system.factored
+    law, numbers = system.linear.law, system.linear.places
+    selection = numbers, numbers[: len(law.segments)], numbers[law.openings :]
+    count = collect_derivatives(law, selection, system.entries)
+    if hold:
+        hold_reversed(system.rows[LAST], system.rows[RELEASED], system.entries, count)
+    same = number[0] == count
+    for k in range(count):
+        same = same and pairs[k] == rows[k, 2] and factored[k] == values[k]
+        pairs[k], factored[k] = rows[k, 2], values[k]
+    if same:  # as where all joints stay closed
+        return True
+    entries, base = tangent.entries, tangent.base
+    for k in range(len(entries)):
+        entries[k] = base[k]
+    _subtract_derivatives(system, count)
+    regular = factorise(tangent)
+    number[0] = count if regular else -1
+    return regular
+
+
+@summing_kernel
+def _subtract_derivatives(system, count):  # type: ignore
+    """Subtract Gᵀ λ′ G from the tangent, block by block of gaps with the same coordinates."""
+    (rows, values), (indptr, _, data), k = system.entries, system.linear.gaps, 0
+    entries, places, (line, dense) = system.tangent.entries, system.places, system.blocks
+    while k < count:
+        begin = system.begin[rows[k, 2]]
+        width = indptr[rows[k, 1] + 1] - indptr[rows[k, 1]]
+        size = width * (indptr[rows[k, 0] + 1] - indptr[rows[k, 0]])
+        for m in range(size):
+            dense[m] = 0.0
+        while k < count and system.begin[rows[k, 2]] == begin:
+            # one row of λ′ G, then its product with the gap whose force changes
+            row = rows[k, 0]
+            for j in range(width):
+                line[j] = 0.0
+            while k < count and rows[k, 0] == row and system.begin[rows[k, 2]] == begin:
+                first = indptr[rows[k, 1]]
+                for j in range(width):
+                    line[j] += values[k] * data[first + j]
+                k += 1
+            place = 0
+            for entry in range(indptr[row], indptr[row + 1]):
+                for j in range(width):
+                    dense[place + j] += data[entry] * line[j]
+                place += width
+        for m in range(size):
+            entries[places[begin + m]] -= dense[m]
+
+
+@kernel
+def hold_reversed(last, released, entries, count):  # type: ignore
+    """Hold points that reversed their slip: they release nothing, whatever their gaps."""
+    rows, values = entries
+    for k in range(count):
+        if last[rows[k, 0]] * released[rows[k, 0]] < 0.0:
+            values[k] = 0.0
+    for row in range(len(released)):
+        if last[row] * released[row] < 0.0:
+            released[row] = 0.0
+
+
+@kernel
+def _add_derivatives(entries, count, along, result):  # type: ignore
+    """Add the change of λ with that of the gaps, by the derivatives in the factor."""
+    rows, values = entries
+    for k in range(count):
+        result[rows[k, 0]] += values[k] * along[rows[k, 1]]
+
+
+@kernel
+def _small_move(system, work, share):  # type: ignore
+    """Go a share of the correction from where it begins."""
+    law, rows, contact = system.linear.law, system.rows, system.contact
+    for row in range(rows.shape[1]):
+        law.rows[GUESS, row] = rows[GAP_ORIGIN, row] + share * rows[ALONG, row]
+        rows[BALANCED, row] = rows[BALANCED_ORIGIN, row] + share * rows[MOVE, row]
+    for k in range(contact.shape[1]):
+        contact[0, k] = contact[1, k] + share * contact[2, k]
+    return 1.0
+
+
+_solve_small = newton_driver(_small_residual, _small_correction, _small_move)
+
+
+@overload(solve_contact, jit_options=KERNEL_OPTIONS)
+def _solve_contact(system):  # type: ignore
+    return _solve_small_step if is_system(system, SmallSystem) else None
+
+
+def _solve_small_step(system):  # type: ignore
+    """Solve a step; a second try restarts from the guess, with a line search from its begin."""
+    law, work, total = system.linear.law, system.work, 0
+    # relative to the largest force; ten times as much where rounding does not let it fall
+    error = 1e-12 * largest_force(law, work.rows[Z])
+    tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
+    for full_steps in (4, 1):
+        predict_gaps(law, work.rows[Z], work.rows[Z_BEFORE])
+        iterations = _solve_small(system, work, tolerances, full_steps)
+        total += abs(iterations)
+        if iterations > 0:
+            for row in range(law.rows.shape[1]):
+                work.rows[Z_BEFORE, row], work.rows[Z, row] = (
+                    work.rows[Z, row],
+                    law.rows[GUESS, row],
+                )
+                work.rows[LAMBDA, row] = system.rows[BALANCED, row]
+            for k in range(len(system.linear.weight)):
+                work.vectors[W, k] = system.contact[0, k]
+            return total
+    return -1
+
+
+# ---- large displacements
+
+
+class LargeSystem(NamedTuple):
+    """A structure of large displacements."""
+
+    joints: LargeDisplacementJoints  # kinematics and law
+    work: "LargeStepWorkspace"
+    forces: JointStepForces  # workspace of the joints' forces over a step
+    slip: Array  # irreversible slip of the points before the step (p,) [m]
+    mass: SparseRows
+    blocks: SparseRows  # K, of the blocks alone
+    viscous: SparseRows  # C
+    effective: SparseRows  # 2 M/Δt² + C/Δt + (½ + β/Δt) K
+    tangent: Any  # the same, to which joints add
+    places: Indices  # entry of the tangent that each rate of the joints adds to (e,)
+    faces: Array  # workspace of `assemble_rates` (2, 2, 4, s)
+    weight: Array  # forces of gravity (n,)
+    body: Array  # forces per unit ground acceleration (2, n)
+    step: tuple[float, float]  # Δt, and β/Δt
+    tolerances: Tolerances
+
+
+class LargeStepWorkspace(NamedTuple):
+    """Vectors of a step with large displacements, each (n,)."""
+
+    before: Array  # coordinates at its start
+    after: Array  # and at its end, as tried
+    move: Array  # Δq
+    correction: Array  # of Δq
+    residual: Array  # forces out of balance
+    pulled: Array  # K q at the start of the step
+    constant: Array  # forces that do not depend on the end of the step
+
+
+@overload(start_run, jit_options=KERNEL_OPTIONS)
+def _start_run(system, state, memory):  # type: ignore
+    return _start_large_run if is_system(system, LargeSystem) else None
+
+
+@overload(solve_step, jit_options=KERNEL_OPTIONS)
+def _solve_step(system, step, states, ground):  # type: ignore
+    return _solve_large_step if is_system(system, LargeSystem) else None
+
+
+@overload(evaluate_step, jit_options=KERNEL_OPTIONS)
+def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
+    return _evaluate_large_step if is_system(system, LargeSystem) else None
+
+
+def _start_large_run(system, state, memory):  # type: ignore
+    """Copy the memory of the joints."""
+    for point in range(len(memory)):
+        system.slip[point] = memory[point]
+
+
+@kernel
+def _sum_loads(system, work, old, ground):  # type: ignore
+    """Sum up the forces that do not depend on the end of the step."""
+    constant, body, elastic = work.constant, system.body, len(system.blocks[2]) > 0
+    for k in range(len(constant)):
+        work.before[k] = old[0, k]
+        inertia = 2.0 / system.step[0] * row_times(system.mass, k, old[1])
+        constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
+        if elastic:
+            work.pulled[k] = row_times(system.blocks, k, old[0])
+            constant[k] -= work.pulled[k]
+
+
+@kernel
+def _large_residual(system, work, iteration):  # type: ignore
+    """Evaluate the forces out of balance at the trial displacements."""
+    forces, square, reverses = system.forces, 0.0, False
+    residual, move, sides = work.residual, work.move, system.joints.kinematics
+    for k in range(len(move)):
+        work.after[k] = work.before[k] + move[k]
+    if iteration != 1:  # only the first correction is compared with the guess
+        for point in range(len(forces.slip_direction)):
+            forces.slip_direction[point] = 0.0
+    compute_step_forces(system.joints, work.before, work.after, system.step[1], system.slip, forces)
+    for k in range(len(residual)):
+        residual[k] = work.constant[k] - row_times(system.effective, k, move)
+    for joint in range(len(forces.force)):
+        for side in range(2):
+            for k in range(sides.size[joint, side]):
+                residual[sides.index[joint, side, k]] -= forces.force[joint, side, k]
+                reverses = reverses or forces.missing_force[joint, side, k] != 0.0
+    for k in range(len(residual)):
+        square += residual[k] ** 2
+    return np.sqrt(square), np.sqrt(square), reverses
+
+
+@kernel
+def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
+    """Solve for the correction of Δq."""
+    forces, sides, correction = system.forces, system.joints.kinematics, work.correction
+    for k in range(len(correction)):
+        correction[k] = work.residual[k]
+    if hold:  # what the residual lacks if reversed points stick; rates are those of stuck points
+        for joint in range(len(forces.missing_force)):
+            for side in range(2):
+                for k in range(sides.size[joint, side]):
+                    correction[sides.index[joint, side, k]] -= forces.missing_force[joint, side, k]
+    if not reuse:
+        entries, base = system.tangent.entries, system.tangent.base
+        assemble_rates(sides, forces, system.faces)
+        for k in range(len(entries)):
+            entries[k] = base[k]
+        for k in range(len(forces.rate)):
+            entries[system.places[k]] += forces.rate[k]
+        if not factorise(system.tangent):
+            return False
+    solve(system.tangent, correction)
+    return True
+
+
+@kernel
+def _large_move(system, work, share):  # type: ignore
+    """Add the correction, or for a share below one subtract half of the last addition."""
+    move, correction, largest = work.move, work.correction, 0.0
+    factor = 1.0 if share == 1.0 else -share
+    for k in range(len(move)):
+        move[k] += factor * correction[k]
+        if not abs(correction[k]) <= largest:  # also where it is not a number
+            largest = abs(correction[k])
+    return largest
+
+
+_solve_large = newton_driver(_large_residual, _large_correction, _large_move)
+
+
+def _solve_large_step(system, step, states, ground):  # type: ignore
+    """Solve a step; a second try restarts from the guess, with a line search from its begin."""
+    (old, new), total, dt, work = states, 0, system.step[0], system.work
+    _sum_loads(system, work, old, ground)
+    for full_steps in (3, 0):
+        for k in range(len(work.move)):
+            work.move[k] = dt * old[1, k]
+        iterations = _solve_large(system, work, system.tolerances, full_steps)
+        total += abs(iterations)
+        if iterations > 0:
+            # the midpoint rule: velocity and acceleration from the change of coordinates
+            for k in range(len(work.move)):
+                new[0, k] = work.after[k]
+                new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
+                new[2, k] = (new[1, k] - old[1, k]) / dt
+            return total
+    return -1
+
+
+def _evaluate_large_step(system, step, states, ground, results, memory):  # type: ignore
+    """Copy mean resultants and memory, and evaluate the energies of a step."""
+    resultants, energy = results
+    for joint in range(len(resultants)):
+        for k in range(3):
+            resultants[joint, k] = system.forces.resultants[joint, k]
+    _evaluate_energies(system, system.work, states[1], ground, energy)
+    for point in range(len(memory)):
+        memory[point] = system.slip[point]
+
+
+@kernel
+def _evaluate_energies(system, work, new, ground, energy):  # type: ignore
+    """Evaluate energies at the end of a step, and work and losses in it."""
+    (dt, lag), forces, move = system.step, system.forces, work.move
+    energy[0] = energy[1] = energy[2] = energy[3] = 0.0
+    for k in range(len(forces.irreversible_slip)):
+        system.slip[k] = forces.irreversible_slip[k]
+    for k in range(len(forces.dissipation)):
+        energy[3] += forces.dissipation[k]
+    for k in range(len(move)):
+        energy[0] += 0.5 * new[1, k] * row_times(system.mass, k, new[1])
+        energy[1] -= system.weight[k] * new[0, k]
+        energy[2] -= move[k] * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
+        # blocks: their energy, and damping proportional to their stiffness
+        more = row_times(system.blocks, k, move)
+        energy[1] += 0.5 * new[0, k] * (work.pulled[k] + more)
+        energy[3] += lag * move[k] * more + move[k] * row_times(system.viscous, k, move) / dt
+    energy[1] += joint_energy(system.joints, new[0], system.slip)

@@ -1,0 +1,241 @@
+"""Solver "snes": every scheme, each step one equilibrium solve by PETSc's SNES.
+
+Its histories are the reference that all other solvers reproduce to rounding.
+"""
+
+from collections.abc import Callable, Iterator
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.newmark import StepNumbers
+from archfem.dynamics.state import Batch, State, Step
+from archfem.errors import DidNotConverge
+from archfem.models.model import ModelStep
+from archfem.statics.newton import (
+    CONVEX_SEARCHES,
+    SLIDING_SEARCHES,
+    EquilibriumSolver,
+    Newton,
+    Solution,
+    load_magnitude,
+)
+
+# Times that a step may be halved before the run fails
+MAX_HALVINGS = 8
+
+# Function that solves a step from a state and a time step
+Attempt = Callable[[State, float], Step]
+
+
+class SnesSolver:
+    """Steps an equation of motion, each step solved by SNES.
+
+    Args:
+        equation: of motion.
+        newton: settings of the solves.
+        attempts: solves a step as a whole; by default by the formulas of the scheme. Where it
+            raises `DidNotConverge` the step is halved.
+    """
+
+    def __init__(
+        self, equation: Equation, newton: Newton | None = None, *, attempts: Attempt | None = None
+    ) -> None:
+        self.equation = equation
+        self._attempts = attempts or (self.averaged if equation.conserving else self.attempt)
+        self._scale = load_magnitude(equation.weight)
+        self._solver = EquilibriumSolver(equation.model.size, newton)
+        self._step: tuple[float, StepNumbers, sparse.csr_matrix] | None = None
+        self._matrix: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix] | None = None
+
+    def steps(self, start: State, dt: float, end: float) -> Iterator[Step]:
+        """Yield the steps to the end, one after another.
+
+        Args:
+            start: state before the first step.
+            dt: time between the yielded states [s].
+            end: time of the last one [s].
+
+        Raises:
+            DidNotConverge: a step failed even when halved; `last` is the state before it.
+        """
+        state = start
+        first = start.time
+        for number in range(1, round((end - first) / dt) + 1):
+            target = first + number * dt
+            step = self._advance(state, target, 0)
+            state = step.state
+            yield step
+
+    def batches(self, start: State, dt: float, end: float) -> Iterator[Batch]:
+        """Yield the same steps with their resultants, in batches of one.
+
+        Args:
+            start: state before the first step.
+            dt: time between the yielded states [s].
+            end: time of the last one [s].
+
+        Raises:
+            DidNotConverge: a step failed even when halved; `last` is the state before it.
+        """
+        for step in self.steps(start, dt, end):
+            yield step.batch
+
+    def whole(self, state: State, dt: float) -> Step:
+        """Return a step that is not halved.
+
+        Args:
+            state: before the step.
+            dt: its length [s].
+
+        Raises:
+            DidNotConverge: SNES finds no equilibrium.
+        """
+        return self._attempts(state, dt)
+
+    def attempt(self, state: State, dt: float) -> Step:
+        """Return a step of Newmark's method or HHT that is not halved.
+
+        Args:
+            state: before the step.
+            dt: its length [s].
+
+        Returns:
+            The step, with the resultants at its end.
+
+        Raises:
+            DidNotConverge: SNES finds no equilibrium.
+        """
+        equation, (numbers, linear) = self.equation, self._prepared(dt)
+        load = equation.load(state.time + numbers.share * dt)
+        before = np.stack([state.q, state.velocity, state.acceleration])
+        unmoved = numbers.velocity[0] @ before, numbers.acceleration[0] @ before
+
+        def end(q: Array) -> State:
+            moved = q - state.q
+            velocity = numbers.velocity[1] * moved + unmoved[0]
+            return State(state.time + dt, q, velocity, numbers.acceleration[1] * moved + unmoved[1])
+
+        def unbalanced(q: Array) -> Array:
+            now = _written(state, end(q), numbers.share)
+            moving = equation.model.mass @ now.acceleration + equation.viscous @ now.velocity
+            return np.asarray(moving + equation.model.force(equation.contact(now)) - load)
+
+        def tangent(q: Array) -> sparse.csr_matrix:
+            contact = equation.contact(_written(state, end(q), numbers.share))
+            return self._tangent(contact, linear, numbers.gain)
+
+        guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
+        solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
+        new = end(solved.q)
+        ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
+        ends = (state.q, state.velocity), (new.q, new.velocity)
+        energy = equation.meter.measure_step(*ends, ground)
+        resultants = equation.model.resultants(equation.contact(new))
+        return Step(new, resultants, solved.iterations, dt, energy)
+
+    def averaged(self, state: State, dt: float) -> Step:
+        """Return a step of the conserving scheme that is not halved.
+
+        Args:
+            state: before the step.
+            dt: its length [s].
+
+        Returns:
+            The step, with the resultants on its mean.
+
+        Raises:
+            DidNotConverge: SNES finds no equilibrium.
+        """
+        equation, (numbers, linear) = self.equation, self._prepared(dt)
+        model = equation.with_memory(state)
+        ground = equation.ground(np.array([state.time + dt]), dt)[0, 0]
+        load = equation.weight - model.mass_influence @ ground
+        gain = numbers.velocity[1]
+
+        def speed(q: Array) -> Array:
+            return np.asarray(gain * (q - state.q) - state.velocity)
+
+        def solved(passage: ModelStep, guess: Array) -> Solution:
+            def unbalanced(q: Array) -> Array:
+                change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
+                moving = model.mass @ change + equation.viscous @ drag
+                return np.asarray(moving + passage.force(q) - load)
+
+            def tangent(q: Array) -> sparse.csr_matrix:
+                matrix = passage.tangent(q)
+                matrix.data = matrix.data + linear.data / numbers.gain
+                return matrix
+
+            searches = SLIDING_SEARCHES if equation.remembers else CONVEX_SEARCHES
+            return self._solver.solve(unbalanced, tangent, guess, self._scale, searches)
+
+        passage = model.begin_step(state.q, equation.lag / dt)
+        passage, solution = _solve_with_teeth(passage, solved, state.q + dt * state.velocity)
+        q, moved = solution.q, solution.q - state.q
+        memory, velocity = passage.updated_memory(q), speed(q)
+        new = State(state.time + dt, q, velocity, (velocity - state.velocity) / dt, memory)
+        lost = passage.dissipation(q) + float(moved @ (equation.viscous @ moved)) / dt
+        work = -float(moved @ (model.mass_influence @ ground))
+        energy = equation.energy(new) + np.array([0.0, 0.0, work, lost])
+        return Step(new, passage.resultants(q), solution.iterations, dt, energy)
+
+    def _prepared(self, dt: float) -> tuple[StepNumbers, sparse.csr_matrix]:
+        """StepNumbers of a step, and μ M + ν R; the same objects as before while the step stays."""
+        if self._step is None or abs(self._step[0] - dt) > 1e-9 * dt:
+            numbers, matrix = self.equation.numbers(dt), self.equation.rest.copy()
+            mass = self.equation.model.mass.data
+            matrix.data = numbers.inertia * mass + numbers.rate * matrix.data
+            self._step = (dt, numbers, matrix)
+        return self._step[1:]
+
+    def _tangent(self, contact: Array, linear: sparse.csr_matrix, gain: float) -> sparse.csr_matrix:
+        """Return the tangent of a step; the same object as long as stiffness and step are."""
+        stiffness, last = self.equation.model.tangent(contact), self._matrix
+        if last is None or last[0] is not stiffness or last[1] is not linear:
+            matrix = copy(stiffness)
+            matrix.data = (stiffness.data + linear.data) / gain
+            self._matrix = last = (stiffness, linear, matrix)
+        return last[2]
+
+    def _advance(self, state: State, target: float, halvings: int) -> Step:
+        """Return a step to a time, as a whole or in halves."""
+        dt = target - state.time
+        try:
+            step = self._attempts(state, dt)
+        except DidNotConverge as error:
+            if halvings == MAX_HALVINGS:
+                raise DidNotConverge(
+                    f"the step from t = {state.time:.6g} s failed, down to {dt:.3g} s ({error}): "
+                    "the structure may have fallen apart; try a smaller dt or HHT",
+                    last=state,
+                ) from error
+            first = self._advance(state, state.time + dt / 2.0, halvings + 1)
+            second = self._advance(first.state, target, halvings + 1)
+            return second.appended_to(first, mean=self.equation.conserving)
+        return replace(step, state=replace(step.state, time=target))
+
+
+def _solve_with_teeth(
+    passage: ModelStep, solve: Callable[[ModelStep, Array], Solution], guess: Array
+) -> tuple[ModelStep, Solution]:
+    """Alternate between a step and the rise of its saw teeth; one solve where there are none."""
+    iterations, alternations = 0, 60
+    for _ in range(alternations):
+        solution = solve(passage, guess)
+        guess, iterations = solution.q, iterations + solution.iterations
+        following = passage.with_dilatancy(guess)
+        if following is passage:
+            return passage, replace(solution, iterations=iterations)
+        passage = following
+    raise DidNotConverge(f"saw teeth of joints that slide do not converge in {alternations} turns")
+
+
+def _written(start: State, end: State, share: float) -> State:
+    """Return the state where HHT writes the equation, with the acceleration at the end."""
+    between = start.velocity + share * (end.velocity - start.velocity)
+    return replace(end, q=start.q + share * (end.q - start.q), velocity=between)

@@ -1,0 +1,405 @@
+"""Sparse LU factors in dense panels: elimination order, factor without exchanges, and solves.
+
+The order is one of minimum degree (George and Liu, SIAM Review 31, 1989). Columns of the factor
+with the same fill form a group, and so does a branch of the elimination tree with few columns.
+
+The pattern is symmetric, the matrix need not be. Of each group the rows from the diagonal on are
+one dense block, and the columns below them another. Groups whose entries never change, as inside a
+fill, are eliminated once: the rest is the matrix condensed onto the coordinates that joints touch.
+Groups form a tree, and solves of a symmetric pattern may keep to branches of it.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from archfem._numba import entry, kernel, summing_kernel, view_kernel
+from archfem._typing import Array
+
+Indices = NDArray[np.int64]
+
+# Columns up to which a whole branch of the elimination tree becomes one group
+MAX_LEAF_COLUMNS = 16
+
+# Columns of a group at most
+MAX_GROUP_COLUMNS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """Order of elimination of matrices of one pattern, in groups of columns."""
+
+    order: Indices
+    # coordinates, each branch of the elimination tree without a gap (n,)
+    groups: list[tuple[int, int]]
+    # first column of each group, and one after its last
+    rows: list[Indices]
+    # rows below each group
+    parent: Indices
+    # group of the first row below, -1 where there is none (groups,)
+
+    @classmethod
+    def of(cls, pattern: sparse.csr_matrix) -> "Elimination":
+        """Return the order for a matrix with all entries of those to be factorised (n, n)."""
+        # made symmetric: cancellation may remove an entry without its mirror image
+        ones = sparse.csr_matrix((np.ones(pattern.nnz), pattern.indices, pattern.indptr))
+        ones = ones + ones.T
+        dominant = (ones + pattern.shape[0] * sparse.identity(pattern.shape[0])).tocsc()
+        factor = splu(dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        order = np.argsort(factor.perm_c)
+        fill = _fill(dominant[order][:, order].tocsc())
+        after = _postorder([int(rows[0]) if len(rows) else len(fill) for rows in fill])
+        place = np.argsort(after)
+        fill = [np.sort(place[fill[column]]) for column in after]
+        groups = _groups(fill)
+        group_of = np.repeat(np.arange(len(groups)), [end - start for start, end in groups])
+        rows = [fill[end - 1] for _, end in groups]
+        parent = np.array([group_of[own[0]] if len(own) else -1 for own in rows])
+        return cls(order[after], groups, rows, parent)
+
+    @property
+    def group_of(self) -> Indices:
+        """Group of each coordinate, in this order (n,)."""
+        return np.repeat(np.arange(len(self.groups)), [end - start for start, end in self.groups])
+
+
+def _fill(matrix: sparse.csc_matrix) -> list[Indices]:
+    """Return the rows below the diagonal in each column of the factor, sorted."""
+    size = matrix.shape[0]
+    fill: list[set[int]] = []
+    children: list[list[int]] = [[] for _ in range(size)]
+    for column in range(size):
+        own = matrix.indices[matrix.indptr[column] : matrix.indptr[column + 1]]
+        rows = set(own[own > column].tolist())
+        for child in children[column]:
+            rows |= fill[child]
+        rows.discard(column)
+        fill.append(rows)
+        if rows:
+            children[min(rows)].append(column)
+    return [np.array(sorted(rows), dtype=np.int64) for rows in fill]
+
+
+def _postorder(parent: list[int]) -> Indices:
+    """Return children before parents, branches without gaps; roots have parent `len(parent)`."""
+    children: list[list[int]] = [[] for _ in range(len(parent) + 1)]
+    for node, above in enumerate(parent):
+        children[above].append(node)
+    order, stack = [], list(children[-1])
+    while stack:  # parents before children, reversed below
+        node = stack.pop()
+        order.append(node)
+        stack.extend(children[node])
+    return np.array(order[::-1])
+
+
+def _groups(fill: list[Indices]) -> list[tuple[int, int]]:
+    """Return the first column of each group, and one after its last."""
+    branch = np.ones(len(fill), dtype=np.int64)
+    for column, rows in enumerate(fill):
+        if len(rows):
+            branch[rows[0]] += branch[column]
+    groups: list[tuple[int, int]] = []
+    entries: list[int] = []
+    for column, rows in enumerate(fill):
+        start, own = column, len(rows) + 1
+        leaf = column - int(branch[column]) + 1
+        while groups and groups[-1][0] >= leaf:
+            # join the group before if the branch is small, or few zeros are stored by that
+            before, joined = groups[-1], own + entries[-1]
+            width, height = column + 1 - before[0], column + 1 - before[0] + len(rows)
+            stored = width * height - width * (width - 1) // 2
+            below = fill[before[1] - 1]
+            follows = len(below) > 0 and start <= below[0] <= column
+            dense = width <= MAX_GROUP_COLUMNS and stored <= 64 + 1.15 * joined
+            if not (branch[column] <= MAX_LEAF_COLUMNS or (follows and dense)):
+                break
+            start, own = before[0], joined
+            groups.pop()
+            entries.pop()
+        groups.append((start, column + 1))
+        entries.append(own)
+    return groups
+
+
+class Panels(NamedTuple):
+    """A matrix of which some entries change, in the order of its elimination."""
+
+    first: Indices  # first column of each group, and the number of columns (groups + 1,)
+    below: Indices  # begin of its rows in `rows` (groups + 1,)
+    rows: Indices  # rows below the columns of each group
+    parent: Indices  # group of the first row below, -1 where there is none (groups,)
+    places: Indices  # begin of its entries: its rows, then columns below them (groups + 1,)
+    updates: Indices  # begin of its targets (groups + 1,)
+    targets: Indices  # entries that its elimination changes further down, row by row
+    changing: Indices  # groups to eliminate once entries change
+    base: Array  # entries without changes, of all other groups eliminated
+    entries: Array  # of the matrix, then of its triangles, pivots inverted
+    image: Array  # intermediate results (n,)
+    smallest_step: float  # pivot, relative to its row, below which rows would have to be exchanged
+
+
+def panels_of(
+    matrix: sparse.csr_matrix, elimination: Elimination, rows: Any, columns: Any
+) -> Panels:
+    """Return a matrix in panels, of which entries in some rows and columns (k,) change."""
+    panels = _layout(matrix, elimination, 1e-6)
+    # groups with entries that change, and their ancestors
+    changes = np.zeros(len(panels.parent), bool)
+    changes[elimination.group_of[np.minimum(rows, columns)]] = True
+    for group, parent in enumerate(panels.parent):
+        if changes[group] and parent >= 0:
+            changes[parent] = True
+    # all others are eliminated once
+    if not eliminate(panels._replace(changing=np.flatnonzero(~changes))):
+        raise np.linalg.LinAlgError("a fill without joints is not held by its own inertia")
+    return panels._replace(changing=np.flatnonzero(changes), base=panels.entries.copy())
+
+
+def definite_factor(matrix: sparse.csr_matrix, elimination: Elimination) -> Panels:
+    """Return the factor of a symmetric positive definite matrix, which never changes.
+
+    Raises LinAlgError where it is not definite, and ValueError where the pattern lacks entries.
+    """
+    panels = _layout(matrix, elimination, 0.0)  # no exchanges, however small a pivot is
+    regular = eliminate(panels)
+    diagonal = np.arange(matrix.shape[0])
+    if not (regular and np.all(panels.entries[panel_places(panels, diagonal, diagonal)] > 0.0)):
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    none = np.zeros(0, np.int64)
+    return panels._replace(targets=none, base=np.zeros(0))
+
+
+def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float) -> Panels:
+    """Return the panels of a matrix, with the targets of the elimination of all groups."""
+    size, counts = matrix.shape[0], np.array([len(own) for own in elimination.rows])
+    first = np.array([start for start, _ in elimination.groups] + [size], np.int64)
+    width, rows = np.diff(first), np.concatenate(elimination.rows).astype(np.int64)
+    sizes = width * (width + 2 * counts)
+    below, places, updates = (
+        np.concatenate([[0], np.cumsum(each)]) for each in (counts, sizes, counts**2)
+    )
+    none, entries = np.zeros(0, np.int64), np.zeros(places[-1])
+    groups, image = np.arange(len(width)), np.zeros(2 * size)
+    panels = Panels(
+        *(first, below, rows, elimination.parent, places, updates, none, groups),
+        *(entries, entries, image, smallest),
+    )
+    targets = [np.broadcast_arrays(own[:, None], own) for own in elimination.rows]
+    ends = (np.concatenate([each[k].ravel() for each in targets]) for k in range(2))
+    of_matrix = matrix.tocoo()
+    np.add.at(entries, panel_places(panels, of_matrix.row, of_matrix.col), of_matrix.data)
+    return panels._replace(targets=panel_places(panels, *ends))
+
+
+def panel_places(panels: Panels, rows: Any, columns: Any) -> Indices:
+    """Return which entry belongs to each row and column (k,)."""
+    first, low, high = panels.first, np.minimum(rows, columns), np.maximum(rows, columns)
+    group = np.searchsorted(first, low, "right") - 1
+    start, width, count = first[group], np.diff(first)[group], np.diff(panels.below)[group]
+    # place of the higher coordinate among the rows below the group, by a search in all of them
+    size = first[-1]
+    keys = size * np.repeat(np.arange(len(first) - 1), np.diff(panels.below)) + panels.rows
+    later = np.searchsorted(keys, size * group + high) - panels.below[group]
+    inner, near, far = high < start + width, low - start, high - start
+    match = np.append(keys, -1)[later + panels.below[group]] == size * group + high
+    if not np.all(inner | match):
+        raise ValueError("the matrix has entries that the pattern of its factor lacks")
+    upper = np.where(rows <= columns, near, far) * (width + count)
+    upper += np.where(rows <= columns, np.where(inner, far, width + later), near)
+    lower = width * (width + count) + near * count + later
+    return np.asarray(panels.places[group] + np.where(inner | (rows <= columns), upper, lower))
+
+
+@entry
+def eliminate(panels):  # type: ignore
+    """Factorise the matrix in `entries` in place; returns whether no pivot has become small."""
+    entries = panels.entries
+    for group in panels.changing:
+        start, end = panels.places[group], panels.places[group + 1]
+        width = panels.first[group + 1] - panels.first[group]
+        count = panels.below[group + 1] - panels.below[group]
+        middle = start + width * (width + count)
+        top = entries[start:middle].reshape((width, width + count))
+        left = entries[middle:end].reshape((width, count))
+        targets = panels.targets[panels.updates[group] : panels.updates[group + 1]]
+        if not _eliminate_rows(top, panels.smallest_step):
+            return False
+        _eliminate_columns(top, left)
+        _update_rest(top, left, targets, panels.image, entries)
+    return True
+
+
+@summing_kernel
+def _eliminate_rows(top, smallest):  # type: ignore
+    """Eliminate in each row of a group the columns before its own, four rows at a time."""
+    width, size = top.shape
+    for i in range(width):
+        own, k = top[i], 0
+        while k + 4 <= i:
+            # multipliers of four rows, each after the elimination by those before
+            p, q, r, s = top[k], top[k + 1], top[k + 2], top[k + 3]
+            a = own[k] * p[k]
+            b = (own[k + 1] - a * p[k + 1]) * q[k + 1]
+            c = (own[k + 2] - a * p[k + 2] - b * q[k + 2]) * r[k + 2]
+            d = (own[k + 3] - a * p[k + 3] - b * q[k + 3] - c * r[k + 3]) * s[k + 3]
+            own[k], own[k + 1], own[k + 2], own[k + 3] = a, b, c, d
+            k += 4
+            rest, p, q, r, s = own[k:], p[k:], q[k:], r[k:], s[k:]
+            for j in range(len(rest)):
+                rest[j] -= a * p[j] + b * q[j] + c * r[j] + d * s[j]
+        for last in range(k, i):
+            row = top[last]
+            own[last] = factor = own[last] * row[last]
+            for j in range(last + 1, size):
+                own[j] -= factor * row[j]
+        largest = 0.0
+        for j in range(i, size):
+            largest = max(largest, abs(own[j]))
+        if not abs(own[i]) > smallest * largest:
+            return False
+        own[i] = 1.0 / own[i]
+    return True
+
+
+@summing_kernel
+def _eliminate_columns(top, left):  # type: ignore
+    """Eliminate in the rows below a group, stored by columns, the columns of the group."""
+    width, count = left.shape
+    for m in range(width):
+        own, k = left[m], 0
+        while k + 4 <= m:
+            a, b, c, d = top[k, m], top[k + 1, m], top[k + 2, m], top[k + 3, m]
+            p, q, r, s = left[k], left[k + 1], left[k + 2], left[k + 3]
+            for i in range(count):
+                own[i] -= a * p[i] + b * q[i] + c * r[i] + d * s[i]
+            k += 4
+        for last in range(k, m):
+            factor, other = top[last, m], left[last]
+            for i in range(count):
+                own[i] -= factor * other[i]
+        inverse = top[m, m]
+        for i in range(count):
+            own[i] *= inverse
+
+
+@summing_kernel
+def _update_rest(top, left, targets, image, entries):  # type: ignore
+    """Subtract the product of a group's blocks from the entries further down, two rows a time."""
+    width, count = left.shape
+    for i in range(0, count, 2):
+        m = min(i + 1, count - 1)  # the second row
+        one, two = image[:count], image[count : 2 * count]
+        for j in range(count):
+            one[j] = two[j] = 0.0
+        for k in range(0, width - width % 4, 4):
+            p, q, r, s = top[k][width:], top[k + 1][width:], top[k + 2][width:], top[k + 3][width:]
+            a, b, c, d = left[k, i], left[k + 1, i], left[k + 2, i], left[k + 3, i]
+            e, f, g, h = left[k, m], left[k + 1, m], left[k + 2, m], left[k + 3, m]
+            for j in range(count):
+                one[j] += a * p[j] + b * q[j] + c * r[j] + d * s[j]
+                two[j] += e * p[j] + f * q[j] + g * r[j] + h * s[j]
+        for k in range(width - width % 4, width):
+            row, a, e = top[k][width:], left[k, i], left[k, m]
+            for j in range(count):
+                one[j] += a * row[j]
+                two[j] += e * row[j]
+        own = targets[i * count : (i + 1) * count]
+        for j in range(count):
+            entries[own[j]] -= one[j]
+        if m > i:
+            own = targets[m * count : (m + 1) * count]
+            for j in range(count):
+                entries[own[j]] -= two[j]
+
+
+@view_kernel
+def four(panel, column, height):  # type: ignore
+    """Return four columns of a panel, from one on."""
+    start = column * height
+    return (
+        panel[start : start + height],
+        panel[start + height : start + 2 * height],
+        panel[start + 2 * height : start + 3 * height],
+        panel[start + 3 * height : start + 4 * height],
+    )
+
+
+@kernel
+def solve_panels(panels, vector):  # type: ignore
+    """Solve in place by the factor."""
+    solve_lower(panels, vector)
+    for group in range(len(panels.parent) - 1, -1, -1):
+        solve_upper(panels, vector, group)
+
+
+@summing_kernel
+def solve_lower(panels, vector):  # type: ignore
+    """Solve with the lower triangle, of unit diagonal; groups with only zeros cost nothing."""
+    for group in range(len(panels.parent)):
+        start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
+        rows = panels.rows[panels.below[group] : panels.below[group + 1]]
+        own, count, zero = vector[start : start + width], len(rows), True
+        block = panels.entries[panels.places[group] :]
+        for value in own:
+            zero = zero and value == 0.0
+        if zero:
+            continue
+        for i in range(1, width):
+            row, value = block[i * (width + count) :], own[i]
+            for k in range(i):
+                value -= row[k] * own[k]
+            own[i] = value
+        # columns below the group, four at a time: each entry of the sum is loaded once
+        total, lower = panels.image[:count], block[width * (width + count) :]
+        for i in range(count):
+            total[i] = 0.0
+        for k in range(0, width - width % 4, 4):
+            p, q, r, s = four(lower, k, count)
+            a, b, c, d = own[k], own[k + 1], own[k + 2], own[k + 3]
+            for i in range(count):
+                total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
+        for k in range(width - width % 4, width):
+            column, value = lower[k * count :], own[k]
+            for i in range(count):
+                total[i] += value * column[i]
+        for i in range(count):
+            vector[rows[i]] -= total[i]
+
+
+@summing_kernel
+def solve_upper(panels, vector, group):  # type: ignore
+    """Solve with the rows of a group of the upper triangle, after those of its ancestors."""
+    start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
+    rows = panels.rows[panels.below[group] : panels.below[group + 1]]
+    own, later, count = vector[start : start + width], panels.image[: len(rows)], len(rows)
+    block, size = panels.entries[panels.places[group] :], width + count
+    for i in range(count):
+        later[i] = vector[rows[i]]
+    # columns right of the group, four rows at a time
+    right = block[width:]
+    for k in range(0, width - width % 4, 4):
+        p, q, r, s = four(right, k, size)
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for j in range(count):
+            a += p[j] * later[j]
+            b += q[j] * later[j]
+            c += r[j] * later[j]
+            d += s[j] * later[j]
+        own[k], own[k + 1] = own[k] - a, own[k + 1] - b
+        own[k + 2], own[k + 3] = own[k + 2] - c, own[k + 3] - d
+    for k in range(width - width % 4, width):
+        row, value = right[k * size :], 0.0
+        for j in range(count):
+            value += row[j] * later[j]
+        own[k] -= value
+    # its own triangle, whose pivots are inverted
+    for k in range(width - 1, -1, -1):
+        row, value = block[k * size :], own[k]
+        for j in range(k + 1, width):
+            value -= row[j] * own[j]
+        own[k] = value * row[k]

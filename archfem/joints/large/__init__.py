@@ -1,0 +1,13 @@
+"""Joints between blocks with large displacements and rotations, compiled.
+
+    face_kinematics  face poses and joint gaps at large rotations
+    forces           joint forces and derivative at large rotations
+    overlap_law      overlap law and friction, compiled
+    rates            derivative of the joint forces, in blocks shared by segments
+
+Start reading at `forces`.
+"""
+
+from archfem import _numba
+
+_numba.prepare_cache()

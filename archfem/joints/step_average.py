@@ -1,0 +1,186 @@
+"""Joint forces averaged over a time step, and the joint memory at its end.
+
+Opening and slip are linear in time over the step. Damping that follows the joints shifts openings
+by its time lag, g + β ġ, so that a joint closes and opens earlier, and never pulls.
+
+With dilatancy the opening of a point grows linearly over the step, to the value that belongs to the
+slip at its end. It follows from fixed-point iteration: a step is solved with one value, and
+`with_dilatancy` returns the step with the next. The normal force acts on the gap less the dilatancy
+opening; friction dissipates μ N |s| less the work N tan ψ |s| of opening, which is not negative.
+Bonds break at the end of a step; the energy stored in them is then lost.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem.joints.bonds import dilatancy_opening
+from archfem.joints.contact_law import (
+    ZERO_DIVISION_GUARD,
+    clip_to_friction,
+    friction_excess,
+    shear_over_step,
+)
+from archfem.joints.operator import JointOperator
+
+
+@dataclass(frozen=True, eq=False)
+class StepForces:
+    """Mean joint forces of a time step from a state with known joint memory."""
+
+    operator: JointOperator  # with the joint memory at the start
+    start: Array  # coordinates at its start (n,)
+    damping_lag: float  # time lag of damping over the length of the step, β/Δt [-]
+    # opening of each point by dilatancy at the end (p,) [m]; None as at the start
+    end_opening: Array | None = None
+    # error of the last iterate of that opening (p,) [m], and the relaxation factor applied [-]
+    last_correction: tuple[Array, float] | None = None
+
+    @cached_property
+    def _before(self) -> tuple[Array, Array]:
+        """Effective gaps and elastic shear forces at the start, each (p,)."""
+        return self.operator.effective_gaps(self.start), self.operator.trial_shear(self.start)
+
+    def _gap_path(self, q: Array) -> tuple[Array, Array]:
+        """Return the gaps at both ends of the step, shifted by the lag of damping, each (p,)."""
+        before, after = self._before[0], self.operator.effective_gaps(q, self.end_opening)
+        ahead = self.damping_lag * (after - before)
+        return before + ahead, after + ahead
+
+    def _shear_change(self, q: Array) -> Array:
+        """Return the change of the elastic shear without further slip (p,) [N]."""
+        return self.operator.trial_shear(q) - self._before[1]
+
+    def _means(self, q: Array) -> tuple[Array, Array, Array, Array]:
+        """Return mean normal force, mean shear, Coulomb's limit, elastic shear at the end (p,)."""
+        operator, slides = self.operator, self.operator.points.slides
+        normal, closed = operator.law.step_means(*self._gap_path(q))
+        limit = operator.coulomb_limit(normal, closed)
+        first, change = self._before[1], self._shear_change(q)
+        shear, last = shear_over_step(first, change, self.damping_lag, limit)
+        linear = first + (0.5 + self.damping_lag) * change
+        return (
+            normal,
+            np.where(slides, shear, linear),
+            limit,
+            np.where(slides, last, first + change),
+        )
+
+    def _point_forces(self, q: Array) -> tuple[Array, Array]:
+        """Return mean normal and shear forces, each (p,) [N]."""
+        normal, shear, *_ = self._means(q)
+        return self.operator.add_bond_pull(normal), shear
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the generalised forces of the joints (n,)."""
+        return self.operator.generalised_force(*self._point_forces(q))
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
+        return self.operator.sum_resultants(*self._point_forces(q))
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the joint memory at the end of the step, as `JointOperator.memory`."""
+        operator, (_, _, limit, last) = self.operator, self._means(q)
+        excess = operator.trial_shear(q) - last
+        if operator.bonds is None:
+            return operator.updated_slip(excess)
+        exceeded = operator.bonds.exceeded(operator.effective_gaps(q, self.end_opening))
+        return operator.updated_bond_memory(exceeded, excess, limit)
+
+    def with_dilatancy(self, q: Array) -> "StepForces":
+        """Return the step with the dilatancy opening due to the slip on the way to q."""
+        points = self.operator.points
+        if points.dilatancy is None:
+            return self
+        limit, slip = self._means(q)[2], self.updated_memory(q)[: len(points.offset)]
+        target, initial = dilatancy_opening(points, slip), self.operator.dilatancy_opening
+        assert target is not None
+        initial = np.zeros_like(slip) if initial is None else initial
+        present = initial if self.end_opening is None else self.end_opening
+        error = target - present
+        # converged within round-off of the largest opening in the step, or of an elastic slip
+        scale = np.abs(target - initial).max()
+        elastic = (points.dilatancy * limit / points.shear_spring).max()
+        if np.abs(error).max() <= 1e-9 * max(scale, elastic):
+            return self
+        factor = 1.0
+        if self.last_correction is not None:
+            factor = _aitken_factor(error, *self.last_correction)
+        return replace(self, end_opening=present + factor * error, last_correction=(error, factor))
+
+    def _opening_change(self) -> Array | float:
+        """Return the growth of the dilatancy opening over the step (p,) [m]."""
+        initial = self.operator.dilatancy_opening
+        if self.end_opening is None:
+            return 0.0
+        return self.end_opening if initial is None else self.end_opening - initial
+
+    def _broken_bond_energy(self, q: Array) -> float:
+        """Return the energy stored in bonds that break at the end [J]."""
+        operator = self.operator
+        if operator.bonds is None:
+            return 0.0
+        gaps = operator.effective_gaps(q, self.end_opening) + operator.bonds.stretch
+        after = operator.with_memory(self.updated_memory(q))
+        return operator.normal_energy(gaps) - after.normal_energy(gaps)
+
+    def dissipation(self, q: Array) -> float:
+        """Return the energy lost to friction, broken bonds and damping [J]; never negative."""
+        operator, points = self.operator, self.operator.points
+        before, after = self._before[0], operator.effective_gaps(q, self.end_opening)
+        normal, shear, limit, _ = self._means(q)
+        # damping across: lagged less unlagged mean force, on the change of the gap
+        across = (normal - operator.law.step_means(before, after)[0]) @ (after - before)
+        # along: excess at the start, friction while sliding, damping
+        change, first = self._shear_change(q), self._before[1]
+        start = np.where(points.slides, clip_to_friction(first, limit), first)
+        excess = np.abs(friction_excess(start + change, limit))
+        mean = np.where(
+            points.slides, shear_over_step(first, change, 0.0, limit)[0], first + 0.5 * change
+        )
+        along = 0.5 * (first**2 - start**2) + excess * limit + (shear - mean) * change
+        lost = float(across + np.sum(along / points.shear_spring))
+        if points.is_plain:
+            return lost
+        opened = np.sum(operator.add_bond_pull(normal) * self._opening_change())
+        return lost + float(opened) + self._broken_bond_energy(q)
+
+    def stiffness(self, q: Array) -> Array:
+        """Return the derivative of the mean force, for `JointOperator.tangent_map` (m,) [N/m]."""
+        operator, points, lag = self.operator, self.operator.points, self.damping_lag
+        # by how much the lagged gaps at both ends change with the gap at the end
+        path, rates = self._gap_path(q), (lag, 1.0 + lag)
+        across = operator.law.mean_stiffness(*path, rates)
+        if not operator.slides:
+            return np.concatenate([across, (0.5 + lag) * points.shear_spring])
+        by_change, by_limit = self._shear_rates(q)
+        along = np.where(points.slides, by_change, 0.5 + lag) * points.shear_spring
+        area_rate = operator.law.mean_area_rate(*path, rates)
+        coupling = operator.friction_coupling(across, area_rate, by_limit)
+        return np.concatenate([across, along, coupling])
+
+    def _shear_rates(self, q: Array) -> tuple[Array, Array]:
+        """Return derivatives of the mean shear by its elastic change and by the limit, (p,) [-]."""
+        first, change, limit = self._before[1], self._shear_change(q), self._means(q)[2]
+        start = clip_to_friction(first, limit)
+        excess = friction_excess(start + change, limit)
+        # part of the step in which the point slides; very small changes are lost in the sums
+        with np.errstate(all="ignore"):
+            sliding = np.where(excess != 0.0, np.clip(excess / change, 0.0, 1.0), 0.0)
+        clipped = np.where(np.abs(first) > limit, np.sign(first), 0.0)
+        mean = shear_over_step(first, change, 0.0, limit)[0] + self.damping_lag * change
+        at_limit = np.abs(mean) > limit
+        by_change = 0.5 * (1.0 - sliding) ** 2 + self.damping_lag
+        by_limit = (1.0 - sliding) * clipped + sliding * np.sign(change)
+        return np.where(at_limit, 0.0, by_change), np.where(at_limit, np.sign(mean), by_limit)
+
+
+def _aitken_factor(error: Array, last_error: Array, last_factor: float) -> float:
+    """Return the relaxation factor of a fixed-point iteration by Aitken's method."""
+    # Irons and Tuck, Int. J. Numer. Meth. Eng. 1 (1969) 275-277, bounded to 0.05 to 2
+    change = error - last_error
+    scale = max(float(change @ change), ZERO_DIVISION_GUARD)
+    return min(max(-last_factor * float(last_error @ change) / scale, 0.05), 2.0)

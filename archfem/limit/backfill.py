@@ -1,0 +1,591 @@
+"""Backfill in limit analysis: earth pressure on stones, load spreading, self-weight programme.
+
+A fill is not a body here but an action on the stones below it. The structure is cut into vertical
+strips: the weight of each column of fill rests on the stone at its foot, the vertical stress in it
+gives the active and the passive pressure on the stones' faces (Rankine), and a load on the road
+spreads in a fan down to the stones that it meets first (Flamant).
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import radians, sqrt, tan
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem._validation import check_number, check_type, is_one_of, short_repr
+from archfem.errors import InvalidInput
+from archfem.limit.linear_programme import (
+    Optimum,
+    Programme,
+    RigidBlocks,
+    friction_limits,
+    no_limits,
+    rigid_load,
+)
+from archfem.limit.rigid_regions import RigidRegions, find_rigid_regions, take_all_rigid
+from archfem.masonry.loads import BodyForce, PointLoad
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import (
+    CONTACT_TOLERANCE,
+    Structure,
+    first_coordinates,
+    rigid_motion_matrix,
+)
+from archfem.units import in_degrees
+
+logger = logging.getLogger("archfem")
+
+SELF_WEIGHT = BodyForce(0.0, -1.0)
+
+# Force missing for equilibrium, per weight of the free blocks, above which they do not stand [-]
+EQUILIBRIUM_TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fill:
+    """Strength of a fill, and the way in which it spreads loads that stand on it.
+
+    Limit analysis takes a fill not as a body but as an action on the stones below:
+
+    - its weight, column by column, rests on the stone below the column;
+    - it presses on the stones' faces horizontally, by anything from the active pressure to a part
+      of the passive one (Rankine, smooth faces), with the vertical stress σ of the columns above,
+
+        a max(K_a σ - 2 c √K_a, 0) <= p <= m (K_p σ + 2 c √K_p),   K_p = 1 / K_a = tan²(45° + φ/2),
+
+      so that stones which move into the fill are held back and those which move away are pushed;
+    - a load on its surface spreads down in a straight fan to the stones that it meets first.
+
+    The vertical stress is that of the weights alone: live loads do not raise the pressures. A body
+    force pulls at each column's foot, and does not change the pressures as an earthquake would
+    (Mononobe and Okabe). Shear between fill and stones is neglected, and the fill is long enough to
+    bear its reactions: its own balance and failure are not checked, and the pressure on one arch
+    does not act on the next.
+
+    Attributes:
+        friction_angle: friction angle φ of the fill [degrees].
+        cohesion: cohesion c of the fill [Pa].
+        mobilisation: mobilised part m of the passive pressure, from 0 for none to 1 for all; the
+            whole of it needs more movement than a bridge may have [-].
+        active: part a of the active pressure that always acts, from 0 to 1 [-]. Neglecting it
+            is customary for arches, and wrong for walls that hold a fill back. Where some passive
+            pressure beyond it is counted on, the whole is on the safe side of any part.
+        dispersal: distribution of a load within the fan: "boussinesq", as through an elastic
+            half-plane under a line load, or "uniform", evenly on each level.
+        spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's
+            stresses would carry outside of it is distributed inside.
+
+    References:
+        Gilbert, RING Theory and Modelling Guide, University of Sheffield (2005). Rankine, Phil.
+        Trans. R. Soc. 147 (1857) 9-27. Flamant, C. R. Acad. Sci. 114 (1892) 1465-1468.
+
+    Example:
+        >>> af.limit.Fill(friction_angle=30.0).mobilisation
+        0.3333333333333333
+    """
+
+    friction_angle: float
+    cohesion: float = 0.0
+    mobilisation: float = 1.0 / 3.0
+    active: float = 1.0
+    dispersal: str = "boussinesq"
+    spread: float = 30.0
+
+    def __post_init__(self) -> None:
+        """Refuse values outside their range, most of them wrong units."""
+        for key in ("friction_angle", "spread"):
+            if isinstance(value := getattr(self, key), str) or key == "spread":
+                object.__setattr__(self, key, in_degrees(value, f"fill, {key}"))
+        for key in ("friction_angle", "cohesion", "mobilisation", "active", "spread"):
+            check_number(getattr(self, key), f"fill, {key}", minimum=0.0)
+        if not (self.friction_angle == 0.0 or 1.0 <= self.friction_angle <= 60.0):
+            raise InvalidInput(
+                f"fill, friction_angle {self.friction_angle:.4g}° is neither 0 nor between 1° and "
+                "60°: give degrees; gravel has about 35"
+            )
+        if self.cohesion > 1e6:
+            raise InvalidInput(
+                f"fill, cohesion {self.cohesion:.4g} Pa is above 1 MPa: give Pa; with so much it "
+                "is masonry, to be modelled by blocks"
+            )
+        for key in ("mobilisation", "active"):
+            if getattr(self, key) > 1.0:
+                raise InvalidInput(
+                    f"fill, {key} {getattr(self, key):.4g} is above 1: give a part of the pressure"
+                )
+        if self.dispersal not in (choices := ("boussinesq", "uniform")):
+            raise InvalidInput(
+                f"fill, dispersal {self.dispersal!r} is not known: use one of {choices}"
+            )
+        if not 0.1 <= self.spread <= 80.0:
+            raise InvalidInput(
+                f"fill, spread {self.spread:.4g}° is not between 0.1° and 80°: give degrees from "
+                "the vertical; 1 in 2 is 26.6"
+            )
+
+    @property
+    def passive_coefficient(self) -> float:
+        """Rankine's K_p, passive over vertical stress of a fill without cohesion [-]."""
+        return tan(radians(45.0 + self.friction_angle / 2.0)) ** 2
+
+    @property
+    def edge(self) -> float:
+        """Slope of the fan's edges, horizontal to vertical [-]."""
+        return tan(radians(self.spread))
+
+    def pressures(self, overburden: Array) -> tuple[Array, Array]:
+        """Return the least and the greatest horizontal pressure, shaped as the argument [Pa].
+
+        Args:
+            overburden: vertical stress σ in the fill, any shape [Pa].
+        """
+        passive = self.passive_coefficient
+        least = overburden / passive - 2.0 * self.cohesion / sqrt(passive)
+        least = self.active * np.maximum(least, 0.0)
+        most = self.mobilisation * (passive * overburden + 2.0 * self.cohesion * sqrt(passive))
+        return least, np.maximum(least, most)
+
+    def share(self, slope: Array) -> Array:
+        """Return the part of a load that spreads to the left of some rays, shaped as given [-].
+
+        Under a line load on an elastic half-plane stresses are radial (Flamant), so that the force
+        between two rays of the fan is the same on any face that it meets.
+
+        Args:
+            slope: tan θ of rays at θ from the vertical, positive to the right, any shape.
+        """
+        inside = np.clip(slope, -self.edge, self.edge)
+        if self.dispersal == "uniform":
+            return np.asarray(0.5 + 0.5 * inside / self.edge)
+        return np.asarray(0.5 + 0.5 * _flamant(inside) / _flamant(np.array(self.edge)))
+
+
+def _flamant(slope: Array) -> Array:
+    """Return θ + sin θ cos θ, proportional to the force between the vertical and a ray."""
+    return np.asarray(np.arctan(slope) + slope / (1.0 + slope**2), dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSlices:
+    """Trapezia of blocks cut along the verticals through all corners, strip by strip upwards."""
+
+    block: NDArray[np.intp]  # number of the block of each slice (n,)
+    strip: NDArray[np.intp]  # number of its strip, from the left (n,)
+    side: Array  # x of its left and right side (n, 2) [m]
+    bottom: Array  # y of its lower edge at both sides (n, 2) [m]
+    top: Array  # y of its upper edge at both sides (n, 2) [m]
+
+    @property
+    def area(self) -> Array:
+        """Area of each slice (n,) [m²]."""
+        height = self.top - self.bottom
+        return np.asarray(height.mean(axis=1) * (self.side[:, 1] - self.side[:, 0]))
+
+    @property
+    def middle(self) -> Array:
+        """Centroid of each slice along x (n,) [m]."""
+        left, right = np.maximum(self.top - self.bottom, 0.0).T
+        share = (left + 2.0 * right) / np.maximum(3.0 * (left + right), np.finfo(float).tiny)
+        return np.asarray(self.side[:, 0] + share * (self.side[:, 1] - self.side[:, 0]))
+
+
+def slice_blocks(structure: Structure) -> BlockSlices:
+    """Cut the blocks of a structure along the verticals through all their corners."""
+    outlines = [block.drawn() for block in structure.blocks]
+    near = CONTACT_TOLERANCE * structure.size
+    cuts = np.unique(np.concatenate([outline[:, 0] for outline in outlines]))
+    cuts = cuts[np.append(True, np.diff(cuts) > near)]
+    trapezia = [
+        (number, strip, *cuts[strip : strip + 2], *low, *high)
+        for number, outline in enumerate(outlines)
+        for strip, low, high in _slice_outline(outline, cuts, near)
+    ]
+    rows = np.array(trapezia, dtype=float).reshape(-1, 8)
+    rows = rows[np.lexsort((rows[:, 4:].sum(axis=1), rows[:, 1]))]  # by strip, then upwards
+    numbers = rows[:, :2].astype(np.intp)
+    return BlockSlices(numbers[:, 0], numbers[:, 1], rows[:, 2:4], rows[:, 4:6], rows[:, 6:8])
+
+
+def _slice_outline(outline: Array, cuts: Array, near: float) -> list[tuple[int, Array, Array]]:
+    """Return strip, lower and upper edge of every trapezium of one outline."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    swap = start[:, :1] > end[:, :1]
+    left, right = np.where(swap, end, start), np.where(swap, start, end)
+    steep = right[:, 0] - left[:, 0] <= near  # vertical edges bound no trapezium
+    left, right = left[~steep], right[~steep]
+    slope = (right[:, 1] - left[:, 1]) / (right[:, 0] - left[:, 0])
+    pieces = []
+    first, last = np.searchsorted(cuts, [left[:, 0].min() - near, right[:, 0].max() - near])
+    for strip in range(first, last):
+        over = (left[:, 0] <= cuts[strip] + near) & (right[:, 0] >= cuts[strip + 1] - near)
+        x = cuts[strip : strip + 2]
+        level = left[over, 1, None] + slope[over, None] * (x - left[over, 0, None])
+        # from below, edges of an outline are in turn a lower and an upper one
+        level = level[np.argsort(level.sum(axis=1))]
+        pieces += [(strip, level[k], level[k + 1]) for k in range(0, len(level) - 1, 2)]
+    return pieces
+
+
+@dataclass(frozen=True, eq=False)
+class FillProfile:
+    """Stones of a structure, and the fill and paving that rest on them, in vertical strips."""
+
+    structure: Structure
+    stones: NDArray[np.bool_]  # whether each block is a stone (n_blocks,)
+
+    @cached_property
+    def slices(self) -> BlockSlices:
+        """All blocks in strips."""
+        return slice_blocks(self.structure)
+
+    @cached_property
+    def near(self) -> float:
+        """Distance of points that count as one [m]."""
+        return CONTACT_TOLERANCE * self.structure.size
+
+    @cached_property
+    def _unit_weights(self) -> Array:
+        """Unit weights of the slices (n,) [N/m³]."""
+        weights = np.array([block.material.unit_weight for block in self.structure.blocks])
+        return np.asarray(weights[self.slices.block])
+
+    def columns(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return stone, foot and weight of every column of fill (n,), (n, 2) [m], (n,) [N]."""
+        cut, rests = self.slices, ~self.stones[self.slices.block]
+        # the stone below each slice of fill, through any fill between them
+        below = np.where(rests, -1, np.arange(len(rests)))
+        for k in range(1, len(rests)):
+            if rests[k] and cut.strip[k] == cut.strip[k - 1]:
+                below[k] = below[k - 1]
+        carried = np.flatnonzero(rests & (below >= 0))
+        weight = (self._unit_weights * cut.area)[carried] * self.structure.width
+        carrier, x = below[carried], cut.middle[carried]
+        foot = np.stack([x, _interpolate_edge(cut.side[carrier], cut.top[carrier], x)], axis=1)
+        return cut.block[carrier], foot, weight
+
+    def overburden(self, point: Array, side: float) -> float:
+        """Return the vertical stress of all fill above a point, just beside it [Pa]."""
+        cut, x = self.slices, point[0] + 2.0 * side * self.near
+        over = np.flatnonzero((cut.side[:, 0] <= x) & (x < cut.side[:, 1]))
+        at = np.full(len(over), point[0])
+        edges = (_interpolate_edge(cut.side[over], y[over], at) for y in (cut.bottom, cut.top))
+        stress = 0.0
+        for k, low, high in zip(over, *edges, strict=True):
+            if self.stones[cut.block[k]] and low > point[1] - self.near:
+                break  # a stone above carries the fill beyond it
+            if not self.stones[cut.block[k]]:
+                stress += float(self._unit_weights[k] * max(high - max(low, point[1]), 0.0))
+        return stress
+
+    @cached_property
+    def _skyline(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Highest stone below each of many narrow pieces: number or -1, x and y of its sides."""
+        cut, stone = self.slices, self.stones[self.slices.block]
+        blocks, sides, levels = [], [], []
+        for strip in range(int(cut.strip.max()) + 1):
+            in_strip = np.flatnonzero(cut.strip == strip)
+            if not len(in_strip):
+                continue
+            stones = in_strip[stone[in_strip]]
+            left, right = cut.side[in_strip[0]]
+            # the fan is integrated on pieces of 1/2000 of the structure's size
+            count = int(np.ceil((right - left) / (1 / 2000 * self.structure.size)))
+            x, y = np.linspace(left, right, count + 1), np.full(count + 1, -np.inf)
+            if len(stones):
+                y = np.interp(x, cut.side[stones[-1]], cut.top[stones[-1]])
+            blocks.append(np.full(count, cut.block[stones[-1]] if len(stones) else -1))
+            sides.append(np.stack([x[:-1], x[1:]], axis=1))
+            levels.append(np.stack([y[:-1], y[1:]], axis=1))
+        return np.concatenate(blocks), np.concatenate(sides), np.concatenate(levels)
+
+    def fan(self, point: Array, fill: Fill) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return stones, points and parts of a load that spreads through the fill in a fan."""
+        halves = [self._half_fan(point, fill, sense) for sense in (1, -1)]
+        block, points, part = (np.concatenate(values) for values in zip(*halves, strict=True))
+        return block, points, part
+
+    def _half_fan(
+        self, point: Array, fill: Fill, sense: int
+    ) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return the fan on one side of a load, outwards: to the right where sense is 1."""
+        block, side, level = self._skyline
+        distance = sense * (side[:, ::sense] - point[0])
+        beyond = np.flatnonzero(distance[:, 1] > self.near)[::sense]
+        # slopes of the rays to both sides of each piece; a stone above the load stops all rays
+        depth = point[1] - level[beyond, ::sense]
+        slope = distance[beyond] / np.maximum(depth, self.near)
+        outward = np.where(depth > self.near, np.maximum(slope, 0.0), np.inf)
+        # A stone that stands up into the fan shades those behind it: the running maximum of the
+        # slopes separates the rays already intercepted from those that go on. Rays that no stone
+        # intercepts end in the ground.
+        reached = np.minimum(np.maximum.accumulate(outward.ravel()), fill.edge)[1::2]
+        before = np.concatenate([[0.0], reached[:-1]])
+        met = np.flatnonzero(reached > before)
+        # the force acts where the middle ray of each interval meets the piece
+        first, last = slope[met].T
+        ray = 0.5 * (before + reached)[met]
+        along = np.clip((ray - first) / np.where(last > first, last - first, np.inf), 0.0, 1.0)
+        ends = np.stack([side, level], axis=2)[beyond[met], ::sense]
+        points = ends[:, 0] + along[:, None] * (ends[:, 1] - ends[:, 0])
+        return block[beyond[met]], points, fill.share(reached[met]) - fill.share(before[met])
+
+
+def _interpolate_edge(side: Array, edge: Array, x: Array) -> Array:
+    """Return the height of edges at places between their ends (n,) [m]."""
+    share = (x - side[:, 0]) / (side[:, 1] - side[:, 0])
+    return np.asarray(edge[:, 0] + share * (edge[:, 1] - edge[:, 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class FillContacts:
+    """Pieces of stones' faces in contact with the fill beside or above them."""
+
+    block: NDArray[np.intp]  # number of the stone of each piece in the rigid regions (n,)
+    ends: Array  # of each piece (n, 2, 2) [m]
+    toward: Array  # sense of the pressure along x, 1 or -1 (n,)
+    least: Array  # active pressure at both ends (n, 2) [Pa]
+    most: Array  # mobilised passive pressure at both ends (n, 2) [Pa]
+
+    def thrust(self, pressure: Array, width: float) -> tuple[Array, Array]:
+        """Return points and resultants (n, 2) of pressures that are linear along each piece."""
+        rise = np.abs(self.ends[:, 1, 1] - self.ends[:, 0, 1])
+        size = self.toward * pressure.mean(axis=1) * rise * width
+        first, last = pressure.T
+        share = (first + 2.0 * last) / np.maximum(3.0 * (first + last), np.finfo(float).tiny)
+        points = self.ends[:, 0] + share[:, None] * (self.ends[:, 1] - self.ends[:, 0])
+        return points, np.stack([size, np.zeros(len(size))], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class BlocksWithFill:
+    """Rigid stones of a structure, with the loads and the resistance of its fill."""
+
+    whole: Structure  # with its fill
+    fill: Fill | None  # strength of the fill, or None without one
+    rigid_regions: RigidRegions  # the stones that stand by themselves
+
+    @cached_property
+    def _place(self) -> NDArray[np.intp]:
+        """Number in the rigid regions of each block of the whole, -1 for the fill (n_blocks,)."""
+        place = np.full(self.rigid_regions.size, -1)
+        place[list(self.rigid_regions.blocks)] = np.arange(len(self.rigid_regions.blocks))
+        return place
+
+    @cached_property
+    def _profile(self) -> FillProfile:
+        """Stones and fill in strips."""
+        return FillProfile(self.whole, self._place >= 0)
+
+    @cached_property
+    def _columns(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Stone, foot and weight of every column of fill."""
+        return self._profile.columns()
+
+    @cached_property
+    def contacts(self) -> FillContacts:
+        """Pieces of the stones' faces on which the fill presses."""
+        soil, normals = set(find_yielding_blocks(self.whole)), self.whole.normals
+        block, ends, toward, stress = [], [], [], []
+        pieces, level = 8, 1e-9  # pieces a face; rise over length of a face without side pressure
+        for number, joint in enumerate(self.whole.joints):
+            stone = next((b for b in joint.blocks if b not in soil), joint.lower)
+            other = joint.blocks[0] + joint.blocks[1] - stone
+            out = normals[number] * (1.0 if stone == joint.lower else -1.0)
+            bare = self._place[stone] < 0 or self.whole.blocks[stone].fixed
+            if bare or other not in soil or abs(out[0]) <= level or out[1] < -level:
+                continue
+            along = np.linspace(0.0, 1.0, pieces + 1)[:, None]
+            points = joint.ends[0] + along * np.diff(joint.ends, axis=0)
+            side = float(np.sign(out[0]))
+            over = np.array([self._profile.overburden(point, side) for point in points])
+            block += [self._place[stone]] * pieces
+            toward += [-side] * pieces
+            ends += list(pairwise(points))
+            stress += list(pairwise(over))
+        assert self.fill is not None
+        least, most = self.fill.pressures(np.array(stress, dtype=float).reshape(-1, 2))
+        return FillContacts(
+            np.array(block, dtype=np.intp),
+            np.array(ends, dtype=float).reshape(-1, 2, 2),
+            np.array(toward, dtype=float),
+            least,
+            most,
+        )
+
+    def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
+        """Return the generalised forces of actions on the free stones (3 n_free,) [N, N, N m]."""
+        total = np.zeros(3 * len(self.rigid_regions.structure.free))
+        for action in actions:
+            # a body force acts on the fill too, and so on the stone at the foot of each column
+            if self.fill is not None and isinstance(action, BodyForce):
+                block, foot, weight = self._columns
+                pull = weight[:, None] * np.array([action.horizontal, action.vertical])
+                total += self._generalised_sum(self._place[block], foot, pull)
+            if self.fill is not None and isinstance(action, PointLoad):
+                number, point = action.place(self.whole)
+                if self._place[number] < 0:
+                    total += self._spread_load(action, point)
+                    continue
+            total += rigid_load(self.rigid_regions.structure, [action])
+        return total
+
+    def _spread_load(self, load: PointLoad, point: Array) -> Array:
+        """Return the generalised forces of a load on the fill (3 n_free,)."""
+        if load.force[0] != 0.0 or load.force[1] > 0.0:
+            raise InvalidInput(
+                f"a point load of {load.force} N at x = {load.x:.4g} m stands on the fill, which "
+                "spreads what presses straight down: give (0, -P), and forces along the road as "
+                "a BodyForce or on a structure without fill"
+            )
+        assert self.fill is not None
+        block, points, part = self._profile.fan(point, self.fill)
+        forces = part[:, None] * np.array(load.force)
+        return self._generalised_sum(self._place[block], points, forces)
+
+    def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
+        """Warn where a fill without cohesion would slide before the stones become a mechanism."""
+        pulls = [action for action in actions if isinstance(action, BodyForce)]
+        if self.fill is None or self.fill.cohesion > 0.0:
+            return
+        # A column rests on the next layer by friction alone: it slides where the horizontal pull
+        # exceeds tan φ times the vertical force.
+        slope = tan(radians(self.fill.friction_angle))
+        sideways = factor * abs(sum(pull.horizontal for pull in pulls))
+        if sideways > slope * (1.0 - factor * sum(pull.vertical for pull in pulls)):
+            logger.warning(
+                "at a factor of %.4g the fill itself slides, at %.3g g sideways and tan φ = %.3g: "
+                "the factor is that of the stones alone, and no fill would stay to load them so",
+                *(factor, sideways, slope),
+            )
+
+    def active_forces(self) -> Array:
+        """Return the generalised forces of the active pressure (3 n_free,) [N, N, N m]."""
+        if self.fill is None:
+            return np.zeros(3 * len(self.rigid_regions.structure.free))
+        contacts = self.contacts
+        points, forces = contacts.thrust(contacts.least, self.whole.width)
+        return self._generalised_sum(contacts.block, points, forces)
+
+    def passive_forces(self) -> sparse.csr_matrix:
+        """Return the generalised forces of each contact's pressure range (3 n_free, n)."""
+        if self.fill is None:
+            return sparse.csr_matrix((3 * len(self.rigid_regions.structure.free), 0))
+        contacts = self.contacts
+        points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
+        return sparse.csr_matrix(self._generalised_forces(contacts.block, points, forces).T)
+
+    def pressure_dataset(self, share: Array) -> xr.Dataset | None:
+        """Return the pressures of the fill over contact, or None where there is none."""
+        if self.fill is None:
+            return None
+        contacts = self.contacts
+        share = share[len(share) - len(contacts.block) :]  # a load factor may stand before them
+        least, most = contacts.least.mean(axis=1), contacts.most.mean(axis=1)
+        variables = {
+            "pressure": ("contact", least + share * (most - least), {"units": "Pa"}),
+            "least": ("contact", least, {"units": "Pa"}),
+            "most": ("contact", most, {"units": "Pa"}),
+        }
+        ends, numbers = ("contact", "end"), np.array(self.rigid_regions.blocks, dtype=np.intp)
+        return xr.Dataset(
+            variables,
+            {
+                "block": ("contact", numbers[contacts.block]),
+                "x": (ends, contacts.ends[:, :, 0], {"units": "m"}),
+                "y": (ends, contacts.ends[:, :, 1], {"units": "m"}),
+                "toward": ("contact", contacts.toward),
+            },
+        )
+
+    def _generalised_forces(
+        self, block: NDArray[np.intp], points: Array, forces: Array
+    ) -> sparse.csr_matrix:
+        """Return the generalised forces of forces at points of the stones (n, 3 n_free)."""
+        structure = self.rigid_regions.structure
+        start = np.full(len(structure.blocks), -1)
+        for number, first in first_coordinates(structure).items():
+            start[number] = first
+        centroids = np.array([stone.centroid for stone in structure.blocks])
+        entries = np.einsum("pi,pij->pj", forces, rigid_motion_matrix(points, centroids[block]))
+        rows = np.flatnonzero(start[block] >= 0)  # supports have no coordinates
+        columns = start[block[rows], None] + np.arange(3)
+        shape = (len(block), 3 * len(structure.free))
+        return sparse.csr_matrix((entries[rows].ravel(), (rows.repeat(3), columns.ravel())), shape)
+
+    def _generalised_sum(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
+        """Return the sum of those generalised forces (3 n_free,)."""
+        return np.asarray(self._generalised_forces(block, points, forces).sum(axis=0)).ravel()
+
+
+def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
+    """Separate the stones of a structure from its fill, and check that the fill has a strength."""
+    soil = find_yielding_blocks(structure)
+    names = [structure.blocks[number].name for number in soil]
+    # Fill cut into pieces has the strength of its joints: its pieces are rigid as stones are.
+    if names and fill is None and all(structure.blocks[number].grain for number in soil):
+        return BlocksWithFill(structure, None, take_all_rigid(structure))
+    if names and fill is None:
+        raise InvalidInput(
+            f"blocks {names} are softer than the joints around them: rigid, they would hold every "
+            "ring below; give their strength, fill=af.limit.Fill(friction_angle=35.0), to take "
+            "them as weight and earth pressure, or push a finite-element model over"
+        )
+    if fill is not None and not names:
+        raise InvalidInput(
+            "fill is given, but no block is soft enough to be one (role 'other', and softer than "
+            "the joints around it): leave fill out, or build the structure with its backfill"
+        )
+    regions = find_rigid_regions(structure)
+    if set(regions.blocks) & set(soil):
+        raise InvalidInput(f"there is nothing but fill, {names}: limit analysis is of stones")
+    return BlocksWithFill(structure, fill, regions)
+
+
+def _check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
+    """Refuse unknown options, and bonds, which break and do not yield."""
+    if not is_one_of(friction, choices := ("coulomb", "nonassociated", None)):
+        raise InvalidInput(f"friction {short_repr(friction)} is not known: use one of {choices}")
+    if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
+        raise InvalidInput(f"strength {strength:.3g} Pa is not positive: leave it out for no limit")
+    if structure.tension.any():
+        raise InvalidInput(
+            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: limit analysis "
+            "is for joints that yield, and bonds break; for the safe answer without them give "
+            "Contact(tension=0.0, cohesion=0.0), with them follow a pushover"
+        )
+
+
+def self_weight_programme(
+    structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
+) -> tuple[BlocksWithFill, Programme]:
+    """Return the rigid stones, and the programme of their self-weight without an objective."""
+    check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
+    _check_options(structure, friction, strength)
+    stones = attach_fill(structure, fill)
+    rigid = stones.rigid_regions.structure
+    blocks = RigidBlocks(rigid)
+    limits = no_limits(len(rigid.joints))
+    if friction is not None:
+        limits = friction_limits(rigid.friction, blocks.cohesion)
+    crushing = None
+    if strength is not None:
+        crushing = strength * rigid.width * rigid.depths / blocks.force_unit
+    weight = blocks.dimensionless(stones.load([SELF_WEIGHT]) + stones.active_forces())
+    dead = Programme(blocks, weight, limits, crushing)
+    if fill is None:
+        return stones, dead
+    # further unknowns, 0 to 1: the position of each contact's pressure in its range
+    pressures = sparse.diags(-blocks.coordinate_units / blocks.force_unit) @ stones.passive_forces()
+    return stones, dead.with_unknowns(pressures, np.zeros(pressures.shape[1]), 1.0)
+
+
+def is_balanced(fall: Optimum, dead: Programme) -> bool:
+    """Return whether the forces missing for equilibrium are within the tolerance."""
+    return fall.value <= EQUILIBRIUM_TOLERANCE * len(dead.blocks.structure.free)

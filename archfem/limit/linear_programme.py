@@ -1,0 +1,288 @@
+"""Equilibrium of rigid blocks as a linear programme over the forces at the ends of the joints.
+
+Each joint carries a compression at its intrados end, F_i, one at its extrados end, F_e, and a
+shear force V. They are equivalent to the resultants
+
+    N = F_i + F_e,   M = (F_e - F_i) h/2,
+
+and turn |M| <= N h/2 into F_i, F_e >= 0. By virtual work the balance with the loads f is the
+transpose of the kinematics: -G_oᵀ F + G_sᵀ V = f, with G_o the openings of the two ends and G_s
+the slips in terms of the motions of the blocks. Forces are in mean block weights and rotations in
+mean joint depths, so that coefficients are of order one.
+
+References: Livesley, Int. J. Numer. Meth. Eng. 12 (1978) 1853-1871.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linprog
+
+from archfem._typing import Array
+from archfem.errors import DidNotConverge
+from archfem.joints.quadrature import Quadrature
+from archfem.joints.rigid_kinematics import rigid_joint_operator
+from archfem.masonry.loads import BodyForce, PointLoad
+from archfem.masonry.structure import Structure, first_coordinates, rigid_motion_matrix
+
+
+class NoEquilibrium(DidNotConverge):
+    """The programme is infeasible: no forces within the limits balance the loads."""
+
+
+def rigid_load(structure: Structure, actions: Sequence[BodyForce | PointLoad]) -> Array:
+    """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
+    start = first_coordinates(structure)
+    load = np.zeros(3 * len(start))
+    for action in actions:
+        if isinstance(action, BodyForce):
+            for number, first in start.items():
+                block = structure.blocks[number]
+                weight = block.area * block.material.unit_weight * structure.width
+                load[first : first + 2] += weight * np.array([action.horizontal, action.vertical])
+        else:
+            number, point = action.place(structure)
+            motion = rigid_motion_matrix(point[None, :], structure.blocks[number].centroid)[0]
+            load[start[number] : start[number] + 3] += np.array(action.force) @ motion
+    return load
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBlocks:
+    """Rigid blocks of a structure, with forces at the two ends of each joint."""
+
+    structure: Structure
+
+    @property
+    def force_unit(self) -> float:
+        """Unit of force in the programme: the mean weight of a free block [N]."""
+        return self.structure.weight / len(self.structure.free)
+
+    @cached_property
+    def length_unit(self) -> float:
+        """Unit of length in the programme: the mean depth of a joint [m]."""
+        return float(self.structure.depths.mean())
+
+    @cached_property
+    def coordinate_units(self) -> Array:
+        """Units of the block coordinates in the programme (3 n_free,) [m, m, rad]."""
+        return np.tile([1.0, 1.0, 1.0 / self.length_unit], len(self.structure.free))
+
+    @cached_property
+    def cohesion(self) -> Array:
+        """Cohesive shear strength c A of the whole joints (n_joints,) [mean block weights]."""
+        return self.structure.cohesion / self.force_unit
+
+    @cached_property
+    def kinematics(self) -> sparse.csr_matrix:
+        """Openings of intrados ends, of extrados ends, and slips (3 n_joints, 3 n_free) [-, m]."""
+        ends = rigid_joint_operator(self.structure, 1, Quadrature("nodal"))
+        rows = [ends.opening[0::2], ends.opening[1::2], ends.slip[0::2]]
+        return sparse.vstack(rows, format="csr")
+
+    def gaps(self, motion: Array) -> Array:
+        """Return intrados openings, extrados openings and slips of a motion (3, n_joints) [m]."""
+        structure, jump = self.structure, np.zeros((len(self.structure.joints), 2, 2))
+        centroids = np.array([block.centroid for block in structure.blocks])
+        # displacement jump at both ends: higher block minus lower block
+        for side, sign in enumerate((-1.0, 1.0)):
+            block = structure.pairs[:, side]
+            x, y = np.moveaxis(structure.ends - centroids[block, None], -1, 0)
+            u, v, turn = motion[block].T[:, :, None]
+            jump += sign * np.stack([u - turn * y, v + turn * x], axis=-1)
+        intrados, extrados = np.einsum("kei,ki->ek", jump, structure.normals)
+        slip = np.einsum("ki,ki->k", jump[:, 0], structure.tangents)
+        return np.stack([intrados, extrados, slip])
+
+    @cached_property
+    def balance(self) -> sparse.csr_matrix:
+        """Balance of the free blocks, in the programme's units (3 n_free, 3 n_joints)."""
+        sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
+        return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
+
+    def dimensionless(self, load: Array) -> Array:
+        """Return generalised forces in the programme's units (3 n_free,)."""
+        return self.coordinate_units * load / self.force_unit
+
+    def motion(self, multipliers: Array) -> Array:
+        """Return the motion of all blocks, zero for fixed ones (n_blocks, 3) [m, m, rad]."""
+        motion = np.zeros((len(self.structure.blocks), 3))
+        motion[list(self.structure.free)] = (self.coordinate_units * multipliers).reshape(-1, 3)
+        return motion
+
+    def largest_displacement(self, motion: Array) -> float:
+        """Return the largest displacement of a corner of any block [m]."""
+        return max(
+            float(
+                np.linalg.norm(rigid_motion_matrix(block.drawn(), block.centroid) @ u, axis=1).max()
+            )
+            for block, u in zip(self.structure.blocks, motion, strict=True)
+        )
+
+    def resultants(self, forces: Array) -> Array:
+        """Return N, V, M of every joint (n_joints, 3) [N, N, N m]."""
+        intrados, extrados, shear = self.force_unit * forces.reshape(3, -1)
+        moment = (extrados - intrados) * self.structure.depths / 2.0
+        return np.stack([intrados + extrados, shear, moment], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Linear limits on the joint forces, `rows @ forces <= bounds`, besides F_i, F_e >= 0."""
+
+    rows: sparse.csr_matrix  # (m, 3 n_joints) [-]
+    bounds: Array  # (m,) [mean block weights]
+
+    def joined(self, other: "Limits") -> "Limits":
+        """Return both sets of limits together."""
+        rows = sparse.vstack([self.rows, other.rows], format="csr")
+        return Limits(rows, np.concatenate([self.bounds, other.bounds]))
+
+
+def no_limits(joint_count: int) -> Limits:
+    """Return an empty set of limits on the joint forces."""
+    return Limits(sparse.csr_matrix((0, 3 * joint_count)), np.zeros(0))
+
+
+def friction_limits(coefficient: Array, cohesion: Array) -> Limits:
+    """Return the limits |V| <= c A + μ N of each joint; none where μ is infinite."""
+    slides = np.isfinite(coefficient)
+    slope, one = sparse.diags(-np.where(slides, coefficient, 0.0)), sparse.diags(1.0 * slides)
+    rows = sparse.bmat([[slope, slope, one], [slope, slope, -one]], format="csr")
+    return Limits(rows, np.tile(cohesion, 2))
+
+
+def crushing_cuts(joints: NDArray[np.intp], at: Array, crushing: Array) -> Limits:
+    """Return tangents at N_0 = `at` of the crushing limit |M| <= N h/2 - N²/(2 σ w)."""
+    # A rectangular stress block of the full strength σ demands F >= N²/(2 N_c) at each end, with
+    # N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
+    slope, row, count = at / crushing[joints], np.arange(len(joints)), len(crushing)
+    shape = (len(joints), count)
+    tangent = sparse.csr_matrix((slope, (row, joints)), shape)
+    end = sparse.csr_matrix((np.ones(len(joints)), (row, joints)), shape)
+    rows = sparse.bmat(
+        [[tangent - end, tangent, None], [tangent, tangent - end, sparse.csr_matrix(shape)]]
+    )
+    return Limits(rows.tocsr(), np.tile(slope * at / 2.0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Optimal solution of a programme."""
+
+    value: float  # minimum of the objective
+    forces: Array  # F_i, F_e and V of all joints (3 n_joints,) [mean block weights]
+    multipliers: Array  # of the balance: the motion of the free blocks (3 n_free,)
+    unknowns: Array = field(default_factory=lambda: np.zeros(0))  # z, besides the forces (k,)
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """Linear programme over joint forces x and further unknowns z."""
+
+    # min  a·x + b·z   subject to   A x + D z = f,   limits on x,   F_i, F_e >= 0,   0 <= z <= c
+
+    blocks: RigidBlocks  # their balance is A
+    load: Array  # f (3 n_free,) [mean block weights]
+    limits: Limits  # on the joint forces
+    crushing: Array | None = None  # crushing force σ w h (n_joints,) [mean block weights]
+    force_cost: Array | None = None  # a (3 n_joints,); None for zero
+    columns: sparse.csr_matrix | None = None  # D (3 n_free, k); None without z
+    unknown_cost: Array = field(default_factory=lambda: np.zeros(0))  # b (k,)
+    upper_bounds: Array = field(default_factory=lambda: np.zeros(0))  # c (k,), infinite for none
+
+    def with_unknowns(
+        self, columns: sparse.csr_matrix, cost: Array, upper_bound: float = np.inf
+    ) -> "Programme":
+        """Return the programme with further unknowns before its present ones."""
+        if self.columns is not None:
+            columns = sparse.hstack([columns, self.columns], format="csr")
+        upper_bounds = np.concatenate([np.full(len(cost), upper_bound), self.upper_bounds])
+        cost = np.concatenate([cost, self.unknown_cost])
+        return replace(self, columns=columns, unknown_cost=cost, upper_bounds=upper_bounds)
+
+    def with_load_factor(self, load: Array) -> "Programme":
+        """Return the programme that maximises the factor of a further load, its first unknown."""
+        column = sparse.csr_matrix(-self.blocks.dimensionless(load)[:, None])
+        return self.with_unknowns(column, np.array([-1.0]))
+
+    def minimise_residual(self) -> Optimum:
+        """Return the least sum of forces missing for equilibrium; the multipliers are a fall."""
+        identity = sparse.identity(len(self.load))
+        columns = sparse.hstack([identity, -identity], format="csr")
+        optimum = self.with_unknowns(columns, np.ones(2 * len(self.load))).solve()
+        assert optimum is not None  # a sum of magnitudes is bounded from below
+        return optimum
+
+    def objective(self, state: Optimum) -> float:
+        """Return a·x + b·z of a state of another programme over the same unknowns."""
+        force_cost = 0.0 if self.force_cost is None else self.force_cost @ state.forces
+        return float(force_cost + self.unknown_cost @ state.unknowns)
+
+    def solve(self, max_rounds: int = 60, crushing_tolerance: float = 1e-7) -> Optimum | None:
+        """Solve, adding crushing cuts until none is violated; None where it is unbounded."""
+        limits = self.limits
+        if self.crushing is not None:
+            every = np.arange(len(self.crushing))
+            for share in (0.25, 0.5, 1.0):
+                limits = limits.joined(crushing_cuts(every, share * self.crushing, self.crushing))
+        # As tangents of a parabola the cuts converge quadratically, in about six rounds.
+        for _ in range(max_rounds):
+            optimum = self._solve_linear(limits)
+            if optimum is None or self.crushing is None:
+                return optimum
+            thrust = optimum.forces.reshape(3, -1)[:2].sum(axis=0)
+            smaller_end = optimum.forces.reshape(3, -1)[:2].min(axis=0)
+            excess = thrust**2 / (2.0 * self.crushing) - smaller_end
+            violated = np.flatnonzero(excess > crushing_tolerance * self.crushing)
+            if not len(violated):
+                return optimum
+            limits = limits.joined(crushing_cuts(violated, thrust[violated], self.crushing))
+        raise DidNotConverge(
+            f"the crushing limit is still violated after {max_rounds} rounds of cuts: "
+            "check that strength is in Pa"
+        )
+
+    def _solve_linear(self, limits: Limits) -> Optimum | None:
+        """Solve with linear limits only, by the dual simplex method."""
+        joint_count, extra = len(self.blocks.structure.depths), len(self.unknown_cost)
+        size = 3 * joint_count
+        force_cost = np.zeros(size) if self.force_cost is None else self.force_cost
+        balance = self.blocks.balance
+        if self.columns is not None:
+            balance = sparse.hstack([balance, self.columns], format="csr")
+        no_rows = sparse.csr_matrix((len(limits.bounds), extra))
+        bounds = np.tile([0.0, np.inf], (size + extra, 1))
+        bounds[2 * joint_count : size, 0] = -np.inf  # shear has either sign
+        bounds[size:, 1] = self.upper_bounds
+        # Residuals of balance and limits in mean block weights. Where round-off stops the solver,
+        # presolve changes its path, and then a coarser tolerance lets it end.
+        for presolve, tolerance in ((False, 1e-9), (True, 1e-9), (True, 1e-8)):
+            result = linprog(
+                np.concatenate([force_cost, self.unknown_cost]),
+                A_ub=sparse.hstack([limits.rows, no_rows], format="csr"),
+                b_ub=limits.bounds,
+                A_eq=balance,
+                b_eq=self.load,
+                bounds=bounds,
+                method="highs-ds",
+                options={
+                    "primal_feasibility_tolerance": tolerance,
+                    "dual_feasibility_tolerance": tolerance,
+                    "presolve": presolve,
+                },
+            )
+            if result.status in (0, 2, 3):  # optimal, infeasible, unbounded
+                break
+        if result.status == 3:
+            return None
+        if result.status == 2:
+            raise NoEquilibrium("no state of equilibrium fulfils the limits")
+        if result.status != 0:
+            raise DidNotConverge(f"the linear programme found no state: {result.message}")
+        multipliers = np.array(result.eqlin.marginals)
+        return Optimum(float(result.fun), result.x[:size], multipliers, result.x[size:])

@@ -1,0 +1,297 @@
+"""Mechanisms by counting failed joints: classes, first instant, duration and opening.
+
+Most mechanisms by count close again before anything falls; `episode` follows one from its first
+instant. `mechanism_kinematics` checks whether the failed joints permit a motion.
+"""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from archfem.errors import InvalidInput
+from archfem.joints.criteria import (
+    Criteria,
+    assessed_joints,
+    failed_joints,
+    find_lasting,
+    part_roles,
+    step_lengths,
+    with_failure_flags,
+)
+from archfem.masonry.parts import select_assessed_parts
+from archfem.units import mm
+
+# Classes of mechanisms, from narrow to wide
+MECHANISM_KINDS = ("local", "semi-global", "global")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Parts of a structure that fail, or move, together.
+
+    Attributes:
+        kind: class of the mechanism: "local" in one ring or one pier, "semi-global" in one ring
+            and one pier, "global" in more; "none" where no ring and no pier moves.
+        part: names of the rings and piers concerned, joined by " + ".
+        joints: numbers of the failed joints; by motion, of those that open or slip.
+        time: instant [s]; None for a static state.
+        blocks: numbers of the blocks that can move; empty where rings and piers cannot, or for a
+            mechanism by count.
+        names: names of `joints`, not used in comparisons.
+    """
+
+    kind: str
+    part: str
+    joints: tuple[int, ...]
+    time: float | None = None
+    blocks: tuple[int, ...] = ()
+    names: tuple[str, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """Unbroken time for which all joints of a mechanism stay failed.
+
+    Attributes:
+        duration: duration [s]; a record stands for the step that ends with it.
+        opening: largest opening of any of its joints meanwhile [m]; None where openings are not
+            recorded.
+        closes: whether it ends before the record does.
+    """
+
+    duration: float
+    opening: float | None
+    closes: bool
+
+    def __str__(self) -> str:
+        """Describe duration, opening, and whether it closes again."""
+        wide = "" if self.opening is None else f", opens by up to {self.opening / mm:.3g} mm"
+        end = "closes again" if self.closes else "has not closed when the record ends"
+        return f"it lasts {duration_text(self.duration)}{wide} and {end}"
+
+
+def duration_text(duration: float) -> str:
+    """Return a duration as text, short ones in milliseconds."""
+    return f"{duration:.3g} s" if duration >= 1.0 else f"{1e3 * duration:.3g} ms"
+
+
+def mechanism_kind(roles: Collection[str]) -> str:
+    """Return the class of a mechanism: "none", "local", "semi-global" or "global"."""
+    carrying = sorted(role for role in roles if role != "other")
+    if len(carrying) < 2:
+        return "local" if roles else "none"
+    return "semi-global" if carrying == ["pier", "ring"] else "global"
+
+
+def counted_mechanism(
+    joints: xr.Dataset, criteria: Criteria | None = None, *, kinds: Sequence[str] = MECHANISM_KINDS
+) -> Mechanism | None:
+    """Find the first instant from which on enough joints have failed at once.
+
+    A wide reading of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
+    ring alone (local), with joints of one pier among the four (semi-global), or of more rings and
+    piers (global); `demirel_aldemir_mechanism` follows their words. A joint that has come apart
+    counts too. The class is that of all joints failed at the instant; `kinds=("local",)` finds
+    four in one ring regardless of further failures. Over time enough joints must have failed for
+    as long as the criteria say, the same ones or others.
+
+    Args:
+        joints: over joint, or over time and joint; those of `judged` are counted.
+        criteria: conditions of failure, number of failed joints that make a mechanism, and their
+            duration; by default those by which the joints were judged already.
+        kinds: classes of mechanisms to find.
+
+    Returns:
+        The mechanism, or None.
+    """
+    joints = with_failure_flags(joints, criteria)
+    limits, roles, flags = Criteria.of(joints), part_roles(joints), _flags_over_time(joints)
+    counts = _count_by_part(flags, select_assessed_parts(roles))
+
+    def find_group(instant: int) -> tuple[int, tuple[str, ...]] | None:
+        count = {name: int(failures[instant]) for name, failures in counts.items()}
+        group = _widest_group(count, roles, limits.failures, kinds)
+        return None if group is None else (instant, group)
+
+    enough = np.flatnonzero(sum(counts.values()) >= limits.failures)
+    first = find_lasting(enough, flags["time"].values, limits.duration, find_group)
+    if first is None:
+        return None
+    instant, group = first
+    return _mechanism(flags, instant, mechanism_kind([roles[name] for name in group]), group)
+
+
+def demirel_aldemir_mechanism(
+    joints: xr.Dataset, criteria: Criteria | None = None
+) -> Mechanism | None:
+    """Find the first mechanism by the criterion of Demirel and Aldemir (2021), as they word it.
+
+    One ring must have four hinging or sliding joints of its own at once; then it has collapsed
+    locally. Where joints of piers have failed too, the mechanism is semi-global or global. Joints
+    of a pier thus change the class, and never help to make up the four, as they do in
+    `counted_mechanism`. So it begins at the very instant of "four in a ring" of
+    `counted_mechanisms`. Open points of the paper are read so: a joint counts once, though it
+    hinges and slides; one that has come apart, whose ratios are beyond any limit, counts as failed;
+    with joints of one pier it is semi-global, with joints of more global. The number four is that
+    of the criteria, and their hinge is at |e| = 0.46, 8 % short of the 0.5 of the paper's equation,
+    as in its evaluation of the bridge. The paper does not word a duration; it is that of the
+    criteria.
+
+    Args:
+        joints: over joint, or over time and joint.
+        criteria: by default those by which the joints were judged already.
+
+    Returns:
+        The mechanism, of the rings that have collapsed and the piers with failed joints, or None.
+
+    References:
+        Demirel and Aldemir, Buildings 11 (2021), section 2, criteria 1 and 2 and the text after
+        them.
+    """
+    joints = with_failure_flags(joints, criteria)
+    limits, roles, flags = Criteria.of(joints), part_roles(joints), _flags_over_time(joints)
+    counts = _count_by_part(flags, roles)
+    rings = [name for name, role in roles.items() if role == "ring"]
+    collapsed = np.array([counts[name] >= limits.failures for name in rings])
+    collapsed = collapsed.reshape(-1, flags.sizes["time"])  # also without any ring
+    instants = np.flatnonzero(collapsed.any(axis=0))
+    instant = find_lasting(instants, flags["time"].values, limits.duration, lambda number: number)
+    if instant is None:
+        return None
+    fallen = [name for name, down in zip(rings, collapsed[:, instant], strict=True) if down]
+    piers = [name for name, role in roles.items() if role == "pier" and counts[name][instant]]
+    group = [name for name in roles if name in (*fallen, *piers)]
+    return _mechanism(flags, instant, MECHANISM_KINDS[min(len(piers), 2)], group)
+
+
+def counted_mechanisms(
+    joints: xr.Dataset, criteria: Criteria | None = None
+) -> dict[str, Mechanism | None]:
+    """Find the first mechanism by each of the definitions in use that count joints.
+
+    "Any four joints" are of rings and piers, anywhere; "four in a ring" of one ring, regardless of
+    further failures; "ring and pier" four of one ring and one pier together, at least one of each.
+    The number four is that of the criteria.
+
+    Args:
+        joints: over joint, or over time and joint.
+        criteria: by default those by which the joints were judged already.
+
+    Returns:
+        The first mechanism by each definition, or None, by the definition's name.
+    """
+    joints = with_failure_flags(joints, criteria)
+    rings = joints["role"].values.astype(str) == "ring"
+    return {
+        "any four joints": counted_mechanism(joints),
+        "four in a ring": counted_mechanism(joints.isel(joint=rings), kinds=("local",)),
+        "ring and pier": counted_mechanism(joints, kinds=("semi-global",)),
+    }
+
+
+def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
+    """Follow a mechanism from its instant on, for as long as its joints stay failed.
+
+    Args:
+        joints: over time and joint, as those of the mechanism, with their flags.
+        found: mechanism with a time, by count or by motion.
+
+    Returns:
+        Its duration and opening.
+
+    Raises:
+        InvalidInput: the mechanism has no time, or one that was not recorded.
+    """
+    times = joints["time"].values
+    start = np.flatnonzero(times == found.time)
+    if not len(start):
+        raise InvalidInput(
+            f"the mechanism's time {found.time} is none of those recorded: give the joints in "
+            "which it was found, over time"
+        )
+    begin = int(start[0])
+    in_mechanism = np.flatnonzero(joints["joint"].isin(list(found.joints)).values)
+    after = with_failure_flags(joints).isel(joint=in_mechanism, time=slice(begin, None))
+    all_failed = failed_joints(after).all("joint").values
+    count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
+    duration = float(step_lengths(times)[begin : begin + count].sum())
+    opening = float(after["opening"][:count].max()) if "opening" in after else None
+    return Episode(duration, opening, begin + count < len(times))
+
+
+def has_counted_mechanism(joints: xr.Dataset) -> xr.DataArray:
+    """Return whether enough joints for a mechanism by count have failed at each instant."""
+    return failed_joints(assessed_joints(joints)).sum("joint") >= Criteria.of(joints).failures
+
+
+def matching_definitions(
+    count: Mapping[str, int], roles: Mapping[str, str], failures: int
+) -> frozenset[str]:
+    """Return the definitions of `counted_mechanisms` that failed joints meet at an instant."""
+    rings = {name: number for name, number in count.items() if roles[name] == "ring"}
+    definitions = {
+        "any four joints": (count, MECHANISM_KINDS),
+        "four in a ring": (rings, ("local",)),
+        "ring and pier": (count, ("semi-global",)),
+    }
+    return frozenset(
+        name
+        for name, (counted, kinds) in definitions.items()
+        if _widest_group(counted, roles, failures, kinds) is not None
+    )
+
+
+def _flags_over_time(joints: xr.Dataset) -> xr.DataArray:
+    """Return failure flags over time and joint; a static state has one instant, NaN."""
+    flags = failed_joints(joints)
+    if "time" not in flags.coords:
+        flags = flags.assign_coords(time=np.nan)
+    if "time" not in flags.dims:
+        flags = flags.expand_dims("time")
+    return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
+
+
+def _count_by_part(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArray[np.int64]]:
+    """Return the number of failed joints of each part, by its name, over time (steps,)."""
+    part, failures = flags["part"].values.astype(str), flags.values
+    return {name: failures[:, part == name].sum(axis=1) for name in parts}
+
+
+def _mechanism(flags: xr.DataArray, instant: int, kind: str, group: Sequence[str]) -> Mechanism:
+    """Return the mechanism of the failed joints of some parts at an instant."""
+    flags = flags.isel(time=instant)
+    flags = flags[flags.values & np.isin(flags["part"].values.astype(str), group)]
+    time = float(flags["time"])
+    return Mechanism(
+        kind,
+        " + ".join(group),
+        tuple(flags["joint"].values.tolist()),
+        None if np.isnan(time) else time,
+        names=tuple(flags["name"].values.astype(str).tolist()),
+    )
+
+
+def _widest_group(
+    count: Mapping[str, int], roles: Mapping[str, str], failures: int, kinds: Sequence[str]
+) -> tuple[str, ...] | None:
+    """Return the parts with enough failures together, of the widest permitted class, or None."""
+
+    def kind(group: Sequence[str]) -> str:
+        return mechanism_kind([roles[name] for name in group])
+
+    def total(group: Sequence[str]) -> int:
+        return sum(count[name] for name in group)
+
+    hit = tuple(name for name in count if count[name])
+    groups = [*combinations(hit, 1), *combinations(hit, 2), hit]
+    enough = [group for group in groups if total(group) >= failures and kind(group) in kinds]
+    # among groups of one class the one with most failures
+    return max(
+        enough,
+        key=lambda group: (MECHANISM_KINDS.index(kind(group)), total(group)),
+        default=None,
+    )

@@ -1,0 +1,358 @@
+"""Mechanisms verified by kinematics: rigid-block motions that only the failed joints permit.
+
+The motion is the optimum of a linear programme over the block motions (`verified_mechanism`).
+Before it is solved, a smaller problem rules out most states. The gaps g of the joints, openings
+and slips, are compatible where every closed loop of blocks closes: Rᵀ g = 0, with R a basis of the
+self-stresses, Gᵀ R = 0. A motion that the failed joints permit is then a point of a small cone,
+
+    R_fᵀ g_f = 0,   g_f >= 0 where a joint moves one way only,   g = 0 in all others,
+
+three equations a loop, for any number of blocks (Gordan's alternative: either such a point exists,
+or a self-stress that presses every failed joint shut).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linprog, nnls
+from scipy.sparse.csgraph import dijkstra
+
+from archfem._typing import Array
+from archfem._validation import check_type
+from archfem.errors import DidNotConverge
+from archfem.joints.criteria import Criteria, find_lasting, merge_criteria, with_failure_flags
+from archfem.joints.resultants import check_instant
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.mechanism_count import Mechanism, counted_mechanism, mechanism_kind
+from archfem.limit.rigid_regions import RigidRegions, find_rigid_regions
+from archfem.masonry.parts import select_assessed_parts
+from archfem.masonry.structure import Structure
+
+
+@dataclass(frozen=True, eq=False)
+class VerifiedMechanism:
+    """Mechanism by motion at an instant, beside the mechanism by count.
+
+    Attributes:
+        moved: mechanism by motion, with the blocks that move and the joints that open or slip; its
+            kind is "none" where no ring and no pier moves.
+        counted: mechanism by the count of `counted_mechanism`, or None.
+        motion: displacements of all blocks' centroids and rotations (n_blocks, 3) [m, m, rad];
+            translations, and rotations times the mean depth of the joints, are at most 1 m.
+    """
+
+    moved: Mechanism
+    counted: Mechanism | None
+    motion: Array
+
+    @property
+    def kind(self) -> str:
+        """Class by motion: "none", "local", "semi-global" or "global"."""
+        return self.moved.kind
+
+    @property
+    def agrees(self) -> bool:
+        """Whether count and motion give the same class."""
+        return self.moved.kind == (self.counted.kind if self.counted else "none")
+
+    def __str__(self) -> str:
+        """Describe the classes by motion and by count, and whether they agree."""
+        counted = f"{self.counted.kind} ({self.counted.part})" if self.counted else "none"
+        moved = f"{self.kind} ({self.moved.part})" if self.moved.part else "none"
+        verdict = "agree" if self.agrees else "disagree"
+        return f"motion and count {verdict}: by motion {moved}, by count {counted}"
+
+
+def verified_mechanism(
+    structure: Structure,
+    joints: xr.Dataset,
+    criteria: Criteria | None = None,
+    *,
+    limit: float | None = None,
+) -> VerifiedMechanism:
+    """Search a rigid-block motion that the joints failed at one instant permit.
+
+    The largest motion v, within a box, that opens a joint only where it hinges (away from the face
+    that stays in contact) or has come apart, slides only where friction and cohesion are used up
+    and in the sense of the shear force, and closes none:
+
+        max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere,
+
+    with g the openings of both ends and the slip of each joint, and |v| <= 1. Where the maximum is
+    zero the failures are not a mechanism, however many they are. Bodies that yield, such as a
+    fill, are left out. The class is that of the rings and piers that move
+    (`select_assessed_parts`); where only other parts can move it is "none".
+
+    Args:
+        structure: structure whose blocks move.
+        joints: as made by `joint_dataset`, at one instant.
+        criteria: conditions of failure; by default those by which the joints were judged already.
+        limit: of |e| for a hinge, beside the usual criteria [-].
+
+    Returns:
+        The motion and its class, beside the count.
+
+    Raises:
+        InvalidInput: `joints` has several instants, or those of another structure; both criteria
+            and a limit were given.
+
+    References:
+        Heyman, Int. J. Solids Struct. 2 (1966) 249-279: a mechanism needs hinges on alternating
+        faces, not only four of them.
+
+    Example:
+        >>> ring = af.circular_arch(radius=10.0, thickness=1.5, embrace=157.5, voussoirs=7)
+        >>> fall = af.collapse_factor(ring, live=af.BodyForce(1.0))
+        >>> str(af.verified_mechanism(ring, fall.joints))
+        'motion and count agree: by motion local (arch), by count local (arch)'
+    """
+    check_type(structure, Structure, "structure", "give that whose joints these are")
+    check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
+    joints = with_failure_flags(joints, merge_criteria(criteria, hinge=limit))
+    return cached_verifier(structure).verify(joints)
+
+
+def first_verified_mechanism(
+    structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
+) -> VerifiedMechanism | None:
+    """Find the first instant of a time history from which on the failed joints permit a motion.
+
+    They must permit one, the same or another, for as long as the criteria say.
+
+    Args:
+        structure: structure whose blocks move; of its rings and piers, one at least must.
+        joints: over time and joint.
+        criteria: conditions of failure, and their duration; by default those by which the joints
+            were judged already.
+
+    Returns:
+        The motion and its class at that instant; None where no ring and no pier ever moves.
+    """
+    verifier, joints = cached_verifier(structure), with_failure_flags(joints, criteria)
+    freedoms = verifier.freedoms(joints)
+    # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
+    moves: dict[bytes, bool] = {}
+    mechanisms: dict[int, VerifiedMechanism] = {}
+
+    def verify(instant: int) -> VerifiedMechanism:
+        if instant not in mechanisms:
+            mechanisms[instant] = verifier.verify(joints.isel(time=instant))
+        return mechanisms[instant]
+
+    def find_motion(instant: int) -> int | None:
+        pattern = freedoms[instant].tobytes()
+        if pattern not in moves:
+            permitted = verifier.loop_check.permits_motion(freedoms[instant])
+            moves[pattern] = permitted and verify(instant).kind != "none"
+        return instant if moves[pattern] else None
+
+    instants = np.flatnonzero(freedoms.any(axis=1))
+    duration = Criteria.of(joints).duration
+    first = find_lasting(instants, joints["time"].values, duration, find_motion)
+    return None if first is None else verify(first)
+
+
+@dataclass(frozen=True, eq=False)
+class Verifier:
+    """Verifies mechanisms of one structure, instant by instant.
+
+    Attributes:
+        structure: structure whose blocks move.
+    """
+
+    structure: Structure
+
+    @cached_property
+    def rigid_regions(self) -> RigidRegions:
+        """Blocks and joints that can be part of a mechanism."""
+        return find_rigid_regions(self.structure)
+
+    @cached_property
+    def blocks(self) -> RigidBlocks:
+        """Rigid blocks of the rigid regions."""
+        return RigidBlocks(self.rigid_regions.structure)
+
+    @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts whose motion decides the class."""
+        rigid = self.rigid_regions.structure
+        return select_assessed_parts(
+            {rigid.blocks[n].part: rigid.blocks[n].role for n in rigid.free}
+        )
+
+    @cached_property
+    def loop_check(self) -> "LoopCheck":
+        """Fast check of most states that permit no motion of the judged parts."""
+        return LoopCheck(self.blocks, self.parts)
+
+    def verify(self, joints: xr.Dataset) -> VerifiedMechanism:
+        """Search a motion at one instant, as `verified_mechanism` does.
+
+        Args:
+            joints: of the whole structure, as made by `joint_dataset`, with their flags.
+
+        Returns:
+            The motion and its class, beside the count.
+
+        Raises:
+            InvalidInput: `joints` has several instants, or is of another structure.
+        """
+        check_instant(self.structure, joints)
+        scaled = _largest_motion(self.blocks, self.freedoms(joints))
+        tolerance = 1e-6  # least motion, relative to the largest allowed, that counts as one
+        gaps = (self.blocks.kinematics @ (self.blocks.coordinate_units * scaled)).reshape(3, -1)
+        working = np.flatnonzero(np.abs(gaps).max(axis=0) > tolerance)
+        motion = self.blocks.motion(scaled)
+        size = np.abs(motion * [1.0, 1.0, self.blocks.length_unit]).max(axis=1)
+        moving = np.flatnonzero(size > tolerance)
+        regions, blocks = self.rigid_regions, self.rigid_regions.structure.blocks
+        roles = {blocks[k].part: blocks[k].role for k in moving if blocks[k].part in self.parts}
+        numbers = tuple(regions.joints[k] for k in working)
+        moved = Mechanism(
+            mechanism_kind(roles.values()),
+            " + ".join(roles),
+            numbers,
+            float(joints["time"]) if "time" in joints.coords else None,
+            tuple(regions.blocks[k] for k in moving),
+            tuple(self.structure.joints[number].name for number in numbers),
+        )
+        return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
+
+    def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
+        """Search a motion as `verify` does, after the fast check of the loops.
+
+        Args:
+            joints: as for `verify`.
+
+        Returns:
+            The motion and its class; None where no ring and no pier can move.
+        """
+        if not self.loop_check.permits_motion(self.freedoms(joints)):
+            return None
+        mechanism = self.verify(joints)
+        return None if mechanism.kind == "none" else mechanism
+
+    def freedoms(self, joints: xr.Dataset) -> Array:
+        """Return the freedoms of each joint of the rigid regions: to open at its ends, and to slip.
+
+        Args:
+            joints: of the whole structure, as made by `joint_dataset`, with their flags.
+
+        Returns:
+            (…, 3 n_joints), intrados ends first, then extrados ends, then slips: 1 where an end
+            may open, the sense in which a joint may slip, 1 or -1; 0 where it may not, and 2 where
+            it may in either sense.
+        """
+        numbers = list(self.rigid_regions.joints)
+        side, slides, apart, shear = (
+            joints.variables[name].transpose(..., "joint").values[..., numbers]
+            for name in ("hinge", "slide", "open", "V")
+        )
+        return joint_freedoms(side, slides, apart, np.sign(shear))
+
+
+def joint_freedoms(
+    side: NDArray[Any], slides: NDArray[np.bool_], apart: NDArray[np.bool_], sense: NDArray[Any]
+) -> Array:
+    """Return the freedoms of joints, as `Verifier.freedoms` does (…, 3 n_joints)."""
+    either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
+    slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
+    return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)
+
+
+@lru_cache(maxsize=8)
+def cached_verifier(structure: Structure) -> Verifier:
+    """Return the verifier of a structure, the same for structures that are equal."""
+    return Verifier(structure)
+
+
+def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
+    """Solve the programme of `verified_mechanism` for the scaled motion (3 n_free,)."""
+    sense = np.where(freedoms == 2.0, 0.0, freedoms)
+    gaps = blocks.kinematics @ sparse.diags(blocks.coordinate_units)
+    free = sparse.diags(sense) @ gaps
+    fixed = gaps[freedoms == 0.0]
+    result = linprog(
+        -np.asarray(free.sum(axis=0)).ravel(),
+        A_ub=-free[sense != 0.0],
+        b_ub=np.zeros(int(np.count_nonzero(sense))),
+        A_eq=fixed,
+        b_eq=np.zeros(fixed.shape[0]),
+        bounds=(-1.0, 1.0),
+        method="highs-ds",
+    )
+    if result.status != 0:
+        raise DidNotConverge(f"the linear programme found no motion: {result.message}")
+    return result.x
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCheck:
+    """Compatibility of gaps around all loops of rigid blocks, for the motion of some parts."""
+
+    blocks: RigidBlocks
+    parts: tuple[str, ...]  # names of the parts that must move
+
+    @cached_property
+    def stresses(self) -> Array:
+        """Orthonormal basis R of the self-stresses (3 n_joints, r) [-]."""
+        gaps = self.blocks.kinematics @ sparse.diags(self.blocks.coordinate_units)
+        basis = np.linalg.qr(gaps.toarray(), mode="complete")[0][:, gaps.shape[1] :]
+        return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
+
+    @cached_property
+    def required_joints(self) -> NDArray[np.bool_]:
+        """Joints on a path from the ground to each block of the parts (n_joints,)."""
+        # A block whose path neither opens nor slips anywhere does not move. Weights make paths
+        # avoid joints between blocks of other parts, whose own motion does not count.
+        structure = self.blocks.structure
+        judged = [not block.fixed and block.part in self.parts for block in structure.blocks]
+        ground = len(structure.blocks)
+        vertex = [ground if block.fixed else k for k, block in enumerate(structure.blocks)]
+        between: dict[tuple[int, int], int] = {}
+        weights = sparse.lil_matrix((ground + 1, ground + 1))
+        for number, joint in enumerate(structure.joints):
+            a, b = (vertex[block] for block in joint.blocks)
+            between[a, b] = between[b, a] = number
+            near = any(judged[block] for block in joint.blocks)
+            weights[a, b] = weights[b, a] = 1.0 if near else float(len(structure.joints))
+        before = dijkstra(weights.tocsr(), indices=ground, return_predecessors=True)[1]
+        required = np.zeros(len(structure.joints), dtype=bool)
+        for block in np.flatnonzero(judged):
+            while block != ground:
+                required[between[block, before[block]]] = True
+                block = before[block]
+        return required
+
+    def permits_motion(self, freedoms: Array) -> bool:
+        """Return whether the failed joints may permit a motion of the parts."""
+        # one column for each freedom, two for a slip in either sense
+        either = np.flatnonzero(freedoms == 2.0)
+        rows = np.concatenate([np.flatnonzero(freedoms), either])
+        sense = np.concatenate([np.sign(freedoms[freedoms != 0.0]), -np.ones(len(either))])
+        columns = self.stresses[rows].T * sense
+        # some required joint must move: any one-way gap, or a two-way slip in one of its senses
+        required = np.tile(self.required_joints, 3)
+        gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
+        gaps += [
+            side * sense * (rows == slip) for slip in either[required[either]] for side in (1, -1)
+        ]
+        return any(_closes_loops(columns, gap) for gap in gaps)
+
+
+def _closes_loops(columns: Array, gap: Array, tolerance: float = 1e-5) -> bool:
+    """Return whether movements x >= 0 with gap·x = 1 close every loop, columns x = 0."""
+    # The tolerance of the misfit is well above that of the linear programme (1e-7), so that the
+    # programme and not this check decides close cases.
+    if not gap.any():
+        return False
+    try:
+        misfit = nnls(np.vstack([columns, gap]), np.append(np.zeros(len(columns)), 1.0))[1]
+    except RuntimeError:  # no convergence: let the programme decide
+        return True
+    return bool(misfit < tolerance)

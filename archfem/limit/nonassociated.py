@@ -1,0 +1,376 @@
+"""Sliding without dilatancy in limit analysis: solutions by alternating linear programmes.
+
+Let φ(R) be the optimum of the linear programme whose joints carry |V| <= R. A state with normal
+forces N is a solution without dilatancy where it is itself an optimum for R = c A + μ N: its
+mechanism slides where |V| = R, opens only ends that carry nothing, and dissipates R |slip|. With y
+the mechanism that is dual to φ, and t(y) its slips, the gap
+
+    value(x) + [c A + μ N(x)]·t(y) - [φ(R) + R·t(y)]  >=  0
+
+is zero for such a pair. It is linear in the forces x for a given mechanism, and in the mechanism
+for given forces: a bilinear programme over two separate polyhedra (Konno 1976). Alternation
+minimises it in one and then in the other, until it vanishes or stops falling. There the slips are
+scaled at random and the alternation continues. To descend from a solution, the objective is
+limited to values a little worse than its own. The gap is always that of the whole programme, so
+that any pair with a vanishing gap is a solution.
+
+References: Drucker, J. Appl. Mech. 21 (1954) 71-74. Ferris and Tin-Loi, Int. J. Mech. Sci. 43
+(2001) 209-224. Konno, Math. Program. 11 (1976) 14-27.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.errors import DidNotConverge
+from archfem.limit.linear_programme import Limits, Optimum, Programme, friction_limits
+
+# States from which the search starts besides the associated one; fewer for many joints
+MAX_START_COUNT = 40
+
+# Joints up to which every start is tried and normal forces are bounded one by one
+MAX_FULL_SEARCH_JOINTS = 150
+
+# Relative gap that counts as zero [-]: programmes are solved to 1e-9
+GAP_TOLERANCE = 1e-7
+
+# Shear resistance added so that round-off cannot make a programme infeasible [mean block weights]
+RESISTANCE_MARGIN = 1e-8
+
+# Relative decrease of the objective from one solution to the next weaker one [-]
+OBJECTIVE_DECREASE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class AlternatingIterate:
+    """Forces and mechanism after one alternation, and their gap."""
+
+    state: Optimum  # forces and objective, with the mechanism as its multipliers
+    gap: float  # [units of the objective]
+    converged: bool  # whether the gap counts as zero
+
+
+def find_solution(
+    programme: Programme, forces: Array, max_alternations: int = 30
+) -> AlternatingIterate | None:
+    """Alternate from given forces to a solution without dilatancy; None where the gap stagnates."""
+    smallest = np.inf
+    for _ in range(max_alternations):  # most end within three
+        iterate = _alternate(programme, programme, forces, 1.0)
+        if iterate is None or iterate.converged:
+            return iterate
+        if iterate.gap > (1.0 - GAP_TOLERANCE) * smallest:
+            return None
+        smallest, forces = iterate.gap, iterate.state.forces
+    return None
+
+
+def descend(
+    programme: Programme, first: AlternatingIterate | None, forces: Array, patience: int
+) -> Iterator[AlternatingIterate]:
+    """Yield ever weaker solutions, until `patience` alternations in a row find none."""
+    rng, fruitless, perturb, smallest = np.random.default_rng(1), 0, first is not None, np.inf
+    restricted = programme
+    if first is not None:
+        restricted, forces = _require_weaker(programme, first.state.value), first.state.forces
+    while fruitless < patience:
+        factor = rng.lognormal(size=len(forces) // 3) if perturb else 1.0
+        iterate = _alternate(programme, restricted, forces, factor)
+        if iterate is None:
+            return
+        if iterate.converged:
+            yield iterate
+            restricted, fruitless = _require_weaker(programme, iterate.state.value), 0
+        perturb = iterate.converged or iterate.gap > (1.0 - GAP_TOLERANCE) * smallest
+        smallest, forces = np.inf if perturb else iterate.gap, iterate.state.forces
+        fruitless += 1
+
+
+def _alternate(
+    programme: Programme, restricted: Programme, forces: Array, factor: Array | float
+) -> AlternatingIterate | None:
+    """Find the mechanism for forces, then forces of `restricted` for its slips times a factor."""
+    resistance = shear_resistance(programme, normal_forces(forces)) + RESISTANCE_MARGIN
+    try:
+        mechanism = replace(programme, limits=shear_limits(programme, resistance)).solve()
+        if mechanism is None:
+            return None
+        slips = slip_magnitudes(programme, mechanism.multipliers)
+        state = _minimise_gap(restricted, factor * slips)
+    except DidNotConverge:  # round-off left no state
+        return None
+    if state is None:
+        return None
+    value = programme.objective(state)
+    change = shear_resistance(programme, normal_forces(state.forces)) - resistance
+    gap = value + float(change @ slips) - mechanism.value
+    tolerance = GAP_TOLERANCE * max(abs(value), abs(mechanism.value))
+    tolerance = tolerance + RESISTANCE_MARGIN * float(slips.sum())
+    pair = Optimum(value, state.forces, mechanism.multipliers, state.unknowns)
+    return AlternatingIterate(pair, gap, gap <= tolerance)
+
+
+def _minimise_gap(programme: Programme, slips: Array, preference: float = 1e-4) -> Optimum | None:
+    """Return the forces of least gap for given slips, among equal gaps the weakest."""
+    # The small `preference` for a weak objective decides between states of the same gap.
+    dissipation = friction_coefficients(programme) * slips
+    cost = np.concatenate([dissipation, dissipation, np.zeros(len(dissipation))])
+    if programme.force_cost is not None:
+        cost += (1.0 - preference) * programme.force_cost
+    unknown_cost = (1.0 - preference) * programme.unknown_cost
+    return replace(programme, force_cost=cost, unknown_cost=unknown_cost).solve()
+
+
+def _require_weaker(programme: Programme, value: float) -> Programme:
+    """Return the programme restricted to objectives above a value: weaker states."""
+    least = value + OBJECTIVE_DECREASE * abs(value)
+    if programme.force_cost is None:  # the first unknown is the load factor, at a cost of -1
+        upper_bounds = np.concatenate([[max(-least, 0.0)], programme.upper_bounds[1:]])
+        return replace(programme, upper_bounds=upper_bounds)
+    row = Limits(sparse.csr_matrix(-programme.force_cost[None, :]), np.array([-least]))
+    return replace(programme, limits=programme.limits.joined(row))
+
+
+def friction_coefficients(programme: Programme) -> Array:
+    """Return Coulomb's μ, zero in joints that never slide and dissipate nothing (n_joints,)."""
+    coefficient = programme.blocks.structure.friction
+    return np.where(np.isfinite(coefficient), coefficient, 0.0)
+
+
+def shear_resistance(programme: Programme, normal: Array) -> Array:
+    """Return the shear c A + μ N at which joints slide (n_joints,) [mean block weights]."""
+    return programme.blocks.cohesion + friction_coefficients(programme) * normal
+
+
+def shear_limits(programme: Programme, resistance: Array) -> Limits:
+    """Return limits |V| <= R independent of N, none for joints that never slide."""
+    slides = np.isfinite(programme.blocks.structure.friction)
+    return friction_limits(np.where(slides, 0.0, np.inf), resistance)
+
+
+def mechanism_gaps(programme: Programme, multipliers: Array) -> Array:
+    """Return openings of both ends and slips of a mechanism, with those of a moving support."""
+    gaps = -(programme.blocks.balance.T @ multipliers)
+    return gaps if programme.force_cost is None else gaps + programme.force_cost
+
+
+def slip_magnitudes(programme: Programme, multipliers: Array) -> Array:
+    """Return the magnitudes of the slips of a mechanism (n_joints,)."""
+    return np.abs(mechanism_gaps(programme, multipliers).reshape(3, -1)[2])
+
+
+def normal_forces(forces: Array) -> Array:
+    """Return the normal force of each joint (n_joints,) [mean block weights]."""
+    return forces.reshape(3, -1)[:2].sum(axis=0)
+
+
+@dataclass(frozen=True)
+class NonassociatedBounds:
+    """Bounds on the factors of solutions without dilatancy, which need not be unique.
+
+    Attributes:
+        bracket: bounds on the factor of every solution (2,): for a growing load a proven lower
+            bound and the associated factor.
+        between: factors of the weakest and of the strongest solution of the search (2,); NaN
+            where it has none.
+        starts: number of states from which the search started, and of those that reached a
+            solution.
+        unbalanced: largest residual of the balance of the returned solution [mean block weights].
+        excess: largest |V| - c A - μ N, relative to the largest N [-].
+        opening: largest opening of an end that carries force, relative to the largest gap [-]; NaN
+            with a strength, at which ends that carry force give way.
+        gap: complementarity gap, friction dissipation minus work of the loads, relative to the
+            objective [-].
+    """
+
+    bracket: tuple[float, float]
+    between: tuple[float, float]
+    starts: tuple[int, int]
+    unbalanced: float = np.nan
+    excess: float = np.nan
+    opening: float = np.nan
+    gap: float = np.nan
+
+    def __str__(self) -> str:
+        """Describe the range of the solutions in one line."""
+        tried, successful = self.starts
+        lower, upper = self.bracket
+        if not np.isfinite(lower):
+            return "without dilatancy it does not either: no factor is too large"
+        weakest, strongest = self.between
+        text = "were not found"
+        if np.isfinite(weakest):
+            text = f"found from {weakest:.4g} to {strongest:.4g}"
+        return (
+            f"solutions without dilatancy {text} ({successful} of {tried} starts); all lie from "
+            f"{lower:.4g} to {upper:.4g}"
+        )
+
+
+def search_nonassociated(
+    programme: Programme, start: Optimum | None, scale: float
+) -> tuple[Optimum | None, NonassociatedBounds]:
+    """Search the weakest state whose joints slide without opening, from many starts downwards."""
+    starts = _search_starts(programme, start)
+    solutions = [
+        iterate for forces in starts if (iterate := find_solution(programme, forces)) is not None
+    ]
+    normal = np.array([normal_forces(forces) for forces in starts])
+    smallest = normal.reshape(-1, len(programme.blocks.structure.depths)).min(
+        axis=0, initial=np.inf
+    )
+    associated = -np.inf if start is None else start.value
+    bound = max(associated, _bound_objective(programme, smallest))
+    limits = scale * associated, scale * bound
+    successful = len(solutions)
+    first = max(solutions, key=_objective, default=None)
+    least = -np.inf
+    if first is not None:
+        least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
+    if starts and bound > least:  # a weaker solution is possible: descend to it
+        solutions += descend(programme, first, starts[0], patience=30)
+    values = [scale * iterate.state.value for iterate in solutions] or [np.nan]
+    bounds = NonassociatedBounds(
+        (min(limits), max(limits)), (min(values), max(values)), (len(starts), successful)
+    )
+    if not solutions:
+        return None, bounds
+    weakest = max(solutions, key=_objective)
+    return weakest.state, _with_residuals(programme, weakest, bounds)
+
+
+def _objective(iterate: AlternatingIterate) -> float:
+    return iterate.state.value
+
+
+def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
+    """Return the weakest solution without dilatancy reached from given forces, or None."""
+    iterates = [find_solution(programme, forces) for forces in starts]
+    solutions = [iterate.state for iterate in iterates if iterate is not None]
+    return max(solutions, key=lambda state: state.value, default=None)
+
+
+def starting_forces(
+    programme: Programme, start: Optimum | None, number: int, seed: int
+) -> list[Array]:
+    """Return the forces of the associated optimum and of a number of random vertices."""
+    forces = _random_vertices(programme, start, number, np.random.default_rng(seed))
+    return forces if start is None else [start.forces, *forces]
+
+
+def _search_starts(programme: Programme, start: Optimum | None) -> list[Array]:
+    """Return the starts of the full search: their number falls with the joints squared."""
+    joints = len(programme.blocks.structure.depths)
+    number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
+    return starting_forces(programme, start, number, 0)
+
+
+def _random_vertices(
+    programme: Programme, start: Optimum | None, number: int, rng: np.random.Generator
+) -> list[Array]:
+    """Return forces of random vertices of the admissible states; fewer where there are none."""
+    forces = []
+    for _ in range(number):
+        try:
+            state = _random_vertex(programme, start, rng)
+        except DidNotConverge:  # no equilibrium under so much load
+            continue
+        if state is not None:
+            forces.append(state.forces)
+    return forces
+
+
+def _random_vertex(
+    programme: Programme, start: Optimum | None, rng: np.random.Generator
+) -> Optimum | None:
+    """Return the state of least randomly weighted compressions under a random part of the load."""
+    joints = len(programme.blocks.structure.depths)
+    cost = np.concatenate([rng.random(2 * joints), np.zeros(joints)])
+    if programme.force_cost is not None:  # a settlement: its work at random weight
+        size = _largest_magnitude(programme.force_cost)
+        cost = cost + rng.uniform(-1, 1) * programme.force_cost / size
+        return replace(programme, force_cost=cost).solve()
+    assert programme.columns is not None
+    live, others = programme.columns[:, :1], programme.columns[:, 1:]
+    if start is None:  # unbounded: a load of 0.1 to 10 times the weight
+        live_size = float(abs(live).sum())
+        weight = float(np.abs(programme.load).sum())
+        factor = 10.0 ** rng.uniform(-1, 1) * weight / live_size if live_size > 0.0 else 0.0
+    else:
+        factor = float(rng.random() * start.unknowns[0])
+    return replace(
+        programme,
+        force_cost=cost,
+        load=programme.load - live @ np.array([factor]),
+        columns=others,
+        unknown_cost=programme.unknown_cost[1:],
+        upper_bounds=programme.upper_bounds[1:],
+    ).solve()
+
+
+def _bound_objective(programme: Programme, smallest: Array) -> float:
+    """Bound the objective of every solution without dilatancy from above."""
+    # A solution's N is at least the least N of any state of equilibrium. A state with
+    # |V| <= c A + μ min N is therefore admissible in the programme whose optimum the solution is.
+    # Where a known state (`smallest`) has no N in a joint, its least N is zero.
+    joints = len(programme.blocks.structure.depths)
+    least = np.zeros(joints)
+    if joints <= MAX_FULL_SEARCH_JOINTS:
+        no_cost = np.zeros_like(programme.unknown_cost)
+        for joint in np.flatnonzero(smallest > RESISTANCE_MARGIN):
+            cost = np.zeros(3 * joints)
+            cost[[joint, joints + joint]] = 1.0
+            normal = _least_objective(replace(programme, force_cost=cost, unknown_cost=no_cost))
+            least[joint] = max(normal - RESISTANCE_MARGIN, 0.0)
+    negated = None if programme.force_cost is None else -programme.force_cost
+    highest = -_least_objective(
+        replace(programme, force_cost=negated, unknown_cost=-programme.unknown_cost)
+    )
+    limits = shear_limits(programme, shear_resistance(programme, least))
+    try:
+        safe = replace(programme, limits=limits).solve()
+    except DidNotConverge:  # no equilibrium with so little friction
+        return highest
+    return -np.inf if safe is None else min(highest, safe.value)
+
+
+def _least_objective(programme: Programme) -> float:
+    """Return the least objective, or -inf where it is unbounded or the solver fails."""
+    try:
+        optimum = programme.solve()
+    except DidNotConverge:
+        return -np.inf
+    return -np.inf if optimum is None else optimum.value
+
+
+def _with_residuals(
+    programme: Programme, iterate: AlternatingIterate, bounds: NonassociatedBounds
+) -> NonassociatedBounds:
+    """Return the bounds with the residuals of the conditions that define a solution."""
+    state = iterate.state
+    normal, shear = normal_forces(state.forces), np.abs(state.forces.reshape(3, -1)[2])
+    residual = programme.blocks.balance @ state.forces - programme.load
+    if programme.columns is not None:
+        residual = residual + programme.columns @ state.unknowns
+    gaps = mechanism_gaps(programme, state.multipliers)
+    carries = state.forces[: 2 * len(normal)] > GAP_TOLERANCE * max(float(normal.max()), 1.0)
+    slides = np.isfinite(programme.blocks.structure.friction)
+    excess = np.max((shear - shear_resistance(programme, normal))[slides], initial=0.0)
+    opening = np.max(gaps[: len(carries)][carries], initial=0.0)
+    if programme.crushing is not None:  # crushed ends open under force
+        opening = np.nan
+    return replace(
+        bounds,
+        unbalanced=float(np.abs(residual).max()),
+        excess=float(excess) / _largest_magnitude(normal),
+        opening=float(opening) / _largest_magnitude(gaps),
+        gap=max(iterate.gap, 0.0) / _largest_magnitude(np.array([state.value, RESISTANCE_MARGIN])),
+    )
+
+
+def _largest_magnitude(values: Array) -> float:
+    """Return the largest magnitude, at least the smallest normal number, to divide by."""
+    return float(np.abs(values).max(initial=np.finfo(float).tiny))

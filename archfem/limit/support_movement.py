@@ -1,0 +1,386 @@
+"""Finite movement of a support: equilibrium in the displaced geometry, step by step.
+
+A small movement of a support makes rigid blocks a mechanism, whose hinges the linear programme of
+`collapse_factor` finds. Here the blocks move along with it, by finite rotations, and the programme
+is set up again at their places. With g the present gaps at the ends of the joints, and s those
+that a further movement alone would cause, the forces of
+
+    min (g + s)·x   subject to   A x = f_dead,   F_i, F_e >= 0,
+
+and the motion that is dual to them are those of the state of least potential energy: ends with
+g + s > 0 carry nothing, and hinges close and new ones open where that costs less. Where no forces
+balance the weights in the present geometry the structure falls.
+
+The two faces of a joint move with their blocks and need not coincide any more. An end is open by
+the distance of the higher block's corner from the lower block's face, and slip is counted at the
+end that is nearer to contact. The rates of openings and slip are exact for corners that touch, so
+that the forces of hinges act where the hinges are.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem._validation import check_number, check_type
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.backfill import SELF_WEIGHT
+from archfem.limit.collapse import stands
+from archfem.limit.linear_programme import (
+    NoEquilibrium,
+    Optimum,
+    Programme,
+    RigidBlocks,
+    friction_limits,
+    no_limits,
+    rigid_load,
+)
+from archfem.masonry.loads import Settlement
+from archfem.masonry.structure import Structure, rigid_motion_matrix
+
+# First and longest step, as a share of the full movement [-]
+MAX_MOVEMENT_STEP = 0.01
+
+# Penetration, slip, and work of forces on gaps per weight, relative to the size, that count as zero
+GEOMETRY_TOLERANCE = 1e-8
+
+
+class End(StrEnum):
+    """Reason for which a movement ends."""
+
+    FALLS = "falls"
+    LEAPS = "leaps"
+    SLIDES = "slides"
+    LOCKS = "locks"
+    HOLDS = "holds"
+
+    @property
+    def sentence(self) -> str:
+        """Meaning of the reason, as a sentence."""
+        return _END_SENTENCES[self]
+
+
+_END_SENTENCES = {
+    End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
+    End.SLIDES: "beyond, a joint needs more than its friction and slides",
+    End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
+    End.LOCKS: "without sliding in its joints it cannot follow any further",
+    End.HOLDS: "it stands at the whole movement",
+}
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One state of equilibrium under a moving support.
+
+    Attributes:
+        share: share of the full movement [-].
+        work: work of the weights on the full movement, at its present rate [N m]: for a
+            translation by 1 m, the thrust on the support along it, in N.
+        hinges: joints that are open, with the face where the blocks stay in contact.
+        names: names of these joints.
+    """
+
+    share: float
+    work: float
+    hinges: tuple[tuple[int, str], ...]
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Describe share, work, and hinges by number and name, in one line."""
+        hinges = [
+            f"{joint} ({name}) {side}"
+            for (joint, side), name in zip(self.hinges, self.names, strict=True)
+        ]
+        return (
+            f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "
+            f"hinges {', '.join(hinges) or 'none'}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """Largest movement of a support that a structure survives.
+
+    Attributes:
+        structure: structure on the support.
+        full_settlement: full movement, at which the analysis ends.
+        largest: largest share of it at which the structure still stands [-].
+        end: reason for which it ends; `end.sentence` gives its meaning.
+        stages: states of equilibrium from rest to the largest movement.
+        displacement: displacement of every block's centroid, and its rotation, at the largest
+            movement (n_blocks, 3) [m, m, rad].
+    """
+
+    structure: Structure
+    full_settlement: Settlement
+    largest: float
+    end: End
+    stages: tuple[Stage, ...]
+    displacement: Array
+
+    @property
+    def settlement(self) -> Settlement:
+        """Largest movement survived."""
+        x, y, turn = (self.largest * component for component in self.full_settlement.motion)
+        return replace(self.full_settlement, motion=(x, y, turn))
+
+    @property
+    def sequence(self) -> tuple[Stage, ...]:
+        """Stages at which the hinges differ from those before."""
+        pairs = zip((None, *self.stages[:-1]), self.stages, strict=True)
+        return tuple(b for a, b in pairs if a is None or a.hinges != b.hinges)
+
+    def __str__(self) -> str:
+        """Describe the largest movement, its end, and the hinges, line by line."""
+        x, y, turn = self.settlement.motion
+        head = (
+            f"support {self.full_settlement.block} moves by {x:.4g} m, {y:.4g} m and "
+            f"{turn:.4g} rad: {self.end.sentence}"
+        )
+        return "\n".join([head, *map(str, self.sequence)])
+
+
+def largest_movement(
+    structure: Structure,
+    settlement: Settlement,
+    *,
+    friction: str | None = "coulomb",
+    tolerance: float = 1e-4,
+) -> Movement:
+    """Find the movement of a support at which a structure falls under its own weight.
+
+    The support moves in steps, and rigid blocks follow it without sliding: at each step hinges are
+    those of least potential energy in the present geometry, and may jump from joint to joint. A
+    step without equilibrium is halved.
+
+    Args:
+        structure: supports are its fixed blocks.
+        settlement: of a support; its motion is the direction, and the full movement.
+        friction: "coulomb" ends where equilibrium needs |V| > c A + μ N in a joint, as for
+            `collapse_factor`; None never slides.
+        tolerance: width of the last step, as a share of the movement [-].
+
+    Returns:
+        The largest movement and the states of equilibrium up to it.
+
+    Raises:
+        InvalidInput: it does not stand to begin with; the settlement moves nothing, or no support;
+            an option is unknown.
+
+    Note:
+        Joints do not slide, so that a bonded wall, whose upright joints would have to, locks at
+        once; and blocks touch at the ends of their joints only. Where it falls there may be
+        equilibrium elsewhere, which it could reach by a leap alone: that does not count as
+        standing.
+
+    References:
+        Ochsendorf, The Structural Engineer 84 (2), 2006. Portioli and Cascini, Eng. Struct. 148
+        (2017) 485-496.
+
+    Example:
+        >>> ring = af.circular_arch(radius=1.0, thickness=0.15, embrace=180.0, voussoirs=8)
+        >>> spread = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+        >>> round(af.limit.largest_movement(ring, spread, friction=None).largest, 4)
+        0.2269
+    """
+    check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
+    check_type(settlement, Settlement, "settlement", "give Settlement('left abutment', (-1, 0, 0))")
+    if not 1e-8 <= check_number(tolerance, "tolerance [-]") <= MAX_MOVEMENT_STEP:
+        raise InvalidInput(f"tolerance {tolerance:.3g} is not between 1e-8 and {MAX_MOVEMENT_STEP}")
+    if friction not in ("coulomb", None):
+        raise InvalidInput(f"friction {friction!r} is not known here: use 'coulomb' or None")
+    support = settlement.added(structure, np.zeros((len(structure.blocks), 3)))
+    if not support.any():
+        raise InvalidInput(f"settlement {settlement.motion} moves nothing: give a direction")
+    if not stands(structure, friction=friction):
+        raise InvalidInput("it does not stand under its own weight before any support moves")
+    return _MovementPath(structure, settlement, support, friction is not None).follow(tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacedBlocks(RigidBlocks):
+    """Rigid blocks after displacements and rotations of any size."""
+
+    # of every block's centroid along x and y, and anticlockwise rotation (n_blocks, 3) [m, m, rad]
+    displacement: Array
+
+    def moved(self, motion: Array) -> "DisplacedBlocks":
+        """Return the blocks after a further motion."""
+        return DisplacedBlocks(self.structure, self.displacement + motion)
+
+    def current_points(self, points: Array, block: int) -> Array:
+        """Return the present places of points that move with a block (p, 2) [m]."""
+        centroid, (x, y, turn) = self.structure.blocks[block].centroid, self.displacement[block]
+        return centroid + (points - centroid) @ _rotation_matrix(turn).T + [x, y]
+
+    @cached_property
+    def faces(self) -> Array:
+        """Ends of the joints on the lower and on the higher blocks (2, n_joints, 2, 2) [m]."""
+        joints = self.structure.joints
+        return np.array(
+            [
+                [self.current_points(joint.ends, joint.lower) for joint in joints],
+                [self.current_points(joint.ends, joint.higher) for joint in joints],
+            ]
+        )
+
+    @cached_property
+    def axes(self) -> Array:
+        """Normals and tangents of the lower blocks' faces (2, n_joints, 2)."""
+        turns = self.displacement[[joint.lower for joint in self.structure.joints], 2]
+        rotations = np.array([_rotation_matrix(turn) for turn in turns])
+        initial = np.stack([self.structure.normals, self.structure.tangents])
+        return np.einsum("jab,kjb->kja", rotations, initial)
+
+    @cached_property
+    def current_gaps(self) -> Array:
+        """Openings at the intrados and the extrados, and slip (3, n_joints) [m]."""
+        jump = self.faces[1] - self.faces[0]
+        openings, slips = np.einsum("jea,kja->kej", jump, self.axes)
+        nearer = np.argmin(openings, axis=0)
+        return np.vstack([openings, slips[nearer, np.arange(len(nearer))]])
+
+    @cached_property
+    def _rates(self) -> sparse.csr_matrix:
+        """Rates of `current_gaps` with motions of all blocks (3 n_joints, 3 n_blocks)."""
+        joints, nearer = self.structure.joints, np.argmin(self.current_gaps[:2], axis=0)
+        rates = np.zeros((3, len(joints), len(self.structure.blocks), 3))
+        for number, joint in enumerate(joints):
+            normal, tangent = self.axes[:, number]
+            # Both blocks move the corners of the higher one: the lower block's axes turn with it.
+            corners = self.faces[1, number]
+            for block, sign in ((joint.higher, 1.0), (joint.lower, -1.0)):
+                centre = self.structure.blocks[block].centroid + self.displacement[block, :2]
+                points = sign * rigid_motion_matrix(corners, centre)
+                rates[:2, number, block] = np.einsum("a,eac->ec", normal, points)
+                rates[2, number, block] = tangent @ points[nearer[number]]
+        return sparse.csr_matrix(rates.reshape(3 * len(joints), -1))
+
+    @cached_property
+    def kinematics(self) -> sparse.csr_matrix:
+        """Rates of openings and slips with motions of the free blocks (3 n_joints, 3 n_free)."""
+        free = np.array(self.structure.free)
+        return self._rates[:, (3 * free[:, None] + np.arange(3)).ravel()]
+
+    def gaps(self, motion: Array) -> Array:
+        """Return the rates of openings and slip at the present places, as `RigidBlocks.gaps`."""
+        return (self._rates @ motion.ravel()).reshape(3, -1)
+
+
+def _rotation_matrix(turn: float) -> Array:
+    """Return the matrix that turns vectors anticlockwise (2, 2)."""
+    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+
+class _PathEnd(Exception):
+    """The movement ends here."""
+
+    def __init__(self, end: End) -> None:
+        super().__init__(end.sentence)
+        self.end = end
+
+
+@dataclass(frozen=True, eq=False)
+class _MovementPath:
+    """States of equilibrium under a moving support, each from the one before."""
+
+    structure: Structure
+    settlement: Settlement
+    support: Array  # full motion of all blocks, zero but for the support (n_blocks, 3)
+    has_friction: bool  # whether |V| is limited
+
+    def follow(self, tolerance: float) -> Movement:
+        """Move the support as far as there is equilibrium."""
+        blocks = DisplacedBlocks(self.structure, np.zeros_like(self.support))
+        share, step, end = 0.0, MAX_MOVEMENT_STEP, End.HOLDS
+        stages = [self._stage(0.0, *self._equilibrate(blocks))]
+        while share < 1.0 and step >= tolerance:
+            step = min(step, 1.0 - share)
+            try:
+                trial, state = self._equilibrate(self._predict(blocks, step))
+                self._check_friction(trial)
+            except _PathEnd as stop:
+                end, step = stop.end, 0.5 * step
+                continue
+            blocks, share = trial, share + step
+            stages.append(self._stage(share, trial, state))
+            # after the first failure steps only shrink: the bracket of the end is bisected
+            step = min(2.0 * step, MAX_MOVEMENT_STEP) if end is End.HOLDS else step
+        end = End.HOLDS if share >= 1.0 else end
+        displacement = blocks.displacement
+        return Movement(self.structure, self.settlement, share, end, tuple(stages), displacement)
+
+    def _programme(self, blocks: DisplacedBlocks, further: Array | None = None) -> Programme:
+        """Return the programme of least work on the gaps, with those of a further movement."""
+        gaps = blocks.current_gaps
+        # gaps of round-off make the solver of programmes stall
+        gaps = np.where(np.abs(gaps) > 1e-10 * self.structure.size, gaps, 0.0)
+        if further is not None:
+            gaps = gaps + blocks.gaps(further)
+        load = blocks.dimensionless(rigid_load(self.structure, [SELF_WEIGHT]))
+        limits = no_limits(len(self.structure.joints))
+        return Programme(blocks, load, limits, force_cost=np.concatenate([*gaps[:2], -gaps[2]]))
+
+    def _solve(self, programme: Programme) -> Optimum:
+        """Return the optimum, or raise the end that its absence means."""
+        try:
+            optimum = programme.solve()
+        except NoEquilibrium as error:
+            raise _PathEnd(End.FALLS) from error
+        if optimum is None:
+            raise _PathEnd(End.LOCKS)
+        return optimum
+
+    def _predict(self, blocks: DisplacedBlocks, step: float) -> DisplacedBlocks:
+        """Move the support by a share of its movement, and the blocks with it to first order."""
+        further = step * self.support
+        optimum = self._solve(self._programme(blocks, further))
+        return blocks.moved(blocks.motion(optimum.multipliers) + further)
+
+    def _equilibrate(
+        self, blocks: DisplacedBlocks, max_iterations: int = 40
+    ) -> tuple[DisplacedBlocks, Optimum]:
+        """Move the blocks to where they are in equilibrium and do not overlap."""
+        size, start = self.structure.size, blocks
+        for _ in range(max_iterations):  # as Newton's method, in about four
+            state = self._solve(self._programme(blocks))
+            penetration = float(-blocks.current_gaps[:2].min())
+            slip = float(np.abs(blocks.current_gaps[2]).max())
+            work = abs(state.value) / len(self.structure.free)
+            if max(penetration, slip, work) <= GEOMETRY_TOLERANCE * size:
+                return blocks, state
+            blocks = blocks.moved(blocks.motion(state.multipliers))
+            # beyond a tenth of the size the step is too long: another equilibrium may be found
+            if blocks.largest_displacement(blocks.displacement - start.displacement) > 0.1 * size:
+                break
+        raise _PathEnd(End.LEAPS)
+
+    def _check_friction(self, blocks: DisplacedBlocks) -> None:
+        """Raise the end by sliding where no state at these places is within friction."""
+        if not self.has_friction:
+            return
+        limits = friction_limits(self.structure.friction, blocks.cohesion)
+        try:
+            state = replace(self._programme(blocks), limits=limits).solve()
+        except DidNotConverge as error:
+            raise _PathEnd(End.SLIDES) from error
+        tolerance = 10.0 * GEOMETRY_TOLERANCE * self.structure.size
+        if state is None or abs(state.value) / len(self.structure.free) > tolerance:
+            raise _PathEnd(End.SLIDES)
+
+    def _stage(self, share: float, blocks: DisplacedBlocks, state: Optimum) -> Stage:
+        """Return thrust and hinges of a state."""
+        gaps = blocks.gaps(self.support)
+        cost = np.concatenate([*gaps[:2], -gaps[2]])
+        intrados, extrados, _ = blocks.current_gaps
+        # a joint hinges from an opening of a millionth of its depth
+        open_joints = np.flatnonzero(np.abs(extrados - intrados) > 1e-6 * self.structure.depths)
+        hinges = tuple(
+            (int(j), "intrados" if intrados[j] < extrados[j] else "extrados") for j in open_joints
+        )
+        names = tuple(self.structure.joints[j].name for j, _ in hinges)
+        return Stage(share, float(blocks.force_unit * (cost @ state.forces)), hinges, names)

@@ -1,0 +1,165 @@
+"""Loads on a structure besides self-weight: body forces, point loads, settlements."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem._validation import check_integer, check_number, check_numbers
+from archfem.errors import InvalidInput
+from archfem.masonry.structure import Structure
+
+# Larger body forces [g] and point loads [N] must be a mistake of units.
+MAX_BODY_FORCE = 1e3
+MAX_POINT_LOAD = 1e9
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """A force on every block in proportion to its weight.
+
+    Attributes:
+        horizontal: multiple of g, positive along x [-].
+        vertical: multiple of g, positive upward [-]; self-weight is -1.
+
+    Raises:
+        InvalidInput: one is no number, or more than 1000 g.
+
+    Example:
+        >>> block = af.column(breadth=0.6, heights=[2.4])
+        >>> round(af.collapse_factor(block, live=af.BodyForce(1.0)).factor, 6)
+        0.25
+    """
+
+    horizontal: float
+    vertical: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check that the values are multiples of g."""
+        for name in ("horizontal", "vertical"):
+            value = check_number(getattr(self, name), f"body force, {name} [g]")
+            if abs(value) > MAX_BODY_FORCE:
+                raise InvalidInput(
+                    f"body force, {name} = {value:.4g} g is more than {MAX_BODY_FORCE:g} g: give a "
+                    "multiple of g, such as 0.3"
+                )
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force at the highest point of the structure at x.
+
+    On a voussoir with arcs the force acts on the arc itself, so that an inclined force has its true
+    lever arm.
+
+    Attributes:
+        x: position [m].
+        force: its components for the whole width, up positive (2,) [N].
+
+    Raises:
+        InvalidInput: x is no number, or the force no two of up to 1e9 N.
+    """
+
+    x: float
+    force: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Check position and force."""
+        check_number(self.x, "point load, x [m]")
+        object.__setattr__(
+            self, "force", check_numbers(self.force, "point load, force (x, y) [N]", 2)
+        )
+        if max(map(abs, self.force)) > MAX_POINT_LOAD:
+            raise InvalidInput(
+                f"a point load of {self.force} N is above {MAX_POINT_LOAD:g} N: give newtons"
+            )
+
+    def place(self, structure: Structure) -> tuple[int, Array]:
+        """Return the number of the loaded block and the loaded point (2,) [m].
+
+        Args:
+            structure: whose blocks that move may carry it.
+
+        Raises:
+            InvalidInput: no block that moves lies below or above x.
+        """
+        tops = {
+            number: top
+            for number in structure.free
+            if (top := structure.blocks[number].top(self.x)) is not None
+        }
+        if not tops:
+            points = np.concatenate([structure.blocks[b].drawn() for b in structure.free])
+            low, high = points[:, 0].min(), points[:, 0].max()
+            raise InvalidInput(
+                f"a point load at x = {self.x:.4g} m misses the structure, which reaches from "
+                f"{low:.4g} to {high:.4g} m: move it there"
+            )
+        block = max(tops, key=lambda number: tops[number])
+        return block, np.array([self.x, tops[block]])
+
+
+@dataclass(frozen=True)
+class Settlement:
+    """A motion of a support.
+
+    Attributes:
+        block: number or name of a fixed block.
+        motion: of its centroid along x and y, and anticlockwise about it (3,) [m, m, rad].
+    """
+
+    block: int | str
+    motion: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Check block and motion."""
+        if not isinstance(self.block, str):
+            check_integer(self.block, "settlement, block", minimum=0)
+        motion = check_numbers(self.motion, "settlement, motion (x, y, turn) [m, m, rad]", 3)
+        object.__setattr__(self, "motion", motion)
+
+    def place(self, structure: Structure) -> int:
+        """Return the number of the block that settles.
+
+        Args:
+            structure: whose fixed blocks are its supports.
+
+        Raises:
+            InvalidInput: there is no such block, or it is not a support.
+        """
+        supports = {b.name: n for n, b in enumerate(structure.blocks) if b.fixed}
+        number = supports.get(self.block, self.block) if isinstance(self.block, str) else self.block
+        if number not in supports.values():
+            raise InvalidInput(
+                f"block {self.block!r} cannot settle: the supports are {supports}; name one of them"
+            )
+        return int(number)
+
+    def added(self, structure: Structure, supports: Array) -> Array:
+        """Add the settlement to motions of the blocks (n_blocks, 3) [m, m, rad].
+
+        Args:
+            structure: one of whose supports settles.
+            supports: previous motions of its blocks (n_blocks, 3) [m, m, rad], not changed.
+
+        Raises:
+            InvalidInput: there is no such support.
+        """
+        motions = supports.copy()
+        motions[self.place(structure)] += self.motion
+        return motions
+
+
+Action = BodyForce | PointLoad
+
+
+def list_loads(given: Action | Sequence[Action]) -> list[Action]:
+    """Return one load, or several that grow together, as a list."""
+    several = given if isinstance(given, list | tuple) else [given]
+    if not several or not all(isinstance(each, BodyForce | PointLoad) for each in several):
+        raise InvalidInput(
+            f"load {given!r} is none: give BodyForce(horizontal), PointLoad(x, (0, -1)), or a list "
+            "of them; a Settlement comes alone"
+        )
+    return list(several)

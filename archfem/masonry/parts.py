@@ -1,0 +1,186 @@
+"""Roles of parts (ring, pier, other) and directions of rings and piers.
+
+Blocks and joints may state the role of their part (`Block.role`, `Joint.role`). Otherwise words of
+the part's name decide, with a warning where they are ambiguous.
+
+The direction of a ring orders and names its joints. A circle is fitted to the mid-points of the
+joints between its stones (Kåsa, IEEE Transactions on Instrumentation and Measurement 25 (1976) 8),
+and for few stones to their centroids as well. Only directions are derived from it, so elliptic and
+pointed arches are covered.
+"""
+
+import logging
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import Field, dataclass, replace
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem.errors import InvalidStructure
+from archfem.masonry.block import Block
+
+# Rings and piers are assessed; other parts follow their support.
+PART_ROLES = ("ring", "pier", "other")
+
+# Words of the name of a part, in the singular, that identify its role
+ROLE_WORDS = {
+    "ring": frozenset({"arch", "ring"}),
+    "pier": frozenset({"pier", "column"}),
+    "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock"})
+    | {"backfill", "backing", "earth", "fill", "filling", "infill", "soil"}
+    | {"parapet", "sidewall", "spandrel", "wall", "wingwall"}
+    | {"ballast", "deck", "pavement", "paver", "paving", "road"},
+}
+
+# Roles in messages
+ROLE_PHRASES = {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}
+
+logger = logging.getLogger("archfem")
+
+
+class Member(Protocol):
+    """A block or joint as a member of a part."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    @property
+    def name(self) -> str:
+        """Name in tables and messages."""
+
+    @property
+    def part(self) -> str:
+        """Part of the structure."""
+
+    @property
+    def role(self) -> str:
+        """Role of that part, one of `PART_ROLES`, or empty."""
+
+
+AnyMember = TypeVar("AnyMember", bound=Member)
+
+
+def assign_roles(
+    members: Sequence[AnyMember], others: Sequence[Member] = ()
+) -> tuple[AnyMember, ...]:
+    """Return blocks or joints with the roles of their parts, derived where none is given."""
+    # a role given for one member holds for its part; without any, the name of the part decides
+    given = _given_roles((*members, *others))
+    open_parts = dict.fromkeys(each.part for each in members if each.part not in given)
+    roles = given | {part: infer_role(part) for part in open_parts}
+    return tuple(each if each.role else replace(each, role=roles[each.part]) for each in members)
+
+
+def _given_roles(members: Sequence[Member]) -> dict[str, str]:
+    """Collect the roles that members state for their parts."""
+    first: dict[str, Member] = {}
+    for each in members:
+        if not each.role:
+            continue
+        if each.role not in PART_ROLES:
+            raise InvalidStructure(
+                f"'{each.name}' of part '{each.part}' has role {each.role!r}, which is not known: "
+                f"use one of {list(PART_ROLES)}"
+            )
+        other = first.setdefault(each.part, each)
+        if other.role != each.role:
+            raise InvalidStructure(
+                f"of part '{each.part}', '{other.name}' has role '{other.role}' and "
+                f"'{each.name}' has role '{each.role}': give all blocks and joints of a part one "
+                "role, or put them into different parts"
+            )
+    return {part: member.role for part, member in first.items()}
+
+
+def infer_role(part: str) -> str:
+    """Infer the role of a part from the words of its name; warn where they are ambiguous."""
+    # A name without any of `ROLE_WORDS` is neither ring nor pier; a name with words of several
+    # roles has the first of `PART_ROLES`. A part without a name is a ring.
+    if not part:
+        return "ring"
+    words = re.findall(r"[^\W\d_]+", part.lower())
+    singular = {word.removesuffix(plural) for word in words for plural in ("", "s", "es")}
+    named = [role for role in PART_ROLES if singular & ROLE_WORDS[role]]
+    role = named[0] if named else "other"
+    if len(named) != 1:
+        why = f"has words of {' and '.join(named)}" if named else "has no word of a known role"
+        logger.warning(
+            "part '%s' is taken for %s: its name %s. Set its role to ring, pier or other: "
+            'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or of '
+            "their layer in [structure.layers]",
+            part,
+            ROLE_PHRASES[role],
+            why,
+        )
+    return role
+
+
+def select_assessed_parts(roles: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the parts whose failures and motions are assessed, in their order."""
+    # rings and piers; without any, as in a single wall, all parts
+    return tuple(part for part, role in roles.items() if role != "other") or tuple(roles)
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """Direction of a ring or pier."""
+
+    middle: Array  # mean position of its stones (2,) [m]
+    centre: Array | None  # of the fitted circle (2,) [m]; None if straight
+    upright: bool  # of a straight one: vertical instead of horizontal
+
+    def outward(self, place: Array) -> Array:
+        """Return the unit vector (2,) from the inner to the outer face, rightwards in a pier."""
+        if self.centre is None:
+            return np.array([1.0, 0.0] if self.upright else [0.0, 1.0])
+        arm = place - self.centre
+        return arm / np.linalg.norm(arm)
+
+    def separates(self, line: Array) -> bool:
+        """Return whether a line crosses the direction, as joints between its stones do."""
+        step = line[1] - line[0]
+        return bool(2.0 * (step @ self.outward(line.mean(axis=0))) ** 2 > step @ step)
+
+    def along(self, place: Array) -> float:
+        """Return the coordinate of a point along: to the right, upwards, or the clockwise angle."""
+        # angles start at the gap between the springings, so at the left springing
+        if self.centre is None:
+            return float(place[1] if self.upright else place[0])
+        gap, arm = self.centre - self.middle, place - self.centre
+        clockwise = np.arctan2(gap[1] * arm[0] - gap[0] * arm[1], gap @ arm) % (2.0 * np.pi)
+        return float(clockwise if gap[1] <= 0.0 else -clockwise)
+
+
+def find_directions(
+    blocks: Sequence[Block], lines: Iterable[tuple[int, int, Array]]
+) -> dict[str, Direction]:
+    """Find the directions of named rings and piers, by the names of their parts."""
+    stones: dict[str, list[Array]] = {}
+    beds: dict[str, list[Array]] = {}
+    roles = {block.part: block.role for block in blocks}
+    for block in blocks:
+        if block.part and not block.fixed and block.role != "other":
+            stones.setdefault(block.part, []).append(block.centroid)
+    for a, b, line in lines:
+        part = blocks[a].part
+        if part in stones and part == blocks[b].part and not blocks[a].fixed | blocks[b].fixed:
+            beds.setdefault(part, []).append(line.mean(axis=0))
+    for part, centroids in stones.items():
+        middles = beds.get(part, [])
+        stones[part] = middles if len(middles) > 2 else [*middles, *centroids]
+    return {part: _fit_direction(np.array(places), roles[part]) for part, places in stones.items()}
+
+
+def _fit_direction(places: Array, role: str) -> Direction:
+    """Fit the direction of a part through points (n, 2)."""
+    middle = places.mean(axis=0)
+    arms = places - middle
+    _, spread, axes = np.linalg.svd(np.append(arms, np.zeros((2, 2)), axis=0))
+    upright = bool(abs(axes[0, 1]) > abs(axes[0, 0]))
+    # a circle embracing 2.5° has a spread of 0.5 % across its chord: flatter ones are straight
+    if role == "pier" or spread[1] <= 0.005 * spread[0]:
+        return Direction(middle, None, role == "pier" or upright)
+    design = np.column_stack([2.0 * arms, np.ones(len(arms))])
+    solution = np.linalg.lstsq(design, np.sum(arms**2, axis=1), rcond=None)[0]
+    return Direction(middle, middle + solution[:2], upright)

@@ -1,0 +1,234 @@
+"""Parts of a bridge: rings, piers, sidewalls, backfill and paving.
+
+The origin is at the left end of the deck (x) and at the springing level (y), where the centre
+lines of all rings intersect their springing joints.
+"""
+
+from dataclasses import dataclass, field, replace
+from math import atan2, radians, sin
+from numbers import Real
+from typing import Any, ClassVar
+
+import numpy as np
+
+from archfem._validation import check_type, is_number, short_repr
+from archfem.errors import InvalidStructure
+from archfem.masonry.block import Point
+from archfem.masonry.materials import BACKFILL, SOIL_TO_STONE, Contact, Material
+from archfem.units import in_degrees
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arch:
+    """One ring of a bridge.
+
+    Attributes:
+        span: between its springings, along the centre line [m].
+        embrace: subtended angle [degrees], a small one with its unit, "5 degree"; or
+        rise: of the centre line above the springings [m].
+        thickness: of the ring [m].
+        voussoirs: number of stones.
+        name: of the part.
+    """
+
+    role: ClassVar[str] = "ring"
+
+    span: float
+    thickness: float
+    voussoirs: int
+    embrace: float | str | None = None
+    rise: float | None = None
+    name: str = "arch"
+
+    def __post_init__(self) -> None:
+        """Check the lengths and the embrace."""
+        if (self.embrace is None) == (self.rise is None):
+            raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
+        _check_positive(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
+        if self.embrace is None:
+            return
+        embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
+        object.__setattr__(self, "embrace", embrace)
+        if not 0.0 < embrace < 360.0:
+            raise InvalidStructure(
+                f"'{self.name}': embrace {embrace:.4g}° is not between 0° and 360°"
+            )
+
+    @property
+    def half(self) -> float:
+        """Half the embrace [rad]."""
+        if self.embrace is not None:
+            return radians(float(self.embrace)) / 2.0
+        assert self.rise is not None
+        return 2.0 * atan2(self.rise, self.span / 2.0)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the centre line [m]."""
+        return self.span / (2.0 * sin(self.half))
+
+    @property
+    def reach(self) -> float:
+        """Horizontal projection of half a springing joint [m]."""
+        return 0.5 * self.thickness * sin(self.half)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pier:
+    """A pier of stone courses, flush with the intrados of the rings that spring from it.
+
+    Its top course is one skewback between the two springing joints, or behind the only one.
+
+    Attributes:
+        gap: between the springings of the neighbouring centre lines, or from that of the only
+            one to the outer face [m].
+        height: from foundation to springing level [m].
+        course: height of a course, about; courses of a pier are equally high [m].
+        name: of the part.
+    """
+
+    role: ClassVar[str] = "pier"
+
+    gap: float
+    height: float
+    course: float = 0.40
+    name: str = "pier"
+
+    def __post_init__(self) -> None:
+        """Check the lengths."""
+        _check_positive(self, "gap", "height", "course")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sidewall:
+    """Stone courses behind an outer springing, which support it and the parts above.
+
+    Attributes:
+        length: from the springing outwards [m].
+        height: from foundation to springing level [m].
+        course: height of a course, about [m].
+        above: height of the courses above the springing, an abutment to the fill [m].
+        setback: of those courses, and so the depth of the skewback, behind the extrados [m].
+        state: "free" courses; "retained" by a fixed wall at their outer end; or "fixed".
+        name: of the part.
+    """
+
+    role: ClassVar[str] = "other"
+
+    length: float
+    height: float
+    course: float = 0.40
+    above: float = 0.0
+    setback: float = 0.40
+    state: str = "free"
+    name: str = "sidewall"
+
+    def __post_init__(self) -> None:
+        """Check the state and the lengths."""
+        _check_positive(self, "length", "height", "course")
+        _check_not_negative(self, "above", "setback")
+        if self.state not in ("free", "retained", "fixed"):
+            raise InvalidStructure(
+                f"'{self.name}': state '{self.state}' is unknown: free, retained or fixed"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Backfill:
+    """The fill on rings, skewbacks and sidewalls, up to the deck; its far ends are free.
+
+    Attributes:
+        cover: height of fill above the highest crown, up to the level of the deck [m].
+        erosion: settlement of the fill below that level [m], except within
+        hump: this distance to either side of the highest crown [m].
+        spandrels: total thickness of the two spandrel walls, whose weight replaces that of the
+            fill [m].
+        material: of the fill.
+        contact: with stone.
+    """
+
+    cover: float
+    erosion: float = 0.0
+    hump: float = 1.0
+    spandrels: float = 0.0
+    material: Material = BACKFILL
+    contact: Contact = SOIL_TO_STONE
+    name: str = field(default="backfill", init=False)
+
+    def __post_init__(self) -> None:
+        """Check the lengths."""
+        _check_not_negative(self, "cover", "erosion", "hump", "spandrels")
+
+    def surface(self, left: float, right: float, crown: Point) -> list[Point]:
+        """Return points of the surface, from left to right [m].
+
+        Args:
+            left: x of the left end of the deck [m].
+            right: x of its right end [m].
+            crown: the highest point of the rings below [m].
+        """
+        deck = crown[1] + self.cover
+        low, slope = deck - self.erosion, 2.0 * self.erosion
+        reach = crown[0] + np.array([-self.hump - slope, -self.hump, self.hump, self.hump + slope])
+        breaks = reach[(reach > left) & (reach < right)] if self.erosion else reach[:0]
+        x = np.array([left, *breaks, right])
+        y = np.interp(x, reach, [low, deck, deck, low])
+        return [(float(px), float(py)) for px, py in zip(x, y, strict=True)]
+
+    def loaded(self, width: float, stone: Material) -> Material:
+        """Return the fill material with the weight of the spandrels, averaged over the width.
+
+        Args:
+            width: of the bridge, out of plane [m].
+            stone: of the spandrels.
+
+        Raises:
+            InvalidStructure: the spandrels are as wide as the bridge.
+        """
+        if not self.spandrels < width:
+            raise InvalidStructure(
+                f"spandrels of {self.spandrels:.3g} m do not fit into a width of {width:.3g} m"
+            )
+        share = self.spandrels / width
+        weight = (1.0 - share) * self.material.unit_weight + share * stone.unit_weight
+        return replace(self.material, unit_weight=weight)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paving:
+    """Paving stones on the fill.
+
+    Attributes:
+        thickness: of the stones [m].
+        length: of a stone, about [m].
+    """
+
+    thickness: float
+    length: float = 1.0
+    name: str = field(default="paving", init=False)
+
+    def __post_init__(self) -> None:
+        """Check the lengths."""
+        _check_positive(self, "thickness", "length")
+
+
+def _check_positive(part: Any, *keys: str) -> None:
+    """Check that lengths are positive and below 1000 m."""
+    for key in keys:
+        value = getattr(part, key)
+        check_type(value, Real, f"'{part.name}': {key} = {short_repr(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
+        if not 0.0 < value < 1e3:
+            raise InvalidStructure(
+                f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
+            )
+
+
+def _check_not_negative(part: Any, *keys: str) -> None:
+    """Check that lengths are not negative and below 1000 m."""
+    for key in keys:
+        value = getattr(part, key)
+        check_type(value, Real, f"'{part.name}': {key} = {short_repr(value)}", "give a length in m")
+        value = float(value) if is_number(value) else np.nan
+        if not 0.0 <= value < 1e3:
+            raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")

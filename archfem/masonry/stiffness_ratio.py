@@ -1,0 +1,60 @@
+"""Stiffness of blocks relative to their joints, and their lowest internal frequency."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+from archfem.masonry.block import Block
+from archfem.masonry.structure import Structure
+
+
+@dataclass(frozen=True)
+class BlockStiffness:
+    """Stiffness measures of a block."""
+
+    inner: float  # estimated first frequency with fixed joints [Hz]
+    ratio: float  # stiffness E / L of the block over the joint stiffness k_n [-]
+
+
+def estimate_block_stiffness(structure: Structure, number: int) -> BlockStiffness:
+    """Estimate the stiffness ratio and the first internal frequency of a block."""
+    # first mode: a shear wave that crosses the block twice, c_s / (2 L), L² the area
+    block = structure.blocks[number]
+    length = sqrt(block.area)
+    stiffest = max(
+        joint.contact.normal_stiffness for joint in structure.joints if number in joint.blocks
+    )
+    wave = sqrt(_shear_modulus(block) / structure.density(block))
+    return BlockStiffness(wave / (2.0 * length), block.material.young / length / stiffest)
+
+
+def _shear_modulus(block: Block) -> float:
+    """Return G = E / (2 (1 + ν)) [Pa]."""
+    return block.material.young / (2.0 * (1.0 + block.material.poisson))
+
+
+def find_soft_blocks(structure: Structure) -> tuple[int, ...]:
+    """Return the blocks whose internal modes are too low for static condensation."""
+    # Earthquakes have energy up to 25 Hz. Condensation neglects (f / f_inner)² of the inertia:
+    # one per cent where the first internal frequency is ten times higher.
+    return tuple(
+        number
+        for number in structure.free
+        if estimate_block_stiffness(structure, number).inner < 10.0 * 25.0
+    )
+
+
+def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:
+    """Return the blocks, of neither rings nor piers, that deform before their joints open."""
+    # Fill adapts to the rings below; as one rigid body it would support each of them. The pieces of
+    # a fill with joints adapt together.
+    return tuple(
+        number
+        for number in structure.free
+        if structure.blocks[number].role == "other" and _is_yielding(structure, number)
+    )
+
+
+def _is_yielding(structure: Structure, number: int) -> bool:
+    """Return whether a block is softer than its joints (fill about 0.005, voussoirs 40)."""
+    block = structure.blocks[number]
+    return block.grain or estimate_block_stiffness(structure, number).ratio < 1.0

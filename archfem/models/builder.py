@@ -1,0 +1,97 @@
+"""Building a model of a structure from its discretisation."""
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+
+from archfem._threads import single_threaded
+from archfem.errors import InvalidInput
+from archfem.masonry.stiffness_ratio import estimate_block_stiffness, find_soft_blocks
+from archfem.masonry.structure import Structure
+from archfem.models.condensed import condense_blocks
+from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
+from archfem.models.rigid import build_rigid_model
+
+logger = logging.getLogger("archfem")
+
+
+@single_threaded
+def build(structure: Structure, settings: Discretisation) -> Model:
+    """Build a model of a structure."""
+    model = _build_small(structure, settings)
+    if settings.displacements == "large":
+        # imported here: its compiled functions take a while to load
+        from archfem.models.large.model import LargeDisplacementModel
+
+        model = LargeDisplacementModel(model)
+    fidelities = _block_fidelities(structure, settings.fidelity)
+    model.warnings = tuple(_soft_block_warnings(structure, fidelities))
+    for warning in model.warnings:
+        logger.warning("%s", warning)
+    return model
+
+
+def _build_small(structure: Structure, settings: Discretisation) -> Model:
+    """Build a model of small displacements."""
+    fidelities = _block_fidelities(structure, settings.fidelity)
+    if settings.fidelity == "monolithic":
+        _check_plain_joints(structure)
+    if settings.fidelity == "rigid":
+        return build_rigid_model(structure, settings.through, settings.rule)
+    # imported here: rigid models do not need DOLFINx
+    from archfem.models.fem.mesh import cached_mesh, read_mesh
+    from archfem.models.fem.space import build_broken_space
+    from archfem.models.full import build_full_model
+    from archfem.models.reference import MonolithicModel
+
+    if settings.file is None:
+        mesh = cached_mesh(structure, settings)
+    else:
+        mesh = read_mesh(structure, settings.file)
+    space = build_broken_space(mesh, settings.degree)
+    if settings.fidelity == "monolithic":
+        return MonolithicModel(space, settings.rule)
+    model = build_full_model(space, settings.rule)
+    return (
+        model if settings.fidelity == "full" else condense_blocks(model, fidelities, settings.name)
+    )
+
+
+def _block_fidelities(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]:
+    """Return the fidelity of each block."""
+    if isinstance(fidelity, str):
+        return [fidelity] * len(structure.blocks)
+    names = {block.name for block in structure.blocks} | {block.part for block in structure.blocks}
+    unknown = sorted(set(fidelity) - names - {"rest"})
+    if unknown:
+        raise InvalidInput(
+            f"fidelity names {unknown}, which are no blocks or parts: {sorted(names)}"
+        )
+    default = fidelity.get("rest", "full")
+    return [fidelity.get(b.name, fidelity.get(b.part, default)) for b in structure.blocks]
+
+
+def _check_plain_joints(structure: Structure) -> None:
+    """Refuse joints whose law is not written as weak forms."""
+    names = {
+        joint.contact.name
+        for joint in structure.joints
+        if joint.contact.dilatancy > 0.0 or joint.contact.tension > 0.0
+    }
+    if names:
+        raise InvalidInput(
+            f"contacts {sorted(names)} have dilatancy or tension, which fidelity='monolithic' does "
+            "not write: use 'full', which is the same model"
+        )
+
+
+def _soft_block_warnings(structure: Structure, fidelities: Sequence[str]) -> Iterator[str]:
+    """Yield warnings for blocks too soft for their fidelity."""
+    for number in find_soft_blocks(structure):
+        if fidelities[number] in ("rigid", "faces", "condensed"):
+            ratio = estimate_block_stiffness(structure, number)
+            yield (
+                f"block '{structure.blocks[number].name}' is soft: its own modes begin near "
+                f"{ratio.inner:.0f} Hz, in the seismic band, and it is {ratio.ratio:.2g} times as "
+                f"stiff as its joints; '{fidelities[number]}' is wrong for it, use 'full'"
+            )

@@ -1,1 +1,0 @@
-"""States of a model as files of other programs."""

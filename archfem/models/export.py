@@ -1,0 +1,295 @@
+"""Export of one state of a model as DXF, VTU or a file of meshio.
+
+Blocks are polygons, and joints gaps between their faces. No two blocks share a point, so that
+joints open and slide in a file as in the model. VTK's unstructured grids (.vtu), as ParaView
+reads them, are written without VTK.
+"""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archfem._files import atomic_write
+from archfem._typing import Array
+from archfem.errors import InvalidInput
+from archfem.masonry.structure import rigid_motion_matrix
+from archfem.masonry.survey.drawings import write_dxf
+from archfem.models.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Polygons of all blocks and faces of all joints of a model, with their displacements."""
+
+    model: Model
+
+    @cached_property
+    def _fixed(self) -> list[tuple[int, Array]]:
+        """Numbers and outlines of the fixed blocks."""
+        blocks = enumerate(self.model.structure.blocks)
+        return [(number, block.drawn()) for number, block in blocks if block.fixed]
+
+    @cached_property
+    def places(self) -> Array:
+        """Points as built: those of the cells, then those of fixed blocks (m, 2) [m]."""
+        return np.concatenate([self.model.cells.places, *(points for _, points in self._fixed)])
+
+    @cached_property
+    def block(self) -> NDArray[np.intp]:
+        """Block of each point (m,)."""
+        fixed = [np.full(len(points), number) for number, points in self._fixed]
+        return np.concatenate([self.model.cells.block, *fixed]).astype(np.intp)
+
+    @cached_property
+    def polygons(self) -> list[NDArray[np.intp]]:
+        """Corner points of each polygon: the cells, then one for each fixed block."""
+        polygons = [np.asarray(cell, dtype=np.intp) for cell in self.model.cells.polygons]
+        start = len(self.model.cells.places)
+        for _, points in self._fixed:
+            polygons.append(np.arange(start, start + len(points)))
+            start += len(points)
+        return polygons
+
+    @cached_property
+    def owner(self) -> NDArray[np.intp]:
+        """Block of each polygon (p,)."""
+        return self.block[[polygon[0] for polygon in self.polygons]]
+
+    def displacement(self, q: Array) -> Array:
+        """Return the displacements of all points (m, 2) [m]."""
+        if len(q) != self.model.size:
+            raise InvalidInput(
+                f"there are {len(q)} coordinates, and the model has {self.model.size}: give the "
+                "model, of the same cells and degree, that they were computed with"
+            )
+        centroids = [block.centroid for block in self.model.structure.blocks]
+        fixed = [
+            rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]
+            for number, points in self._fixed
+        ]
+        return np.concatenate([self.model.cells.displacement(q), *fixed])
+
+    def stress(self, q: Array) -> Array | None:
+        """Return σ_xx, σ_yy and σ_xy of every polygon (p, 3) [Pa]; None where blocks are rigid."""
+        if self.model.cells.stress is None:
+            return None
+        stress = np.full((len(self.polygons), 3), np.nan)
+        stress[: len(self.model.cells.polygons)] = (self.model.cells.stress @ q).reshape(-1, 3)
+        return stress
+
+    @cached_property
+    def corners(self) -> Array:
+        """Faces of joints as built, along the lower block and back along the higher (j, 4, 2)."""
+        joints = self.model.structure.joints
+        return np.array([[*joint.ends, *joint.ends[::-1]] for joint in joints])
+
+    @cached_property
+    def _anchors(self) -> tuple[NDArray[np.intp], Array]:
+        """Ends of the polygon edge nearest to each corner (4 j, 2), and place on it (4 j,)."""
+        edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.polygons])
+        owner = self.block[edges[:, 0]]
+        joints = self.model.structure.joints
+        blocks = np.repeat([n for joint in joints for n in (joint.lower, joint.higher)], 2)
+        anchors, fractions = [], []
+        for number, point in zip(blocks, self.corners.reshape(-1, 2), strict=True):
+            of_block = edges[owner == number]
+            start = self.places[of_block[:, 0]]
+            step = np.diff(self.places[of_block], axis=1)[:, 0]
+            fraction = np.sum((point - start) * step, axis=1) / np.sum(step * step, axis=1)
+            fraction = np.clip(fraction, 0.0, 1.0)
+            away = np.linalg.norm(start + fraction[:, None] * step - point, axis=1)
+            nearest = int(np.argmin(away))
+            anchors.append(of_block[nearest])
+            fractions.append(fraction[nearest])
+        return np.array(anchors), np.array(fractions)
+
+    def joint_faces(self, displacement: Array) -> Array:
+        """Return the displacements of both faces of each joint, from those of all points.
+
+        They are those of `corners` (n_joints, 4, 2) [m].
+        """
+        edges, fraction = self._anchors
+        first, second = displacement[edges[:, 0]], displacement[edges[:, 1]]
+        return (first + fraction[:, None] * (second - first)).reshape(-1, 4, 2)
+
+
+# VTK's cell types of triangles and quadrilaterals, by number of corners; other polygons have 7
+VTK_CELL_TYPES = {3: 5, 4: 9}
+
+# VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
+VTK_NUMBER_TYPES = {
+    "f": ("Float64", "<f8"),
+    "i": ("Int64", "<i8"),
+    "u": ("UInt8", "u1"),
+    "b": ("UInt8", "u1"),
+}
+
+
+def write_vtu(
+    path: Path,
+    points: Array,
+    polygons: Sequence[NDArray[np.intp]],
+    point_data: Mapping[str, Array],
+    cell_data: Mapping[str, NDArray[Any]],
+) -> None:
+    """Write polygons with data of their points and cells."""
+    sizes = [len(polygon) for polygon in polygons]
+    cells: dict[str, NDArray[Any]] = {
+        "connectivity": np.concatenate(polygons).astype(np.int64),
+        "offsets": np.cumsum(sizes, dtype=np.int64),
+        "types": np.array([VTK_CELL_TYPES.get(size, 7) for size in sizes], dtype=np.uint8),
+    }
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64"><UnstructuredGrid>',
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(polygons)}">',
+        *_section("Points", {"": _spatial(points)}),
+        *_section("Cells", cells),
+        *_section("PointData", {name: _spatial(values) for name, values in point_data.items()}),
+        *_section("CellData", cell_data),
+        "</Piece></UnstructuredGrid></VTKFile>",
+    ]
+    with atomic_write(path) as draft:
+        draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_collection(path: Path, entries: Sequence[tuple[float, int, str]]) -> None:
+    """Write the list of files that make a series (.pvd)."""
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="Collection" version="1.0"><Collection>',
+        *(
+            f'<DataSet timestep="{time:.9g}" group="" part="{part}" file={quoteattr(name)}/>'
+            for time, part, name in entries
+        ),
+        "</Collection></VTKFile>",
+    ]
+    with atomic_write(path) as draft:
+        draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _spatial(values: Array) -> Array:
+    """Return plane vectors as space vectors; other values unchanged."""
+    if values.ndim == 2 and values.shape[1] == 2:
+        return np.column_stack([values, np.zeros(len(values))])
+    return values
+
+
+def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
+    """Return the lines of a section of arrays."""
+    return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
+
+
+def _array(name: str, values: NDArray[Any]) -> str:
+    """Return an array as XML: the number of bytes and the bytes, base64-encoded."""
+    kind, number_type = (
+        VTK_NUMBER_TYPES[values.dtype.kind] if values.dtype != np.uint8 else VTK_NUMBER_TYPES["u"]
+    )
+    data = np.ascontiguousarray(values, dtype=number_type).tobytes()
+    size = np.array([len(data)], dtype="<u8").tobytes()
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    return (
+        f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="binary">'
+        f"{b64encode(size + data).decode()}</DataArray>"
+    )
+
+
+def write_state(model: Model, q: Array, path: str | Path, *, magnification: float = 1.0) -> Path:
+    """Write a displaced state of a model for programs that draw or mesh.
+
+    As *.dxf: displaced outlines of all blocks, each on the layer of its part, over those as built,
+    and the joints as built. As *.vtu, or any format of meshio with data (*.vtk, *.xdmf, *.e …): the
+    cells as built, with displacements [m] at their points, and block numbers and stresses [Pa] of
+    the cells. Blocks share no points, so that openings are visible.
+
+    Args:
+        model: model of the structure.
+        q: coordinates (n,), e.g. `dead.q`.
+        path: of the file; its suffix determines the format.
+        magnification: of displacements in a drawing [-].
+
+    Returns:
+        The file.
+
+    Raises:
+        InvalidInput: q belongs to another model, or meshio is not installed or cannot write the
+            format.
+    """
+    path, solids = Path(path), Solids(model)
+    displacement = solids.displacement(np.asarray(q, dtype=float))
+    if path.suffix == ".dxf":
+        return _write_drawing(solids, displacement, path, magnification)
+    data: dict[str, NDArray[Any]] = {"block": solids.owner.astype(np.int64)}
+    stress = solids.stress(q)
+    if stress is not None:
+        names = ("stress_xx", "stress_yy", "stress_xy")
+        data |= dict(zip(names, stress.T, strict=True))
+    if path.suffix == ".vtu":
+        write_vtu(path, solids.places, solids.polygons, {"displacement": displacement}, data)
+        return path
+    return _write_with_meshio(solids, displacement, data, path)
+
+
+def _write_drawing(solids: Solids, displacement: Array, path: Path, magnification: float) -> Path:
+    """Write a drawing of the blocks as built and displaced."""
+    structure = solids.model.structure
+    places = solids.places + magnification * displacement
+    outlines: dict[str, list[tuple[str, Array]]] = {}
+    for number, block in enumerate(structure.blocks):
+        loop = _trace_outline([cell for cell in solids.polygons if solids.block[cell[0]] == number])
+        outlines.setdefault(block.part or "blocks", []).append((block.name, places[loop]))
+    drawn = [(block.name, block.drawn()) for block in structure.blocks]
+    built = [(name, np.vstack([points, points[:1]])) for name, points in drawn]
+    joints = [(joint.name, joint.ends) for joint in structure.joints]
+    return write_dxf(path, outlines, {"as built": built, "joints": joints})
+
+
+def _trace_outline(cells: list[NDArray[np.intp]]) -> list[int]:
+    """Return the points around a block, in order."""
+    edges = {
+        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
+    }
+    # inner edges occur in both directions
+    following = {a: b for a, b in edges if (b, a) not in edges}
+    loop = [min(following)]
+    while (point := following[loop[-1]]) != loop[0]:
+        loop.append(point)
+    return loop
+
+
+def _write_with_meshio(
+    solids: Solids, displacement: Array, data: dict[str, NDArray[Any]], path: Path
+) -> Path:
+    """Write a file in one of meshio's formats."""
+    try:
+        import meshio
+    except ImportError as error:
+        raise InvalidInput(
+            f"{path.suffix} is written with meshio, which is not installed: pip install "
+            "'archfem[exchange]', or write .dxf or .vtu"
+        ) from error
+    # meshio stores the cells of each type together
+    types: dict[str, list[int]] = {}
+    for number, polygon in enumerate(solids.polygons):
+        cell_type = {3: "triangle", 4: "quad"}.get(len(polygon), f"polygon{len(polygon)}")
+        types.setdefault(cell_type, []).append(number)
+    cells = [(t, np.array([solids.polygons[k] for k in rows])) for t, rows in types.items()]
+    cell_data = {name: [values[rows] for rows in types.values()] for name, values in data.items()}
+    point_data = {"displacement": _spatial(displacement)}
+    mesh = meshio.Mesh(_spatial(solids.places), cells, point_data, cell_data)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        mesh.write(path)
+    except Exception as error:  # meshio and its formats raise exceptions of any class
+        raise InvalidInput(
+            f"meshio does not write this model as {path}: {error}; try .vtu or .vtk"
+        ) from error
+    return path

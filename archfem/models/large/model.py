@@ -1,0 +1,365 @@
+"""Models of large displacements: blocks that rotate and slide as far as they like.
+
+A model of small displacements is written in corotational coordinates of its blocks: displacement
+of the centroid, rotation, and elastic modes in the frame that rotates with the block. The modes
+neither move the centroid nor rotate the block on the mean (mean axes), so the mass matrix is
+constant and diagonal. Inertia forces on the modes due to the spin of the block are neglected.
+"""
+
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.joints.large.face_kinematics import face_pose
+from archfem.joints.large.forces import (
+    JointStepForces,
+    allocate_step_forces,
+    compute_step_forces,
+    facet_slips,
+    joint_energy,
+    measure_states,
+)
+from archfem.joints.large.rates import assemble_rates
+from archfem.joints.sparsity import Pattern
+from archfem.masonry.loads import Action, BodyForce, PointLoad
+from archfem.masonry.structure import rigid_motion_matrix
+from archfem.models.condensed import project_model
+from archfem.models.large.blocks import (
+    CorotationalCoordinates,
+    FramelessPoint,
+    RotatingCells,
+    RotatingPoint,
+    check_small_model,
+    find_slots,
+)
+from archfem.models.large.joints import (
+    JointSegments,
+    build_large_joints,
+    initial_segment_measures,
+    joint_orientation,
+)
+from archfem.models.model import Cells, Model, ModelStep, Observer, Prediction
+
+
+class LargeDisplacementModel(Model):
+    """A model in corotational coordinates of the blocks, built from one of small displacements."""
+
+    large_displacements = True
+    operator = None
+
+    def __init__(self, small: Model) -> None:
+        small = check_small_model(small)
+        blocks = CorotationalCoordinates.of(small)
+        # the model of small displacements in the same coordinates
+        self.small = project_model(small, blocks.basis, small.fidelity)
+        self.structure = small.structure
+        self.fidelity = small.fidelity
+        self.size = self.small.size
+        # first coordinate of each free block, and the number of all
+        self.block_starts = blocks.block_starts
+        # whether each free block has a rotating frame; fill has none
+        self.has_frame = np.array([turns for _, turns in blocks.blocks.values()])
+        self.centres = blocks.centres  # about which blocks rotate (n_blocks, 2) [m]
+        self.segments = JointSegments.of(self.small)
+        self.joints = build_large_joints(self.small, self.segments, blocks.blocks, blocks.centres)
+        self._slots, coupled = find_slots(self.joints.kinematics, self.size)
+        pattern = Pattern.of(self.small.mass, self.small.block_stiffness, coupled)
+        self.mass = pattern.spread(self.small.mass)
+        self.block_stiffness = pattern.spread(self.small.block_stiffness)
+        self._pattern = pattern
+        self._entries = pattern.find_entries(*self._slots.pairs)
+        self.mass_influence = self.small.mass_influence
+        self.cells: Cells = RotatingCells.of(self.small.cells, blocks.blocks)
+        self.support_motion = self.small.support_motion
+        self.initial_gaps: Array | None = None
+        self.prediction: Prediction | None = None
+        self.warnings: tuple[str, ...] = ()
+        self._points: dict[PointLoad, RotatingPoint | FramelessPoint] = {}
+        self._slip = np.zeros_like(allocate_step_forces(self.joints).irreversible_slip)
+
+    def with_support_motion(self, motion: Array) -> Self:
+        """Return the model with supports displaced, as far as they like."""
+        other = copy(self)
+        other.support_motion = motion
+        sides = self.joints.kinematics._replace(fixed_pose=self.segments.fixed_poses(motion))
+        other.joints = self.joints._replace(kinematics=sides)
+        return other
+
+    def with_initial_gaps(self, gaps: Array) -> Self:
+        """Return the model with gaps and slips of its joints at q = 0, due to construction."""
+        other = copy(self)
+        other.initial_gaps = gaps
+        measures = initial_segment_measures(self.small, self.segments, gaps)
+        other.joints = self.joints._replace(initial_measures=np.ascontiguousarray(measures))
+        return other
+
+    @property
+    def memory(self) -> Array:
+        """Irreversible slip of each joint point (p,) [m]."""
+        return self._slip
+
+    def with_memory(self, memory: Array) -> Self:
+        """Return the model with another joint memory."""
+        other = copy(self)
+        other._slip = np.ascontiguousarray(memory, float)
+        return other
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
+        return self._instant(q).irreversible_slip
+
+    def small_displacement_model(self) -> Model:
+        """Return the model of small displacements in the same coordinates."""
+        return self.small
+
+    def with_joint_state(self, built: Model) -> Self:
+        """Return the model with initial gaps and memory of its model of small displacements."""
+        model = self if built.initial_gaps is None else self.with_initial_gaps(built.initial_gaps)
+        # slip is positive toward the extrados there, to the left of the joint's normal here
+        orientation = joint_orientation(self.structure)[self.small.operator.points.joint]
+        return model.with_memory(orientation * built.memory)
+
+    def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
+        """Return a time step from a state with the present joint memory."""
+        return LargeDisplacementStep(self, start, damping_lag)
+
+    def observer(self) -> Observer:
+        """Return the observer of joint faces and block displacements."""
+        return LargeObserver(len(self.structure.joints), self)
+
+    def step_forces(self, start: Array, end: Array, damping_lag: float) -> JointStepForces:
+        """Return the mean forces of the joints over a step."""
+        forces = allocate_step_forces(self.joints)
+        compute_step_forces(
+            self.joints, _plain(start), _plain(end), damping_lag, self._slip, forces
+        )
+        return forces
+
+    def _instant(self, q: Array) -> JointStepForces:
+        """Return the forces of the joints at an instant, a step without displacement."""
+        return self.step_forces(q, q, 0.0)
+
+    def gather_forces(self, force: Array) -> Array:
+        """Return generalised forces from those on the coordinates of each face (n,)."""
+        rows, places = self._slots.rows
+        return np.asarray(np.bincount(rows, force.ravel()[places], self.size), dtype=float)
+
+    def assemble_tangent(
+        self, block_factor: float, joint_factor: float, forces: JointStepForces
+    ) -> sparse.csr_matrix:
+        """Return block stiffness and joint tangent, each times a factor (n, n)."""
+        sides = self.joints.kinematics
+        assemble_rates(sides, forces, np.empty((2, 2, 4, sides.shapes.shape[3])))
+        of_joints = np.bincount(self._entries, forces.rate, len(self._pattern.indices))
+        of_blocks = block_factor * self.block_stiffness.data
+        return self._pattern.with_data(of_blocks + joint_factor * of_joints)
+
+    def force(self, q: Array) -> Array:
+        """Return the internal forces of blocks and joints (n,)."""
+        return np.asarray(self.block_stiffness @ q) + self.gather_forces(self._instant(q).force)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force`; unsymmetric where joints slide (n, n)."""
+        # the mean force depends on the end of a step by half as much as the force at an instant
+        return self.assemble_tangent(1.0, 2.0, self._instant(q))
+
+    def support_forces(self, q: Array, motion: Array) -> Array:
+        """Return the approximate change of `force` due to a small motion of the supports (n,)."""
+        # rotations of the blocks are neglected: this serves as an initial guess
+        return self.small.with_memory(self.memory).support_forces(q, motion)
+
+    def closed_tangent(self) -> sparse.csr_matrix:
+        """Return the tangent at q = 0 with every joint closed over its whole depth (n, n)."""
+        return self._pattern.spread(self.small.closed_tangent())
+
+    def energy(self, q: Array) -> float:
+        """Return the potential energy of blocks and joints without further slip [J]."""
+        of_blocks = 0.5 * float(q @ (self.block_stiffness @ q))
+        return of_blocks + float(joint_energy(self.joints, _plain(q), self._slip))
+
+    def resultants(self, q: Array) -> Array:
+        """Return N, V, M of every joint about the middle of the overlap (n_joints, 3)."""
+        return self._instant(q).resultants
+
+    def measures(self, q: Array) -> Array:
+        """Return opening, slip and rotation of every joint (…, n_joints, 3) [m, m, -]."""
+        measures = measure_states(self.joints, _plain(np.atleast_2d(q)))
+        return measures.reshape(*q.shape[:-1], *measures.shape[1:])
+
+    def face_mismatch(self, q: Array) -> tuple[float, str]:
+        """Return the largest slip past opposite facets, over their length, and its joint."""
+        law = self.joints.face_law
+        if not law.paired.any():
+            return 0.0, ""
+        # facets much shorter than usual do not count by their own length
+        depth, usual = law.depth, np.median(law.depth[law.paired])
+        slips = facet_slips(self.joints, _plain(q))
+        slips = slips * depth / np.maximum(depth, usual)
+        worst = int(np.argmax(slips))
+        return float(slips[worst]), self.structure.joints[self.joints.joint[worst]].name
+
+    def load(self, action: Action, q: Array | None = None) -> Array:
+        """Return the generalised forces of an action; point loads keep their direction (n,)."""
+        if isinstance(action, BodyForce) or q is None:
+            return self.small.load(action)
+        return self._loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
+
+    def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `load` by the coordinates (n, n)."""
+        if isinstance(action, BodyForce):
+            return super().load_rate(action, q)
+        return self._loaded_point(action).force_rate(q, np.array(action.force), self.size)
+
+    def work(self, action: Action, q: Array) -> float:
+        """Return the work of an action since before anything moved [J]."""
+        if isinstance(action, BodyForce):
+            return super().work(action, q)
+        return float(self._loaded_point(action).displacement(q) @ np.array(action.force))
+
+    def _loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
+        """Return the point at which a point load acts."""
+        if action in self._points:
+            return self._points[action]
+        block, place = action.place(self.structure)
+        rows = self.small.cells.displacement_rows(block, place)
+        number = self.structure.free.index(block)
+        first, end = self.block_starts[number], self.block_starts[number + 1]
+        if not self.has_frame[number]:
+            return FramelessPoint(rows)
+        # of the rigid motion, rotation gives the vector from the centroid to the point
+        local = rows[:, first:end].toarray()
+        point = RotatingPoint(int(first), np.array([local[1, 2], -local[0, 2]]), local[:, 3:])
+        self._points[action] = point
+        return point
+
+    def rigid_motions(self, q: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return displacement and velocity of each block as a rigid body, each (n_blocks, 3)."""
+        structure = self.structure
+        poses = np.array(self.support_motion, dtype=float)
+        velocities = np.zeros((len(structure.blocks), 3))
+        for number, block in enumerate(structure.free):
+            own = slice(*self.block_starts[number : number + 2])
+            motion, speed = q[own], velocity[own]
+            if not self.has_frame[number]:
+                mean = self._momentum_projection(block, own)
+                motion, speed = mean @ motion, mean @ speed
+            # from the centre of mass of the mesh to the centroid of the outline
+            arm = structure.blocks[block].centroid - self.centres[block]
+            c, s = np.cos(motion[2]), np.sin(motion[2])
+            rotated = np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+            poses[block] = *(motion[:2] + rotated - arm), motion[2]
+            spin = speed[2] * np.array([-rotated[1], rotated[0]])
+            velocities[block] = *(speed[:2] + spin), speed[2]
+        return poses, velocities
+
+    def _momentum_projection(self, block: int, own: slice) -> Array:
+        """Return the matrix to the rigid motion of a fill with the same momentum (3, s)."""
+        cells = self.small.cells
+        nodes = np.flatnonzero(cells.block == block)
+        rows = (2 * nodes[:, None] + np.arange(2)).ravel()
+        shapes = cells.shape_functions[rows][:, own].toarray()
+        motion = rigid_motion_matrix(cells.places[nodes], self.centres[block]).reshape(-1, 3)
+        rigid = np.linalg.lstsq(shapes, motion, rcond=None)[0]
+        mass = rigid.T @ self.mass[own, own]
+        return np.linalg.solve(mass @ rigid, mass)
+
+
+@dataclass(frozen=True, eq=False)
+class LargeDisplacementStep:
+    """A time step of a model of large displacements."""
+
+    model: LargeDisplacementModel  # with the joint memory at the start
+    start: Array  # coordinates at its start (n,)
+    damping_lag: float  # time lag of damping over the length of the step, β/Δt [-]
+
+    def _joints(self, q: Array) -> JointStepForces:
+        """Return the mean forces of the joints."""
+        return self.model.step_forces(self.start, q, self.damping_lag)
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the internal forces of blocks and joints (n,)."""
+        middle = (0.5 - self.damping_lag) * self.start + (0.5 + self.damping_lag) * q
+        of_blocks = np.asarray(self.model.block_stiffness @ middle)
+        return of_blocks + self.model.gather_forces(self._joints(q).force)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force` (n, n)."""
+        return self.model.assemble_tangent(0.5 + self.damping_lag, 1.0, self._joints(q))
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
+        return self._joints(q).resultants
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the irreversible slip of each joint point at the end (p,) [m]."""
+        return self._joints(q).irreversible_slip
+
+    def dissipation(self, q: Array) -> float:
+        """Return the energy lost to friction and damping [J]."""
+        change = q - self.start
+        in_blocks = self.damping_lag * float(change @ (self.model.block_stiffness @ change))
+        return float(self._joints(q).dissipation.sum()) + in_blocks
+
+    def with_dilatancy(self, q: Array) -> "LargeDisplacementStep":
+        """Return the step itself: large displacements exclude dilatancy."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class LargeObserver(Observer):
+    """Observer of a model of large displacements."""
+
+    joint_count: int
+    model: LargeDisplacementModel
+
+    def read(self, q: Array) -> Array:
+        """Return all readings (r,)."""
+        return self.read_many(q[None])[0]
+
+    @cached_property
+    def _middles(self) -> RotatingCells:
+        """One point for each block, with the mean displacement of its points."""
+        cells = self.model.cells
+        assert isinstance(cells, RotatingCells)
+        return cells.middles(len(self.model.structure.blocks))
+
+    def read_many(self, states: Array) -> Array:
+        """Return the readings of many states (steps, r)."""
+        gap, slip, turn = np.moveaxis(self.model.measures(states), -1, 0)
+        middles = self._middles.displacement(states)
+        middles = middles.reshape(len(states), 2 * len(self._middles.turns))
+        # the measure of rotation is 2 sin(θ/2)
+        return np.concatenate([gap, 2.0 * np.arcsin(0.5 * turn), slip, middles], axis=1)
+
+    def joint_ends(self, q: Array) -> Array:
+        """Return the displacements of both ends of each joint's overlap (n_joints, 2, 2) [m]."""
+        structure, q = self.model.structure, np.ascontiguousarray(q, float)
+        joints, poses = self.model.joints, np.zeros((self.joint_count, 2, 3))
+        # pose of a face is the mean of its segments'
+        weight = (
+            joints.face_law.depth / np.bincount(joints.joint, joints.face_law.depth)[joints.joint]
+        )
+        for segment, joint in enumerate(joints.joint):
+            for side in range(2):
+                poses[joint, side] += weight[segment] * np.array(
+                    face_pose(joints.kinematics, segment, side, q)
+                )
+        mean, apart = poses.mean(axis=1), poses[:, 1] - poses[:, 0]
+        # mean direction of both faces: their tangent, rotated
+        (tx, ty), c, s = structure.tangents.T, np.cos(mean[:, 2]), np.sin(mean[:, 2])
+        along = np.stack([c * tx - s * ty, s * tx + c * ty], axis=-1)
+        slip = np.sum(along * apart[:, :2], axis=1)
+        half = 0.5 * np.maximum(structure.depths - np.abs(slip), 0.0) * np.cos(0.5 * apart[:, 2])
+        middles = structure.middles + mean[:, :2]
+        ends = middles[:, None] + np.array([-1.0, 1.0])[:, None] * (half[:, None] * along)[:, None]
+        return ends - structure.ends
+
+
+def _plain(q: Array) -> Array:
+    """Return coordinates as the one kind of array for which the joints are compiled."""
+    return np.require(q, float, ("C", "W"))

@@ -1,0 +1,188 @@
+"""Linear elastic or rigid blocks between dry joints, in any coordinates.
+
+Internal forces are f(q) = K q + Gᵀ W t(G q), with K the stiffness of the blocks and t the tractions
+of the joints. The joints are the only nonlinearity.
+"""
+
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.joints.operator import JointOperator
+from archfem.joints.rigid_kinematics import block_motion_gaps
+from archfem.joints.sparsity import Pattern
+from archfem.joints.step_average import StepForces
+from archfem.masonry.structure import Structure
+from archfem.models.model import Cells, Model, ModelStep, Observer, Prediction
+from archfem.models.observation import linear_observer
+
+
+class LinearBlockModel(Model):
+    """A model with a constant block stiffness matrix and a joint operator."""
+
+    large_displacements = False
+    operator: JointOperator
+
+    def __init__(
+        self,
+        structure: Structure,
+        fidelity: str,
+        *,
+        mass: sparse.csr_matrix,
+        block_stiffness: sparse.csr_matrix,
+        mass_influence: Array,
+        operator: JointOperator,
+        cells: Cells,
+    ) -> None:
+        pattern = Pattern.of(mass, block_stiffness, operator.coupling_pattern())
+        self.structure = structure
+        self.fidelity = fidelity
+        self.size = mass.shape[0]
+        self.mass = pattern.spread(mass)
+        self.block_stiffness = pattern.spread(block_stiffness)
+        self.mass_influence = mass_influence
+        self.operator = operator
+        self.cells = cells
+        self.support_motion = np.zeros((len(structure.blocks), 3))
+        self.initial_gaps: Array | None = None
+        self.prediction: Prediction | None = None
+        self.warnings: tuple[str, ...] = ()
+        self._pattern = pattern
+        self._joint_tangent = operator.tangent_map(pattern)
+        # point stiffnesses and tangent of the last call
+        self._last: tuple[Array, sparse.csr_matrix] | None = None
+
+    def with_operator(self, operator: JointOperator) -> "LinearBlockModel":
+        """Return a model of the same blocks with another joint operator."""
+        return LinearBlockModel(
+            self.structure,
+            self.fidelity,
+            mass=self.mass,
+            block_stiffness=self.block_stiffness,
+            mass_influence=self.mass_influence,
+            operator=operator,
+            cells=self.cells,
+        ).with_support_motion(self.support_motion)
+
+    def with_joint_law(self, operator: JointOperator) -> Self:
+        """Return the model with another law at the same joint points."""
+        other = copy(self)
+        other.operator = operator
+        other._last = None
+        return other
+
+    def with_support_motion(self, motion: Array) -> Self:
+        """Return the model with supports displaced: joints have gaps and slips at q = 0."""
+        offset = self.initial_gaps
+        if motion.any():
+            gaps = block_motion_gaps(self.structure, self.operator.points, motion)
+            offset = gaps if offset is None else gaps + offset
+        other = self.with_joint_law(replace(self.operator, gap_offset=offset))
+        other.support_motion = motion
+        return other
+
+    def with_initial_gaps(self, gaps: Array) -> Self:
+        """Return the model with gaps and slips of its joints at q = 0, due to construction."""
+        other = copy(self)
+        other.initial_gaps = gaps
+        return other.with_support_motion(self.support_motion)
+
+    @property
+    def memory(self) -> Array:
+        """Irreversible slip (p,) [m], then flags of broken bonds (2 p,)."""
+        return self.operator.memory
+
+    def with_memory(self, memory: Array) -> Self:
+        """Return the model with another joint memory."""
+        other = copy(self)
+        other.operator = self.operator.with_memory(memory)
+        return other
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the joint memory once the model is at q, as `memory`."""
+        return self.operator.updated_memory(q)
+
+    def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
+        """Return a time step from a state with the present joint memory."""
+        return LinearBlockStep(self, StepForces(self.operator, start, damping_lag))
+
+    def observer(self) -> Observer:
+        """Return the observer of joint faces and block displacements."""
+        return linear_observer(self, self.operator)
+
+    def force(self, q: Array) -> Array:
+        """Return the internal forces of blocks and joints (n,)."""
+        return np.asarray(self.block_stiffness @ q) + self.operator.force(q)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force`, the same object while no point changes its state."""
+        stiffness = self.operator.stiffness(q)
+        if self._last is None or not np.array_equal(stiffness, self._last[0]):
+            self._last = (stiffness, self.assemble_tangent(1.0, stiffness))
+        return self._last[1]
+
+    def support_forces(self, q: Array, motion: Array) -> Array:
+        """Return the linearised change of `force` due to a small motion of the supports (n,)."""
+        joints = self.operator
+        gaps = block_motion_gaps(self.structure, joints.points, motion)
+        return joints.generalised_force(*joints.linear_forces(joints.stiffness(q), gaps))
+
+    def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
+        """Return the block stiffness times a factor, plus the tangent of the joints (n, n)."""
+        return self._pattern.with_data(
+            block_factor * self.block_stiffness.data + self._joint_tangent @ stiffness
+        )
+
+    def closed_tangent(self) -> sparse.csr_matrix:
+        """Return the tangent with every joint closed over its whole depth, without slip."""
+        return self.assemble_tangent(1.0, self.operator.closed_stiffness())
+
+    def energy(self, q: Array) -> float:
+        """Return the potential energy of blocks and joints without further slip [J]."""
+        return 0.5 * float(q @ (self.block_stiffness @ q)) + self.operator.energy(q)
+
+    def resultants(self, q: Array) -> Array:
+        """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        return self.operator.resultants(q)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBlockStep:
+    """A time step of linear blocks between joints."""
+
+    model: LinearBlockModel  # with the joint memory at the start
+    joints: StepForces  # the same step of the joints alone
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the internal forces of blocks and joints (n,)."""
+        start, lag = self.joints.start, self.joints.damping_lag
+        of_blocks = self.model.block_stiffness @ ((0.5 - lag) * start + (0.5 + lag) * q)
+        return np.asarray(of_blocks) + self.joints.force(q)
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force` (n, n)."""
+        factor = 0.5 + self.joints.damping_lag
+        return self.model.assemble_tangent(factor, self.joints.stiffness(q))
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
+        return self.joints.resultants(q)
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the joint memory at the end of the step, as `Model.memory`."""
+        return self.joints.updated_memory(q)
+
+    def with_dilatancy(self, q: Array) -> "LinearBlockStep":
+        """Return the step with the dilatancy opening due to the slip on the way to q."""
+        joints = self.joints.with_dilatancy(q)
+        return self if joints is self.joints else LinearBlockStep(self.model, joints)
+
+    def dissipation(self, q: Array) -> float:
+        """Return the energy lost to friction, broken bonds and damping [J]."""
+        change = q - self.joints.start
+        of_blocks = float(change @ (self.model.block_stiffness @ change))
+        return self.joints.dissipation(q) + self.joints.damping_lag * of_blocks

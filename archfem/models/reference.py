@@ -1,0 +1,274 @@
+"""The reference model: weak forms assembled by DOLFINx at every iteration, without condensation.
+
+It shares no shortcut with the other models and is the independent check of them.
+
+For a step along which displacements are linear from u_0 to u_1, with the tractions of
+`joints.contact_law` averaged over the step, internal forces are, for all v,
+
+    ∫ w σ(ū):ε(v) + Σ_joints ∫ w (<t_n> ⟦v⟧·n + <t_s> ⟦v⟧·t),    ū = (½ - λ) u_0 + (½ + λ) u_1,
+
+with λ = β/Δt of damping with the time lag β, which also shifts gaps to g + λ Δg. Friction over the
+step is limited by μ |<t_n>| + c times the part of it for which the joint is closed.
+"""
+
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.errors import InvalidInput
+from archfem.joints.operator import JointOperator
+from archfem.joints.quadrature import Quadrature
+from archfem.joints.sparsity import Pattern
+from archfem.masonry.structure import rigid_motion_matrix
+from archfem.models.fem import _fenicsx
+from archfem.models.fem.forms import Fields, Forms
+from archfem.models.fem.joint_facets import PointReader
+from archfem.models.fem.space import BrokenSpace
+from archfem.models.full import build_full_model
+from archfem.models.model import Model, ModelStep, Observer, Prediction
+from archfem.models.observation import linear_observer
+
+
+@dataclass(frozen=True)
+class StepStart:
+    """State at the start of a step."""
+
+    displacement: Array  # of all nodes (2 m,) [m]
+    irreversible_slip: Array  # of each joint point (p,) [m]
+    damping_lag: float  # time lag of damping over the length of the step [-]
+
+
+@dataclass(frozen=True, eq=False)
+class StepForms:
+    """Weak forms of a step, compiled when first used."""
+
+    forms: Forms  # those of an instant
+
+    @cached_property
+    def _step(self) -> Fields:
+        """Displacements at its start and its end."""
+        functions = self.forms.space.functions
+        return fem.Function(functions), fem.Function(functions)
+
+    @cached_property
+    def _lag(self) -> Any:
+        return _fenicsx.constant(self.forms.space.mesh.grid, 0.0)
+
+    def _set_step(self, start: StepStart, end: Array) -> None:
+        """Set start and end of the step in all forms."""
+        self._step[0].x.array[:] = start.displacement
+        self._step[1].x.array[:] = end
+        self._lag.value = start.damping_lag
+        self.forms.facets.set_point_values(start.irreversible_slip)
+
+    @cached_property
+    def _work(self) -> Any:
+        """Work of the mean forces on a displacement v, a UFL form."""
+        (start, end), lag, forms = self._step, self._lag, self.forms
+        v = ufl.TestFunction(forms.space.functions)
+        mean = (0.5 - lag) * start + (0.5 + lag) * end
+        of_joints = forms.joint_work([faces.means(self._step, lag) for faces in forms.faces], v)
+        return forms.block_work(mean, v) + of_joints
+
+    @cached_property
+    def _force(self) -> Any:
+        return fem.form(self._work)
+
+    def force(self, start: StepStart, end: Array) -> Array:
+        """Return the mean of the assembled internal forces (2 m,) [N]."""
+        self._set_step(start, end)
+        return _fenicsx.assemble_vector(self._force)
+
+    @cached_property
+    def _tangent(self) -> Any:
+        return fem.form(ufl.derivative(self._work, self._step[1]))
+
+    def tangent(self, start: StepStart, end: Array) -> sparse.csr_matrix:
+        """Return the assembled derivative of `force` by the displacement at the end [N/m]."""
+        self._set_step(start, end)
+        return _fenicsx.assemble_matrix(self._tangent)
+
+    @cached_property
+    def _tractions(self) -> PointReader:
+        step, lag = self._step, self._lag
+        return self.forms.point_reader(
+            [[*f.means(step, lag), f.slip_after_step(step, lag)] for f in self.forms.faces]
+        )
+
+    def tractions(self, start: StepStart, end: Array) -> Array:
+        """Return mean tractions and final irreversible slip at joint facet points (3, f, k)."""
+        self._set_step(start, end)
+        return self.forms.facets.read(self._tractions)
+
+    @cached_property
+    def _dissipation(self) -> Any:
+        step, lag, forms = self._step, self._lag, self.forms
+        change = step[1] - step[0]
+        at_joints = forms.over_joints([faces.dissipation(step, lag) for faces in forms.faces])
+        return fem.form(lag * forms.block_work(change, change) + at_joints)
+
+    def dissipation(self, start: StepStart, end: Array) -> float:
+        """Return the energy lost to friction and damping [J]."""
+        self._set_step(start, end)
+        return float(fem.assemble_scalar(self._dissipation))
+
+
+class MonolithicModel(Model):
+    """A model whose forces and tangents are assembled from compiled UFL forms."""
+
+    fidelity = "monolithic"
+    large_displacements = False
+    operator = None
+    initial_gaps = None
+
+    def __init__(self, space: BrokenSpace, rule: Quadrature) -> None:
+        linear = build_full_model(space, rule)
+        self.structure = linear.structure
+        self.size = linear.size
+        self.mass_influence = linear.mass_influence
+        self.cells = linear.cells
+        self.support_motion = linear.support_motion
+        self.prediction: Prediction | None = None
+        self.warnings: tuple[str, ...] = ()
+        self.free = space.free
+        self.steps = StepForms(Forms(space, rule))
+        self._forms = self.steps.forms
+        self._linear = linear
+        self._places, self._owner = space.places, space.owner
+        self._displacement = np.zeros(2 * len(space.places))  # workspace, of all nodes
+        self._memory = linear.memory
+        # the pattern of the forms couples all nodes of the two cells at a facet, even by zeros
+        coupled = self._forms.tangent(self._displacement, self._memory)[self.free][:, self.free]
+        self._pattern = Pattern.of(linear.mass, coupled)
+        self.mass = self._pattern.spread(linear.mass)
+        self.block_stiffness = self._pattern.spread(linear.block_stiffness)
+        self._closed = linear.closed_tangent()
+
+    def with_support_motion(self, motion: Array) -> Self:
+        """Return the model with supports displaced: their nodes follow."""
+        other = copy(self)
+        other.support_motion = motion
+        other._displacement = self._support_displacement(motion)
+        return other
+
+    def _support_displacement(self, motion: Array) -> Array:
+        """Displacements of all nodes, zero but for those of fixed blocks (2 m,) [m]."""
+        displacement = np.zeros_like(self._displacement)
+        for number in set(range(len(motion))) - set(self.structure.free):
+            nodes = np.flatnonzero(self._owner == number)
+            rigid = rigid_motion_matrix(self._places[nodes], self.structure.blocks[number].centroid)
+            displacement.reshape(-1, 2)[nodes] = rigid @ motion[number]
+        return displacement
+
+    def with_initial_gaps(self, gaps: Array) -> Self:
+        """Refuse initial gaps, which the weak forms do not contain."""
+        raise InvalidInput(
+            f"a model '{self.fidelity}' cannot be built in stages: use 'full', which is the same"
+        )
+
+    @property
+    def memory(self) -> Array:
+        """Irreversible slip of each joint point (p,) [m]."""
+        return self._memory
+
+    def with_memory(self, memory: Array) -> Self:
+        """Return the model with another joint memory."""
+        other = copy(self)
+        other._memory = memory
+        return other
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
+        return self._forms.facets.gather(self._tractions(q)[2])
+
+    def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
+        """Return a time step from a state with the present joint memory."""
+        return MonolithicStep(self, StepStart(self.spread(start).copy(), self._memory, damping_lag))
+
+    @property
+    def kinematics(self) -> JointOperator:
+        """Joint operator at the same points, for openings and slips only."""
+        return self._linear.with_support_motion(self.support_motion).operator
+
+    def observer(self) -> Observer:
+        """Return the observer of joint faces and block displacements."""
+        return linear_observer(self, self.kinematics)
+
+    def spread(self, q: Array) -> Array:
+        """Return displacements of all nodes, those of fixed blocks included (2 m,) [m]."""
+        self._displacement[self.free] = q
+        return self._displacement
+
+    def force(self, q: Array) -> Array:
+        """Return the internal forces of blocks and joints (n,)."""
+        return self._forms.force(self.spread(q), self._memory)[self.free]
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force`, assembled in every call."""
+        return self.of_free(self._forms.tangent(self.spread(q), self._memory))
+
+    def support_forces(self, q: Array, motion: Array) -> Array:
+        """Return the linearised change of `force` due to a small motion of the supports (n,)."""
+        tangent = self._forms.tangent(self.spread(q), self._memory)
+        return (tangent @ self._support_displacement(motion))[self.free]
+
+    def of_free(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+        """Return the part of a matrix that belongs to the coordinates, on the model's pattern."""
+        return self._pattern.spread(matrix[self.free][:, self.free])
+
+    def closed_tangent(self) -> sparse.csr_matrix:
+        """Return the tangent with every joint closed over its whole depth."""
+        return self._pattern.spread(self._closed)
+
+    def energy(self, q: Array) -> float:
+        """Return the potential energy of blocks and joints without further slip [J]."""
+        return self._forms.energy(self.spread(q), self._memory)
+
+    def resultants(self, q: Array) -> Array:
+        """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
+        return self._forms.facets.resultants(*self._tractions(q)[:2])
+
+    def _tractions(self, q: Array) -> Array:
+        return self._forms.tractions(self.spread(q), self._memory)
+
+
+@dataclass(frozen=True, eq=False)
+class MonolithicStep:
+    """A time step of the reference model."""
+
+    model: MonolithicModel  # with the joint memory at the start
+    start: StepStart
+
+    def force(self, q: Array) -> Array:
+        """Return the mean of the internal forces of blocks and joints (n,)."""
+        return self.model.steps.force(self.start, self.model.spread(q))[self.model.free]
+
+    def tangent(self, q: Array) -> sparse.csr_matrix:
+        """Return the derivative of `force` (n, n)."""
+        return self.model.of_free(self.model.steps.tangent(self.start, self.model.spread(q)))
+
+    def _tractions(self, q: Array) -> Array:
+        return self.model.steps.tractions(self.start, self.model.spread(q))
+
+    def resultants(self, q: Array) -> Array:
+        """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
+        return self.model.steps.forms.facets.resultants(*self._tractions(q)[:2])
+
+    def updated_memory(self, q: Array) -> Array:
+        """Return the irreversible slip of each joint point at the end (p,) [m]."""
+        return self.model.steps.forms.facets.gather(self._tractions(q)[2])
+
+    def with_dilatancy(self, q: Array) -> "MonolithicStep":
+        """Return the step itself: the weak forms exclude dilatancy."""
+        return self
+
+    def dissipation(self, q: Array) -> float:
+        """Return the energy lost to friction and damping [J]."""
+        return self.model.steps.dissipation(self.start, self.model.spread(q))

@@ -1,0 +1,235 @@
+"""Text of a record file: its numbers, units and channels, and errors with file and line."""
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from math import isfinite
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from archfem._files import read_bytes
+from archfem._typing import Array
+from archfem.errors import InvalidInput
+from archfem.units import STANDARD_GRAVITY
+
+# Pattern of a number as Fortran and C print it
+NUMBER_PATTERN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
+
+# Pattern of a number of samples
+COUNT_PATTERN = r"\d{1,9}"
+
+_NUMERIC_LINE = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
+_ANY_DIGIT = re.compile(r"[0-9]")
+_RUN_TOGETHER = re.compile(r"(?<=[\d.])(?=[-+])")
+
+
+@dataclass(frozen=True)
+class RecordText:
+    """The lines of a file that may hold a record."""
+
+    path: Path  # the file
+    lines: tuple[str, ...]  # its lines without line ends
+    ended: bool  # whether the last line has its line end
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> "RecordText":
+        """Decode a file: UTF-8, or else Western or Turkish in 8 bits."""
+        content = read_bytes(path, "record").rstrip(b"\x1a")  # end-of-file mark of DOS
+        place = Path(path)
+        if b"\0" in content or not content.strip():
+            kind = "not a text file" if content.strip() else "empty"
+            raise InvalidInput(f"{place} is {kind}: give an accelerogram as text")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("cp1254", errors="replace")
+        # `splitlines` would also split at form feeds and shift the line numbers
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        return cls(place, tuple(lines), lines[-1].strip() == "")
+
+    def error(self, message: str, line: int | None = None) -> InvalidInput:
+        """Create an error with the file and the line."""
+        where = f"{self.path}" if line is None else f"{self.path}, line {line + 1}"
+        return InvalidInput(f"{where}: {message}")
+
+    def is_numeric(self, line: int) -> bool:
+        """Return whether a line consists of numbers."""
+        content = self.lines[line]
+        return bool(_NUMERIC_LINE.fullmatch(content) and _ANY_DIGIT.search(content))
+
+    def parse_row(self, line: int, width: int | None = None) -> list[float]:
+        """Parse the numbers of one line."""
+        # numbers without a space between them are split at their signs, or by the column width
+        content = self.lines[line].strip()
+        if content and not self.is_numeric(line):
+            raise self.error(f"numbers expected, got {content[:40]!r}", line)
+        try:
+            row = [float(token) for token in self._split_tokens(line, width)]
+        except ValueError as error:
+            raise self.error(f"not a number in {content[:40]!r}", line) from error
+        if not all(map(isfinite, row)):
+            raise self.error(f"a number too large in {content[:40]!r}", line)
+        return row
+
+    def _split_tokens(self, line: int, width: int | None) -> list[str]:
+        """Split a line into the texts of numbers, with E for Fortran's D."""
+        content = self.lines[line].upper().replace("D", "E")
+        tokens = _RUN_TOGETHER.sub(" ", content).replace(",", " ").replace(";", " ").split()
+        if width and not all(re.fullmatch(NUMBER_PATTERN, token) for token in tokens):
+            return [content[at : at + width] for at in range(0, len(content.rstrip()), width)]
+        return tokens
+
+    def read_block(self, first: int, count: int, width: int | None = None) -> tuple[Array, int]:
+        """Read the number of values that a header states; return them and the next line."""
+        if count < 1:
+            raise self.error(f"the header states {count} samples")
+        numbers: list[float] = []
+        line = first
+        while len(numbers) < count and line < len(self.lines):
+            numbers.extend(self.parse_row(line, width))
+            line += 1
+        if len(numbers) != count:
+            short = len(numbers) < count
+            remedy = "the file is cut short" if short else "samples or the header are damaged"
+            raise self.error(
+                f"the header states {count} samples, the file holds "
+                f"{len(numbers) if short else 'more'}: {remedy}",
+                line - 1,
+            )
+        self._check_print(first, line, width)
+        return np.array(numbers), line
+
+    def _check_print(self, first: int, end: int, width: int | None) -> None:
+        """Refuse a number with other decimals than nearly all others of its block."""
+        tails = [
+            (len(token.partition(".")[2]), line)
+            for line in range(first, end)
+            for token in self._split_tokens(line, width)
+        ]
+        usual, times = Counter(length for length, _ in tails).most_common(1)[0]
+        # where 97 % of the numbers have equally many digits, the others are damaged
+        if 0.97 * len(tails) < times < len(tails):
+            line = next(line for length, line in tails if length != usual)
+            raise self.error("a number has not as many digits as the others: it is damaged", line)
+
+    def read_last_block(self, first: int, count: int) -> Array:
+        """Read the stated number of values at the end of the file (count,)."""
+        numbers, line = self.read_block(first, count)
+        for rest in range(line, len(self.lines)):
+            if self.lines[rest].strip():
+                raise self.error(f"more follows after the {count} samples of the header", rest)
+        self.check_end()
+        return numbers
+
+    def check_end(self) -> None:
+        """Refuse a file whose last number is truncated, compared with the previous ones."""
+        if self.ended:
+            return
+        last = range(max(len(self.lines) - 12, 0), len(self.lines))
+        tokens = [token for line in last for token in self._split_tokens(line, None)]
+        shapes = [re.sub(r"\d", "0", re.sub(r"[-+]", "+", token)) for token in tokens]
+        tails = [shape.partition(".")[2] for shape in shapes]
+        if len(set(tails[-6:-1])) == 1 and len(tails[-1]) < len(tails[-2]):
+            raise self.error(f"the last number {tokens[-1]!r} is cut off", len(self.lines) - 1)
+
+    def find(
+        self, pattern: str, start: int = 0, stop: int | None = None
+    ) -> tuple[int, re.Match[str]]:
+        """Return the index of the first line that contains a pattern, and the match."""
+        search = re.compile(pattern, re.IGNORECASE).search
+        for line, content in enumerate(self.lines[start:stop], start):
+            match = search(content)
+            if match:
+                return line, match
+        raise self.error(f"no line has {pattern!r}: the header is damaged")
+
+    def contains(self, pattern: str, stop: int, start: int = 0) -> bool:
+        """Return whether a line contains a pattern."""
+        search = re.compile(pattern, re.IGNORECASE).search
+        return any(search(line) for line in self.lines[start:stop])
+
+    def header_length(self) -> int:
+        """Count the lines before the first line of numbers."""
+        for line in range(len(self.lines)):
+            if self.is_numeric(line):
+                return line
+        raise self.error("no line of numbers: not an accelerogram")
+
+    def check_step(self, dt: float, line: int | None = None) -> float:
+        """Return a valid sampling interval [s]."""
+        if not 0.0 < dt <= 0.1:  # below 10 Hz no motion of a structure is recorded
+            raise self.error(
+                f"sampling interval {dt:g} s, expected more than 0 and up to 0.1 s", line
+            )
+        return dt
+
+    def check_peak(self, samples: Array, stated: float, tolerance: float = 0.02) -> None:
+        """Compare the samples with the peak that the header states, both in one unit."""
+        peak = np.abs(samples).max()
+        apart = abs(peak - abs(stated))
+        if not (isfinite(apart) and apart <= tolerance * max(peak, abs(stated))):
+            raise self.error(
+                f"the header states a peak of {abs(stated):g}, the samples reach {peak:g}: "
+                "one of them is damaged"
+            )
+
+
+def find_column_width(line: str) -> int | None:
+    """Return the column width of a Fortran format such as (8F10.3) in a line."""
+    match = re.search(r"\(\s*\d+[FE](\d+)\.\d+\s*\)", line, re.IGNORECASE)
+    return int(match[1]) if match else None
+
+
+_DOWN_PATTERN = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
+_VERTICAL_PATTERN = re.compile(
+    r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One component of a record."""
+
+    samples: Array  # accelerations (n,) [m/s²]; a vertical counts upwards
+    dt: float  # time between samples [s]
+    direction: str = ""  # what the file calls the component, e.g. `N-S`, `270`, `UP`
+    is_vertical: bool = False  # whether the component is the vertical one
+
+    @classmethod
+    def from_direction(cls, samples: Array, dt: float, direction: str) -> "Channel":
+        """Create a channel; a vertical component with positive downwards changes its sign."""
+        name = direction.strip()
+        if _DOWN_PATTERN.search(name):
+            return cls(-samples, dt, f"{name}, turned up", True)
+        return cls(samples, dt, name, bool(_VERTICAL_PATTERN.search(name)))
+
+
+# Longer units first: each match is removed before the search for the next.
+_UNIT_PATTERNS = (
+    (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
+    (r"cm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
+    (r"\bgals?\b", 1e-2),
+    (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
+    (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
+)
+_UNIT_NAMES = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
+
+
+def parse_unit(name: str) -> float:
+    """Return the value of a unit of acceleration by its name [m/s²]."""
+    key = str(name).lower().replace("²", "2").replace("^", "").replace(" ", "")
+    if key not in _UNIT_NAMES:
+        raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(_UNIT_NAMES)}")
+    return _UNIT_NAMES[key]
+
+
+def find_units(header: str) -> set[float]:
+    """Return the values of the units of acceleration in a header [m/s²]."""
+    units = set()
+    for pattern, unit in _UNIT_PATTERNS:
+        header, count = re.subn(pattern, " ", header, flags=re.IGNORECASE)
+        if count:
+            units.add(unit)
+    return units

@@ -1,0 +1,164 @@
+"""Response spectra: damped oscillators under a piecewise linear ground acceleration."""
+
+import numpy as np
+import scipy  # loads scipy.signal, which is slow, when it is first used
+from scipy import linalg
+
+from archfem._typing import Array
+from archfem._validation import check_number, check_type, check_unmasked, short_repr
+from archfem.errors import InvalidInput
+from archfem.motion.motion import Motion
+
+
+def find_peak_responses(
+    samples: Array, dt: float, periods: Array, damping: float
+) -> tuple[Array, Array]:
+    """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs.
+
+    u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample (Nigam and Jennings). The
+    record is interpolated to 40 samples a period, and the peak is that of a parabola through the
+    largest sample and its neighbours. The response after the end of the record is ignored.
+
+    References:
+        Nigam, Jennings, Calculation of response spectra from strong-motion earthquake records,
+        BSSA 59 (1969).
+    """
+    check_oscillators(periods, damping)
+    values, times = np.empty(len(periods)), np.empty(len(periods))
+    finer: dict[int, Array] = {1: samples}
+    for index, period in enumerate(periods):
+        if period <= 1e-9 * dt:  # such an oscillator has the acceleration of the ground
+            largest = int(np.argmax(np.abs(samples)))
+            values[index], times[index] = samples[largest], largest * dt
+            continue
+        # 40 samples a period; above 1000 parts of a step the oscillator follows the ground
+        parts = min(max(int(np.ceil(40 * dt / period - 1e-9)), 1), 1000)
+        if parts not in finer:
+            finer[parts] = interpolate_steps(samples, parts)
+        moved = oscillator_displacement(finer[parts], dt / parts, period, damping)
+        peak, at = _find_parabola_peak(moved)
+        values[index], times[index] = -((2.0 * np.pi / period) ** 2) * peak, at * dt / parts
+    return values, times
+
+
+def oscillator_displacement(samples: Array, dt: float, period: float, damping: float) -> Array:
+    """Return the relative displacement of one oscillator (n,) [m], exact for straight samples.
+
+    The step from (u, v) to the next is a matrix exponential; without v it is the recurrence
+    u₂ - tr A u₁ + det A u₀ = b₀ a₂ + b₁ a₁ + b₂ a₀, a digital filter.
+    """
+    omega = 2.0 * np.pi / period
+    # States u, v, and the input with its slope: a' = s, s' = 0.
+    rates = np.zeros((4, 4))
+    rates[0, 1], rates[2, 3] = 1.0, 1.0
+    rates[1, :3] = -(omega**2), -2.0 * damping * omega, -1.0
+    step = linalg.expm(rates * dt)
+    later = step[:2, 3] / dt
+    now = step[:2, 2] - later
+    numerator = np.array(
+        [
+            later[0],
+            now[0] - step[1, 1] * later[0] + step[0, 1] * later[1],
+            step[0, 1] * now[1] - step[1, 1] * now[0],
+        ]
+    )
+    trace = step[0, 0] + step[1, 1]
+    determinant = step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0]
+    # the oscillator is at rest at the first sample, at any acceleration there
+    rest = samples[0] * np.array([-numerator[0], now[0] - numerator[1]])
+    denominator = [1.0, -trace, determinant]
+    return scipy.signal.lfilter(numerator, denominator, samples, zi=rest)[0]
+
+
+def interpolate_steps(samples: Array, parts: int) -> Array:
+    """Divide every step into parts by linear interpolation."""
+    fine = np.arange((len(samples) - 1) * parts + 1) / parts
+    return np.interp(fine, np.arange(len(samples)), samples)
+
+
+def check_oscillators(periods: Array, damping: float) -> None:
+    """Refuse negative periods, and damping ratios outside 0 to 1."""
+    if not (np.all(np.isfinite(periods)) and np.all(np.asarray(periods) >= 0.0)):
+        raise InvalidInput("periods of a spectrum: expected finite values from 0 s upwards")
+    if not 0.0 <= check_number(damping, "damping ratio [-]") < 1.0:
+        raise InvalidInput(f"damping ratio {damping!r}: expected from 0 to below 1 (5 % is 0.05)")
+
+
+def _find_parabola_peak(row: Array) -> tuple[float, float]:
+    """Return the extreme value of a smooth row and its place, between the samples."""
+    top = int(np.argmax(np.abs(row)))
+    if top in (0, len(row) - 1):
+        return float(row[top]), float(top)
+    before, here, after = row[top - 1 : top + 2]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend else 0.0
+    return float(here - 0.25 * (before - after) * shift), top + float(shift)
+
+
+def response_spectrum(
+    motion: Motion,
+    periods: float | Array,
+    damping: float = 0.05,
+    *,
+    component: str = "horizontal",
+) -> Array:
+    """Return the pseudo-acceleration spectrum of one component: ω² times the largest displacement.
+
+    Solved exactly for an acceleration that runs straight between samples; the record is
+    interpolated until period / step >= 40, and peaks between the samples are found by a parabola.
+    The oscillators are followed to the end of the record.
+
+    Args:
+        motion: the ground motion.
+        periods: natural periods (n,) [s]; at zero the spectrum is the peak ground acceleration.
+        damping: ratio to the critical [-].
+        component: horizontal, vertical or transverse.
+
+    Returns:
+        Pseudo-accelerations in the shape of the periods [m/s²].
+
+    Raises:
+        InvalidInput: a negative period, a damping out of range, or a missing component.
+
+    References:
+        Nigam, Jennings, Calculation of response spectra from strong-motion earthquake records,
+        BSSA 59 (1969). Chopra, Dynamics of structures, section 6.6.
+
+    Example:
+        >>> motion = af.Motion.synthetic(duration=4.0, pga=3.0, seed=1)
+        >>> round(float(af.response_spectrum(motion, 0.0)), 6)
+        3.0
+    """
+    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    check_unmasked(periods, "periods [s]")
+    try:
+        natural = np.asarray(periods, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+    samples = motion.component(component)
+    peaks = find_peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
+    spectrum: Array = np.abs(peaks)
+    return spectrum.reshape(natural.shape)
+
+
+def scaled_to_spectrum(
+    motion: Motion, value: float, period: float, *, damping: float = 0.05
+) -> Motion:
+    """Return the motion scaled so that its horizontal spectrum has a value at a period.
+
+    Args:
+        motion: the motion; the one factor acts on all its components.
+        value: pseudo-acceleration to reach [m/s²].
+        period: natural period at which it is reached [s].
+        damping: ratio to the critical [-].
+
+    Raises:
+        InvalidInput: the motion is at rest, the value is not positive, or no oscillator has such a
+            period or damping.
+    """
+    now = float(response_spectrum(motion, period, damping))
+    if now == 0.0 or not value > 0.0:
+        raise InvalidInput(
+            f"scaling a spectral acceleration of {now:g} to {value:g} m/s²: both must be > 0"
+        )
+    return motion.scaled(value / now)

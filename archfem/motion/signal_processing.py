@@ -1,0 +1,177 @@
+"""Processing of one sampled acceleration: integration, filters, baseline, resampling, energy."""
+
+import numpy as np
+import scipy  # loads scipy.signal, which is slow, when it is first used
+from scipy import integrate
+
+from archfem._typing import Array
+from archfem._validation import check_unmasked, count_pieces, short_repr
+from archfem.errors import InvalidInput
+from archfem.units import STANDARD_GRAVITY
+
+# No record exceeds this acceleration [m/s²]: the unit must be wrong.
+MAX_PEAK_ACCELERATION = 5.0 * STANDARD_GRAVITY
+
+# Memory limit: a day at 100 Hz
+MAX_SAMPLES = 10_000_000
+
+
+def validate_samples(samples: Array | None, component: str) -> Array:
+    """Copy a component into a read-only array of finite numbers below 5 g."""
+    check_unmasked(samples, f"{component} acceleration")
+    try:
+        row = np.array(samples, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
+    if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
+        raise InvalidInput(
+            f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
+        )
+    peak = np.abs(row).max()
+    if peak > MAX_PEAK_ACCELERATION:
+        raise InvalidInput(
+            f"{component} acceleration reaches {peak / STANDARD_GRAVITY:.3g} g, more than 5 g: "
+            "that can only be a wrong unit (m/s² expected)"
+        )
+    row.setflags(write=False)
+    return row
+
+
+def integrate_velocity(samples: Array, dt: float) -> Array:
+    """Integrate a piecewise linear acceleration, from rest (n,) [m/s]."""
+    return integrate.cumulative_trapezoid(samples, dx=dt, initial=0.0)
+
+
+def integrate_displacement(samples: Array, dt: float) -> Array:
+    """Integrate a piecewise linear acceleration twice, from rest (n,) [m]."""
+    # exact in each step: d₁ = d₀ + v₀ Δt + (2 a₀ + a₁) Δt²/6
+    steps = (
+        integrate_velocity(samples, dt)[:-1] * dt + (2.0 * samples[:-1] + samples[1:]) * dt**2 / 6.0
+    )
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def correct_baseline(samples: Array, dt: float, degree: int = 6) -> Array:
+    """Correct the baseline of an acceleration: velocity and displacement end at zero.
+
+    The polynomial p(t) = c₂ t² + ... of least squares distance to the displacement, among those
+    that share its last value and slope, is subtracted as p'' from the acceleration. (Fitting the
+    displacement is PEER's way; the two conditions at the end are added.)
+
+    References:
+        Chiou, Darragh, Gregor, Silva, NGA project strong-motion database, Earthquake Spectra 24
+        (2008).
+    """
+    if degree < 3 or len(samples) <= degree:
+        raise InvalidInput(
+            f"base line of degree {degree} for {len(samples)} samples: the degree is at least 3 "
+            "and less than the number of samples"
+        )
+    powers = np.arange(2, degree + 1)
+    time = np.linspace(0.0, 1.0, len(samples))[:, None]
+    length = (len(samples) - 1) * dt
+    moved = integrate_displacement(samples, dt)
+    # p'' is integrated by the same rule as the samples: the end is zero to round-off
+    bends = powers * (powers - 1) * time ** (powers - 2) / length**2
+    shapes = np.column_stack([integrate_displacement(bend, dt) for bend in bends.T])
+    ends = np.array([[integrate_velocity(bend, dt)[-1] for bend in bends.T], shapes[-1]])
+    goal = np.array([integrate_velocity(samples, dt)[-1], moved[-1]])
+    # Equality constraints by null space: c = c_end + Z y.
+    least = np.linalg.lstsq(ends, goal, rcond=None)[0]
+    null = np.linalg.svd(ends)[2][2:].T
+    free = np.linalg.lstsq(shapes @ null, moved - shapes @ least, rcond=None)[0]
+    return samples - bends @ (least + null @ free)
+
+
+def filter_band(samples: Array, dt: float, low: float, high: float, *, order: int = 4) -> Array:
+    """Apply a zero-phase band-pass filter between two corner frequencies [Hz].
+
+    A Butterworth filter runs forwards and backwards over the record, which is padded at both ends
+    by 1.5 order/low seconds of zeros.
+
+    References:
+        Converse, Brady, BAP: basic strong-motion accelerogram processing, USGS OFR 92-296A (1992).
+    """
+    if not 0.0 < low < high < 0.5 / dt:
+        raise InvalidInput(
+            f"band from {low:g} to {high:g} Hz at a step of {dt:g} s: expected "
+            f"0 < low < high < {0.5 / dt:g} Hz"
+        )
+    if order < 1:
+        raise InvalidInput(f"filter of order {order!r}: expected 1 or more")
+    pad = int(np.ceil(1.5 * order / low / dt))
+    filter_ = scipy.signal.butter(order, (low, high), "bandpass", fs=1.0 / dt, output="sos")
+    return scipy.signal.sosfiltfilt(filter_, np.pad(samples, pad), padlen=0)[pad:-pad]
+
+
+def resample_peaks(samples: Array, dt: float, new_dt: float) -> Array:
+    """Resample by linear interpolation, without loss of peaks."""
+    # Each local extreme and both ends replace the nearest new sample, the largest where several
+    # meet: peaks have their values, and move by half a new step at most.
+    if not 0.0 < new_dt < np.inf:
+        raise InvalidInput(f"dt {new_dt!r} s: the time between samples is a positive number")
+    count_pieces((len(samples) - 1) * dt, new_dt, "samples of a motion", MAX_SAMPLES)
+    new_dt = float(new_dt)
+    count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
+    new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
+    rises = np.diff(samples) > 0.0
+    turned = np.concatenate(([True], rises[1:] != rises[:-1], [True]))[: len(samples)]
+    turns = np.flatnonzero(turned & (samples != 0.0))
+    turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
+    new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
+    return new
+
+
+def count_in_samples(times: float | Array, dt: float) -> Array:
+    """Convert times [s] to fractional sample numbers (m,) [-]."""
+    places: Array = np.asarray(times, dtype=float).ravel() / dt
+    if np.isnan(places).any():
+        raise InvalidInput(f"times = {short_repr(times)}: one is not a number; give seconds")
+    return places
+
+
+def interpolate_samples(samples: Array, places: Array) -> Array:
+    """Interpolate linearly at fractional sample numbers (m,), zero outside the record."""
+    # by index instead of a search, since every time step calls this
+    last = len(samples) - 1
+    lower = np.clip(np.floor(places), 0, max(last - 1, 0)).astype(int)
+    part = np.minimum(places - lower, 1.0)
+    values = (1.0 - part) * samples[lower] + part * samples[np.minimum(lower + 1, last)]
+    # the last instant, as a sum of time steps, may exceed the duration by round-off
+    return np.where((places >= 0.0) & (places <= last + 1e-6), values, 0.0)
+
+
+def rotate_components(level: Array, across: Array, angle: float) -> tuple[Array, Array]:
+    """Rotate two horizontal components by an angle [rad] from the first towards the second."""
+    count = max(len(level), len(across))
+    level, across = (np.pad(part, (0, count - len(part))) for part in (level, across))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return cosine * level + sine * across, cosine * across - sine * level
+
+
+def integrate_arias(samples: Array, dt: float) -> Array:
+    """Integrate the Arias intensity π/(2 g) ∫ a² dt over the record (n,) [m/s].
+
+    References:
+        Arias, A measure of earthquake intensity (1970).
+    """
+    energy: Array = integrate.cumulative_trapezoid(samples**2, dx=dt, initial=0.0)
+    return np.pi / (2.0 * STANDARD_GRAVITY) * energy
+
+
+def find_significant_window(
+    samples: Array, dt: float, low: float = 0.05, high: float = 0.95
+) -> tuple[float, float]:
+    """Return when Arias intensity passes two fractions of its end [s].
+
+    References:
+        Trifunac, Brady, A study on the duration of strong earthquake ground motion, BSSA 65 (1975).
+    """
+    growth = integrate_arias(samples, dt)
+    if growth[-1] == 0.0 or not 0.0 <= low < high <= 1.0:
+        raise InvalidInput(
+            f"significant duration from {low:g} to {high:g}: expected fractions from 0 to 1 in "
+            "order, and a motion that moves"
+        )
+    start, end = np.searchsorted(growth, np.array([low, high]) * growth[-1])
+    return float(start * dt), float(end * dt)

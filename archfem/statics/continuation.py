@@ -1,0 +1,360 @@
+"""Continuation of equilibria: a growing load, or a support that moves, step by step.
+
+A step of a growing load has one more unknown, the load factor λ, and one more equation,
+row·(q, λ) = target: control by force, by displacement or by arc length differ in the row alone.
+The bordered system is solved as a whole, so that its matrix stays regular where the tangent is
+singular. Loads may depend on the coordinates where blocks rotate far.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from archfem._typing import Array
+from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.masonry.loads import BodyForce, PointLoad, Settlement
+from archfem.models.model import Model
+from archfem.statics.equilibrium import Equilibrium, self_weight
+from archfem.statics.newton import MAX_ROUND_OFF_RESIDUAL, EquilibriumSolver, load_magnitude
+from archfem.statics.relaxation import (
+    MAX_IRREVERSIBLE_ITERATIONS,
+    has_irreversible_joints,
+    is_stationary,
+    linear_predictor,
+    solve_or_relax,
+)
+
+# Residual relative to the sum of all loads, and of the added equation relative to the step [-]
+RESIDUAL_TOLERANCE = 1e-9
+
+# First displacement, relative to the structure's size [-]
+FIRST_DISPLACEMENT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingLoad:
+    """Actions on a model that grow together."""
+
+    model: Model
+    actions: tuple[BodyForce | PointLoad, ...]
+    size: float  # sum of the magnitudes of the actions [N]
+    first: Array  # generalised forces before anything moves (n,)
+
+    @classmethod
+    def of(cls, model: Model, actions: Sequence[BodyForce | PointLoad]) -> "GrowingLoad":
+        """Return the growing load of some actions on a model."""
+        size = sum(_action_size(model, action) for action in actions)
+        if size == 0.0:
+            raise InvalidInput("the load is zero: give it a force or a multiple of g")
+        first = np.sum([model.load(action) for action in actions], axis=0)
+        return cls(model, tuple(actions), size, first)
+
+    def forces(self, q: Array) -> Array:
+        """Return the generalised forces (n,)."""
+        if not self.model.large_displacements:
+            return self.first
+        return np.sum([self.model.load(action, q) for action in self.actions], axis=0)
+
+    def rate(self, q: Array) -> sparse.csr_matrix | None:
+        """Return the derivative of `forces` (n, n); None where it does not depend on q."""
+        if not self.model.large_displacements:
+            return None
+        return sum(self.model.load_rate(action, q) for action in self.actions)
+
+    def displacement(self, q: Array) -> float:
+        """Return the displacement of the load along itself [m]."""
+        if self.model.large_displacements:
+            return sum(self.model.work(action, q) for action in self.actions) / self.size
+        return float(self.first @ q) / self.size
+
+
+def _action_size(model: Model, action: BodyForce | PointLoad) -> float:
+    """Return the magnitude of an action [N]."""
+    if isinstance(action, PointLoad):
+        return hypot(*action.force)
+    return model.structure.weight * hypot(action.horizontal, action.vertical)
+
+
+@dataclass(eq=False)
+class LoadPath:
+    """Equilibria under a growing load, in the order of its steps."""
+
+    model: Model  # with the joint memory of the last step
+    dead: Array  # generalised forces of the self-weight (n,)
+    load: GrowingLoad
+    unit: tuple[float, float]  # displacement and factor of the first step of an elastic structure
+    states: list[Array]  # coordinates at each step, the dead load's first (n,)
+    joint_forces: list[Array]  # N, V, M of every joint at each step (n_joints, 3) [N, N, N m]
+    factors: list[float]  # of the load at each step [-]
+    iterations: list[int]  # of Newton's method in each step
+    units = "1"  # of the factors
+    moving = "load"  # name of the moving object in messages
+
+    @classmethod
+    def of(
+        cls, model: Model, actions: Sequence[BodyForce | PointLoad], start: Equilibrium
+    ) -> "LoadPath":
+        """Begin at the dead load's equilibrium."""
+        load = GrowingLoad.of(model, actions)
+        live = load.forces(start.q)
+        displacement = FIRST_DISPLACEMENT * model.structure.size
+        compliance = float(live @ splu(model.tangent(start.q).tocsc()).solve(live)) / load.size
+        unit = (displacement, displacement / compliance)
+        resultants = [model.resultants(start.q)]
+        return cls(model, self_weight(model), load, unit, [start.q], resultants, [0.0], [0])
+
+    @property
+    def displacements(self) -> Array:
+        """Displacement of the load along itself, since the dead load (steps,) [m]."""
+        first = self.load.displacement(self.states[0])
+        return np.array([self.load.displacement(q) - first for q in self.states])
+
+    @property
+    def resultants(self) -> Array:
+        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
+        return np.array(self.joint_forces)
+
+    @property
+    def faces(self) -> Array:
+        """Gaps at mid-depth, rotations and slips of joints (steps, 3, n_joints) [m, rad, m]."""
+        observer = self.model.observer()
+        return observer.faces(np.array([observer.read(q) for q in self.states]))
+
+    def advance(self, border: Array, distance: float) -> bool:
+        """Add the equilibrium at a distance along a direction of displacement and factor (2,)."""
+        along, up = border / np.array(self.unit)
+        probe = self.load.forces(self.states[-1]) / self.load.size
+        row = np.append(along * probe, up)
+        x = np.append(self.states[-1], self.factors[-1])
+        target = float(row @ x) + distance
+        # Where several joints slide or turn under the same load the tangent is singular, although
+        # each step has an equilibrium: then a small part of the closed stiffness is mixed in.
+        return any(self._solve_step(row, target, distance, share) for share in (0.0, 1e-3))
+
+    def advance_normal(self, distance: float) -> bool:
+        """Add the equilibrium in the hyperplane normal to the last step, at a distance."""
+        # Unlike `advance` this follows a path on which the load itself moves back for a while, as
+        # when a hinge moves from one joint to the next. Lengths are mass-weighted means.
+        if len(self.states) < 2:
+            return self.advance(np.array([1.0, 1.0]) / np.sqrt(2.0), distance)
+        mass = self.model.structure.weight / self.model.structure.gravity
+        motion, increment = self.states[-1] - self.states[-2], self.factors[-1] - self.factors[-2]
+        weighted = np.append(
+            self.model.mass @ motion / (mass * self.unit[0] ** 2), increment / self.unit[1] ** 2
+        )
+        step = np.append(motion, increment)
+        length = np.sqrt(weighted @ step)
+        row = weighted / length
+        x = np.append(self.states[-1], self.factors[-1])
+        target = float(row @ x) + distance
+        return self._solve_step(row, target, distance, 0.0, x + distance / length * step)
+
+    def advance_by_relaxation(self, increment: float, farthest: float) -> bool:
+        """Add the relaxed equilibrium under a larger factor, unless the load moves too far."""
+        # Where many joints slide, full Newton steps fail although the structure bears more.
+        if self.model.large_displacements:  # relaxation is for small rotations
+            return False
+        q, factor = self.states[-1], self.factors[-1] + increment
+        load = self.dead + factor * self.load.forces(q)
+        try:
+            model, solution = solve_or_relax(EquilibriumSolver(len(q)), self.model, load, q)
+        except DidNotConverge:
+            return False
+        if self.load.displacement(solution.q) - self.load.displacement(self.states[0]) > farthest:
+            return False
+        self._add_state(model, np.append(solution.q, factor), solution.iterations)
+        return True
+
+    def _solve_step(
+        self,
+        row: Array,
+        target: float,
+        distance: float,
+        share: float,
+        guess: Array | None = None,
+    ) -> bool:
+        """Add the equilibrium with row·(q, λ) = target, once joint memory is stationary."""
+        x = np.append(self.states[-1], self.factors[-1]) if guess is None else guess
+        model, iterations = self.model, 0
+        for number in range(MAX_IRREVERSIBLE_ITERATIONS):
+            solution = self._iterate(model, x, (row, target, distance), share)
+            if solution is None:
+                return False
+            x, iterations = solution[0], iterations + solution[1]
+            if not has_irreversible_joints(model) or (
+                number > 0 and is_stationary(model, x[:-1], solution[1])
+            ):
+                self._add_state(model, x, iterations)
+                return True
+            model = model.with_memory(model.updated_memory(x[:-1]))
+        return False
+
+    def _iterate(
+        self, model: Model, x: Array, constraint: tuple[Array, float, float], share: float
+    ) -> tuple[Array, int] | None:
+        """Find (q, λ) in one (n + 1,), and the number of iterations, by Newton's method."""
+        row, target, distance = constraint
+        for iteration in range(30 if share == 0.0 else 60):
+            tangent, rate = model.tangent(x[:-1]), self.load.rate(x[:-1])
+            if rate is not None:
+                tangent = tangent - x[-1] * rate
+            live = self.load.forces(x[:-1])
+            residual = self.dead + x[-1] * live - model.force(x[:-1])
+            missing = target - row @ x
+            on_target = abs(missing) <= RESIDUAL_TOLERANCE * distance
+            if on_target and self._is_converged(residual, x, tangent):
+                return x, iteration
+            # `share` of the closed stiffness makes the tangent regular
+            if share > 0.0:
+                tangent = (1.0 - share) * tangent + share * model.closed_tangent()
+            step = _solve_bordered(tangent, live, row, np.append(residual, missing))
+            if step is None:
+                return None
+            x = x + step
+        return None
+
+    def _add_state(self, model: Model, x: Array, iterations: int) -> None:
+        """Add an equilibrium, (q, λ) in one (n + 1,), and update the joint memory."""
+        self.states.append(x[:-1])
+        self.joint_forces.append(model.resultants(x[:-1]))
+        self.model = model.with_memory(model.updated_memory(x[:-1]))
+        self.factors.append(float(x[-1]))
+        self.iterations.append(iterations)
+
+    def _is_converged(self, residual: Array, x: Array, tangent: sparse.csr_matrix) -> bool:
+        """Return whether forces are in balance, up to round-off of large motions."""
+        load = load_magnitude(self.dead) + abs(x[-1]) * load_magnitude(self.load.forces(x[:-1]))
+        size = load_magnitude(residual)
+        if size <= RESIDUAL_TOLERANCE * load or size > MAX_ROUND_OFF_RESIDUAL * load:
+            return bool(size <= RESIDUAL_TOLERANCE * load)
+        return bool(size <= 8.0 * np.finfo(float).eps * load_magnitude(abs(tangent) @ abs(x[:-1])))
+
+
+def _solve_bordered(
+    tangent: sparse.csr_matrix, load: Array, row: Array, right: Array
+) -> Array | None:
+    """Solve for steps of q and λ; None where their matrix is exactly singular."""
+    size = len(load)
+    try:
+        if size < 400:  # LAPACK is faster than SuperLU up to here
+            matrix = np.empty((size + 1, size + 1))
+            matrix[:size, :size] = tangent.toarray()
+            matrix[:size, size], matrix[size] = -load, row
+            return np.asarray(np.linalg.solve(matrix, right))
+        column = sparse.csr_matrix(-load[:, None])
+        bordered = sparse.vstack([sparse.hstack([tangent, column]), sparse.csr_matrix(row)], "csc")
+        return np.asarray(splu(bordered).solve(right))
+    except (RuntimeError, np.linalg.LinAlgError):  # from SuperLU, from LAPACK
+        return None
+
+
+@dataclass(eq=False)
+class SupportPath:
+    """Equilibria under the dead load over a moving support, as `LoadPath`."""
+
+    model: Model  # with the support motion and the joint memory of the last step
+    support_motion: Array  # before this support moves (n_blocks, 3) [m, m, rad]
+    motion: Array  # of all blocks, for a multiple of one (n_blocks, 3) [m, m, rad]
+    dead: Array  # generalised forces of the self-weight (n,)
+    corner_displacement: float  # of the support's fastest corner, for a multiple of one [m]
+    unit: tuple[float, float]  # displacement, and change of the factor, in the first step
+    multiples: list[float]  # of the motion at each step [-]
+    states: list[Array]  # coordinates at each step (n,)
+    joint_forces: list[Array]  # N, V, M of every joint at each step (n_joints, 3) [N, N, N m]
+    iterations: list[int]  # of Newton's method in each step
+    units = "N m"  # of the factors
+    moving = "support"  # name of the moving object in messages
+
+    @classmethod
+    def of(cls, model: Model, settlement: Settlement, start: Equilibrium) -> "SupportPath":
+        """Begin at the dead load's equilibrium."""
+        motion = settlement.added(model.structure, np.zeros_like(model.support_motion))
+        corner = RigidBlocks(model.structure).largest_displacement(motion)
+        if corner == 0.0:
+            raise InvalidInput(f"the settlement of '{settlement.block}' is zero: give it a motion")
+        return cls(
+            model,
+            model.support_motion,
+            motion,
+            self_weight(model),
+            corner,
+            unit=(FIRST_DISPLACEMENT * model.structure.size, np.inf),
+            multiples=[0.0],
+            states=[start.q],
+            joint_forces=[model.resultants(start.q)],
+            iterations=[0],
+        )
+
+    @property
+    def displacements(self) -> Array:
+        """Displacement of the support's fastest corner, since the dead load (steps,) [m]."""
+        return self.corner_displacement * np.array(self.multiples)
+
+    @property
+    def resultants(self) -> Array:
+        """N, V, M of every joint (steps, n_joints, 3) [N, N, N m]."""
+        return np.array(self.joint_forces)
+
+    @property
+    def faces(self) -> Array:
+        """Gaps at mid-depth, rotations and slips of joints (steps, 3, n_joints) [m, rad, m]."""
+        fixed = self._model_at(0.0).observer()
+        if self.model.large_displacements:
+            observers = [self._model_at(multiple).observer() for multiple in self.multiples]
+            readings = [
+                observer.read(q) for observer, q in zip(observers, self.states, strict=True)
+            ]
+            return fixed.faces(np.array(readings))
+        # readings are linear in coordinates and support motion
+        origin = np.zeros(self.model.size)
+        by_motion = self._model_at(1.0).observer().read(origin) - fixed.read(origin)
+        by_coordinates = np.array([fixed.read(q) for q in self.states])
+        return fixed.faces(by_coordinates + np.array(self.multiples)[:, None] * by_motion)
+
+    @property
+    def factors(self) -> Array:
+        """Work of the weights on a unit of the motion (steps,) [N m]."""
+        # F·o - V·s, with o and s the openings and slips that the motion alone would cause, and F
+        # the compressions at both ends of each joint
+        blocks = RigidBlocks(self.model.structure)
+        intrados, extrados, slip = blocks.gaps(self.motion)
+        normal, shear, moment = np.moveaxis(self.resultants, -1, 0)
+        middle, turn = 0.5 * (intrados + extrados), (extrados - intrados) / blocks.structure.depths
+        return normal @ middle + moment @ turn - shear @ slip
+
+    def advance(self, border: Array, distance: float) -> bool:
+        """Move the support on by a distance, and add the equilibrium there."""
+        multiple = self.multiples[-1] + distance * self.unit[0] / self.corner_displacement
+        model, solver = self._model_at(multiple), EquilibriumSolver(self.model.size)
+        try:
+            model, solution = solve_or_relax(solver, model, self.dead, self._predict(multiple))
+        except DidNotConverge:
+            return False
+        self.multiples.append(multiple)
+        self.states.append(solution.q)
+        self.model = model
+        self.joint_forces.append(model.resultants(solution.q))
+        self.iterations.append(solution.iterations)
+        if len(self.multiples) == 2:  # the first step gives the unit of the factor
+            before, after = self.factors
+            change = abs(float(after - before))
+            is_change = change > RESIDUAL_TOLERANCE * abs(before)
+            self.unit = (self.unit[0], change if is_change else np.inf)
+        return True
+
+    def _predict(self, multiple: float) -> Array:
+        """Return the coordinates extrapolated from the last step, an initial guess (n,)."""
+        last, increment = self.states[-1], multiple - self.multiples[-1]
+        if len(self.multiples) < 2:
+            return linear_predictor(self.model, last, increment * self.motion)
+        rate = (last - self.states[-2]) / (self.multiples[-1] - self.multiples[-2])
+        return last + increment * rate
+
+    def _model_at(self, multiple: float) -> Model:
+        """Return the model with its support moved by a multiple of the motion."""
+        return self.model.with_support_motion(self.support_motion + multiple * self.motion)

@@ -1,0 +1,174 @@
+"""Limit analysis and damping of case files, against the functions of Python."""
+
+import re
+
+import numpy as np
+import pytest
+from backfilled import arch_bridge
+
+import archfem as af
+from archfem.cases.analysis_keys import parse_limit
+from archfem.cases.run import expected_damping
+from archfem.dynamics.schemes import EffectiveDamping
+
+POINT = {"x": "1.4 m", "force": ["0 kN", "-1 kN"]}
+
+
+@pytest.mark.parametrize(
+    ("given", "live", "friction"),
+    [
+        ({"horizontal": 1.0}, [af.BodyForce(1.0)], "coulomb"),
+        ({"horizontal": 1.0, "vertical": 0.3}, [af.BodyForce(1.0, 0.3)], "coulomb"),
+        ({"point": POINT, "friction": "none"}, [af.PointLoad(1.4, (0.0, -1000.0))], None),
+        (
+            {"point": POINT, "horizontal": -0.1, "friction": "nonassociated"},
+            [af.BodyForce(-0.1), af.PointLoad(1.4, (0.0, -1000.0))],
+            "nonassociated",
+        ),
+    ],
+)
+def test_a_table_means_the_same_as_its_call(ring, given, live, friction):
+    found = parse_limit(given).solve(ring)
+    expected = af.collapse_factor(ring, live=live, friction=friction)
+    assert 0.0 < found.factor == expected.factor < np.inf
+    assert found.hinges == expected.hinges
+
+
+def test_a_fill_means_the_same_as_its_call():
+    structure = arch_bridge()
+    table = {
+        "friction_angle": "35 degree",
+        "cohesion": "2 kPa",
+        "mobilisation": 0.5,
+        "active": 0.8,
+        "dispersal": "uniform",
+        "spread": 26.6,
+    }
+    point = {"x": "3.2 m", "force": ["0 kN", "-1 kN"]}
+    found = parse_limit({"point": point, "fill": table}).solve(structure)
+    fill = af.limit.Fill(**table | {"friction_angle": 35.0, "cohesion": 2e3})
+    live = af.PointLoad(3.2, (0.0, -1e3))
+    assert found.factor == af.collapse_factor(structure, live=live, fill=fill).factor
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"horizontal": 1.0, "fill": {}}, "lacks its angle of friction"),
+        ({"horizontal": 1.0, "fill": {"angle": 35}}, "unknown key 'limit.fill.angle'"),
+        ({"horizontal": 1.0, "fill": {"friction_angle": "0.6 rad", "spread": 85}}, "not between"),
+        ({}, "limit has no load: give horizontal"),
+        ({"friction": "none"}, "limit has no load"),
+        ({"horizontl": 1.0}, "unknown key 'limit.horizontl': did you mean 'horizontal'"),
+        ({"horizontal": "1 kN"}, "limit.horizontal = '1 kN' is not in a unit like"),
+        ({"horizontal": 1.0, "friction": "some"}, "limit.friction = 'some' is not known"),
+        ({"point": 3}, "limit.point = 3 is not a table"),
+        ({"point": {"x": 1.4}}, "give a place and the two components of a force"),
+        ({"point": {"x": 1.4, "force": [1.0]}}, "two components of a force"),
+        ({"point": {**POINT, "y": 1}}, "unknown key 'limit.point.y'"),
+        ({"point": {**POINT, "force": ["0 m", "1 kN"]}}, "limit.point.force.0. = '0 m'"),
+        (3, "limit = 3 is not a table"),
+    ],
+)
+def test_limits_that_cannot_be_meant(given, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        parse_limit(given)
+
+
+def test_a_load_beside_the_structure_is_refused(ring):
+    with pytest.raises(af.InvalidInput, match=r"x = 9 m misses the structure"):
+        parse_limit({"point": {**POINT, "x": 9.0}}).solve(ring)
+
+
+SMALL_CASE = """
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0, 1.0, 1.0]
+
+[model]
+fidelity = "rigid"
+
+[analysis]
+damping = { ratio = 0.05, modes = "effective" }
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL_CASE, encoding="utf-8")
+    return path
+
+
+def test_a_case_takes_its_damping_from_the_modes(small):
+    case = af.Case.read(small)
+    assert case.damping == EffectiveDamping(0.05)
+    dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
+    damping, how = af.cases.damping_of(case, dead)
+    assert damping == af.dynamics.effective_damping(dead.model, 0.05, dead)
+    assert re.fullmatch(
+        r"damping: 5 % at \d+\.\d\d Hz, proportional to stiffness; mode 1, the first effective "
+        r"along x, has \d+\.\d % of the mass",
+        how,
+    )
+    # Before a model is chosen it comes from one of elastic blocks, lower by what these yield.
+    elastic = af.build(case.structure, fidelity="condensed")
+    expected = expected_damping(case)(elastic).frequency
+    assert expected == af.cases.damping_of(case, af.dead_load(elastic))[0].frequency
+    assert expected == pytest.approx(damping.frequency, rel=0.05)
+
+
+def test_rayleigh_damping_is_a_word_away(small):
+    case = af.Case.read(
+        small, ["analysis.damping.kind=rayleigh", "analysis.damping.mass_share=0.95"]
+    )
+    assert case.damping == EffectiveDamping(0.05, "rayleigh", mass_share=0.95)
+    dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
+    damping, how = af.cases.damping_of(case, dead)
+    assert damping == af.dynamics.effective_damping(
+        dead.model, 0.05, dead, kind="rayleigh", mass_share=0.95
+    )
+    assert re.match(r"damping: 5 % at \d+\.\d\d and \d+\.\d\d Hz; modes 1 and ", how)
+
+
+def test_damping_at_a_frequency(small):
+    case = af.Case.read(small, ['analysis.damping={ ratio = 0.05, frequency = "8 Hz" }'])
+    assert case.damping == af.StiffnessDamping(0.05, 8.0)
+    dead = af.dead_load(af.build(case.structure, fidelity="rigid"))
+    assert (
+        af.cases.damping_of(case, dead)[1] == "damping: 5 % at 8.00 Hz, proportional to stiffness"
+    )
+
+
+@pytest.mark.parametrize(
+    "damping",
+    [
+        '{ ratio = 0.05, modes = "all" }',
+        '{ ratio = 0.05, modes = "effective", frequencies = [1, 2] }',
+        "{ ratio = 0.05, frequencies = [1, 2], mass_share = 0.1 }",
+        '{ modes = "effective" }',
+        '{ ratio = 0.05, modes = "effective", mass_share = 0.9 }',
+        '{ ratio = 0.05, frequency = 8.0, kind = "rayleigh" }',
+    ],
+)
+def test_damping_that_cannot_be_meant(small, damping):
+    with pytest.raises(af.InvalidInput, match='or modes = "effective" for them'):
+        af.Case.read(small, [f"analysis.damping={damping}"])
+
+
+def test_share_of_a_case_is_checked_when_it_is_read(small):
+    with pytest.raises(af.InvalidInput, match=r"share 2\.0 of the mass"):
+        af.Case.read(small, ["analysis.damping.kind=rayleigh", "analysis.damping.mass_share=2.0"])
+    with pytest.raises(af.InvalidInput, match="damping kind = 'mass'"):
+        af.Case.read(small, ["analysis.damping.kind=mass"])
+
+
+@pytest.mark.slow
+def test_command(small, capsys):
+    out = small.parent / "out"
+    assert af.commands.main(["modes", str(small), "--out", str(out), "--count", "3"]) == 0
+    said = capsys.readouterr().out
+    assert (out / "modes.txt").read_text(encoding="utf-8") in said
+    assert "damping: 5 % at" in said
+    assert {path.name for path in out.iterdir()} == {"modes.txt", "modes.png", "modes.gif"}

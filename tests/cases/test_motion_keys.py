@@ -1,0 +1,133 @@
+"""Motions, suites and target spectra of case files."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.cases.motion_keys import build_motion, build_suite, parse_motion, parse_suite
+
+SHIPPED = Path(__file__).parents[2] / "meshes" / "ring_suite.toml"
+
+
+def pair(**keys):
+    return {"synthetic": {"seed": 1, "duration": 5.0}, **keys}
+
+
+def test_shipped_suite_is_six_horizontals_and_three_verticals():
+    case = af.Case.read(SHIPPED, ["suite.matched=false"])
+    suite = case.ground_suite()
+    assert len(suite.pairs) == 6
+    assert len({motion.horizontal.tobytes() for motion in suite.pairs}) == 6
+    assert len({motion.vertical.tobytes() for motion in suite.pairs}) == 3
+    assert suite.reduction == 3.0
+    assert case.target == af.Tbec2018(ss=1.140, s1=0.315, site="ZD")
+    assert suite.motions[0].name == "pair-1"
+    assert suite.motions[0].pga == pytest.approx(suite.pairs[0].pga / 3.0)
+
+
+def test_a_suite_is_matched_where_the_case_says_so():
+    target = {"code": "TBEC-2018", "ss": 1.140, "s1": 0.315, "site": "ZD"}
+    settings = {"matched": True, "target": target, "pairs": {"one": pair()}}
+    (match,) = build_suite(parse_suite(settings)).matches
+    # What the matching promises over its band, for each component.
+    assert max(match.misfit.values()) < 0.05
+    assert match.motion.name == "one"
+
+
+@pytest.mark.parametrize(
+    ("target", "expected"),
+    [
+        ({"code": "EC8", "ag": 0.25, "ground": "C"}, af.Eurocode8(0.25, "C")),
+        ({"code": "EC8", "ag": 0.25, "ground": "C", "type": 2}, af.Eurocode8(0.25, "C", 2)),
+        (
+            {"code": "table", "periods": ["0 s", "200 ms"], "values": [0.4, 1.0]},
+            af.motion.TableSpectrum([0.0, 0.2], [0.4, 1.0]),
+        ),
+    ],
+)
+def test_targets_are_those_of_the_codes(small, target, expected):
+    tables = tomllib.loads(small.read_text())
+    tables["suite"]["target"] = target
+    periods = np.linspace(0.0, 0.2, 9)
+    assert af.Case.of(tables).target.horizontal(periods) == pytest.approx(
+        expected.horizontal(periods)
+    )
+
+
+def test_samples_may_stand_in_the_case():
+    upright = {"samples": ["0.1 g", 0.0, -1.0], "dt": "10 ms"}
+    given = {"samples": [0.5, 1.0], "dt": 0.01, "vertical": upright, "scale": 2.0}
+    motion = build_motion(parse_motion(given))
+    assert motion.horizontal.tolist() == [1.0, 2.0]
+    assert motion.vertical.tolist() == [0.2 * 9.80665, 0.0, -2.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("suite.reductoin=3", "unknown key 'suite.reductoin': did you mean 'reduction'"),
+        ("suite.pairs={}", "suite.pairs is empty"),
+        ("suite.pairs.a/b={synthetic={seed=1}}", "'a/b' names a folder"),
+        ("suite.pairs.third={}", "suite.pairs.third needs either a file, or synthetic"),
+        ("suite.pairs.third={synthetic={sed=1}}", "unknown key 'suite.pairs.third.synthetic.sed'"),
+        ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
+        ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
+        ("suite.pairs.third={samples=[0.0, 1.0], synthetic={}}", "it has .'samples', 'synthetic'."),
+        ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
+        ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
+        ("suite.matched=true", "suite.matched = true needs a target"),
+        ("suite.target={code='UBC'}", "suite.target.code = 'UBC' is not known"),
+        ("suite.target={code='EC8', ag=0.2}", "suite.target of EC8: .*'ground'"),
+        ("suite.target={code='EC8', ag=0.2, ground='Z'}", "ground 'Z'"),
+        ("motion={synthetic={seed=1}}", "either one motion or a suite"),
+        ("suite.scale=0", "scale 0"),
+    ],
+)
+def test_refusals_name_the_key(small, change, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        af.Case.read(small, [change]).ground_suite()
+
+
+def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
+    level, upright = tmp_path / "level.AT2", tmp_path / "up.txt"
+    at2(level, [0.0, 0.1, -0.1, 0.0], 0.01)
+    upright.write_text("0 0\n0 49.05\n0 0\n")
+    given = {"file": "level.AT2", "vertical": {"file": "up.txt", "column": 2, "units": "gal"}}
+    given["vertical"]["dt"] = 0.005
+    settings = parse_suite({"pairs": {"one": {**given, "resample": "5 ms"}}})
+    (motion,) = build_suite(settings, tmp_path).motions
+    assert motion.dt == 0.005
+    assert motion.vertical == pytest.approx([0.0, 0.4905, 0.0])
+    assert motion.pga == pytest.approx(0.980665)
+    with pytest.raises(af.InvalidInput, match=r'suite\.pairs\.one\.resample = "0\.01 s"'):
+        build_suite(parse_suite({"pairs": {"one": given}}), tmp_path)
+
+
+def test_a_vertical_that_is_made_has_the_peak_that_is_asked_for():
+    """It used to be the vertical of a motion whose horizontal had that peak: two thirds of it."""
+    level = {"seed": 1, "pga": 1.0, "duration": 2.0}
+    upright = {"synthetic": {"seed": 2, "pga": 2.0, "duration": 2.0}}
+    asked = parse_motion({"synthetic": level, "vertical": upright})
+    made = build_motion(asked)
+    assert abs(made.vertical).max() == pytest.approx(2.0, rel=1e-12)
+    assert made.pga == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(af.InvalidInput, match="vertical_ratio: a vertical has none"):
+        parse_motion(
+            {"synthetic": level, "vertical": {"synthetic": {"seed": 2, "vertical_ratio": 0.5}}}
+        )
+
+
+@pytest.mark.parametrize(
+    ("target", "period", "value"),
+    [
+        ('{code="NTC-2018", ag=0.25, f0=2.5, tc_star="0.35 s", site="A"}', 0.2, 0.625),
+        ('{code="ASCE-7-22", sds=1.2, sd1=0.6, tl="8 s"}', 1.0, 0.6),
+        ('{code="EC8-2024", s_alpha=0.5, s_beta=0.15, f_alpha=1.2, f_beta=1.6}', 0.2, 0.6),
+    ],
+)
+def test_codes_by_name(small, target, period, value):
+    spectrum = af.Case.read(small, [f"suite.target={target}"]).target
+    assert spectrum.horizontal(period) == pytest.approx(value)

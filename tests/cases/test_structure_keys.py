@@ -1,0 +1,159 @@
+"""Structures, fills and construction stages of case files."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import archfem as af
+from archfem.cases.structure_keys import build_structure
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+BRIDGES = [
+    path
+    for path in sorted(RING.parent.glob("prusias*.toml"))
+    if path.stem not in ("prusias_retrofit", "prusias_sensitivity")  # studies of them
+]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("structure.width=0", "do not fit into a width of 0 m"),
+        ("structure.arches.main arch.spn=3", "structure.arches.main arch.spn': did you mean"),
+        ("structure.piers.gapp=3", "'structure.piers.gapp': did you mean 'gap'"),
+        ("structure.backfill.hmp=3", "'structure.backfill.hmp': did you mean 'hump'"),
+        ("structure.paving={thickness=0.2,lenght=1}", "structure.paving.lenght': did you mean"),
+        ("suite.pairs.pair-1.synthetic.sed=1", "'suite.pairs.pair-1.synthetic.sed': did you mean"),
+        ("suite.target.code=['EC8']", r"suite.target.code = \['EC8'\] is not known"),
+        ("analysis.damping.jonts='closed'", "'analysis.damping.jonts': did you mean"),
+    ],
+)
+def test_refusals_name_the_key_in_tables_of_a_bridge(change, says):
+    with pytest.raises((af.InvalidInput, af.InvalidStructure), match=says):
+        af.Case.read(RING.with_name("prusias.toml"), [change])
+
+
+@pytest.mark.parametrize("path", BRIDGES, ids=lambda p: p.stem)
+def test_shipped_bridges(path):
+    structure = af.Case.read(path).structure
+    parts = {block.part for block in structure.blocks}
+    assert {"north arch", "main arch", "south arch", "north pier", "south pier"} <= parts
+    assert ("paving" in parts) == (path.stem in ("prusias_paving", "prusias_restored"))
+    assert structure.joints[structure.joint_number("main arch, joint 5")].part == "main arch"
+
+
+def test_a_table_of_parts_says_what_holds_for_all_of_them():
+    case = af.Case.read(
+        RING.with_name("prusias.toml"),
+        ["structure.piers.height=2.8", "structure.piers.south pier.height=2.4"],
+    )
+    lowest = {
+        part: min(
+            y for block in case.structure.blocks if block.part == part for _, y in block.outline
+        )
+        for part in ("north pier", "south pier")
+    }
+    assert lowest["north pier"] - lowest["south pier"] == pytest.approx(-0.4)
+
+
+@pytest.mark.parametrize(
+    ("told", "blocks"),
+    [
+        ('shape="pointed_arch", span=4.0, rise="3 m", thickness=0.5, voussoirs=11', 13),
+        ('shape="elliptical_arch", span=4.0, rise=1.2, thickness=0.6, voussoirs=11', 13),
+        ('shape="flat_arch", span=2.0, thickness=0.5, voussoirs=7, skewback="20 deg"', 9),
+        ('shape="arch_along", intrados=[[0,0],[1,"1 m"],[2,0]], thickness=0.4, voussoirs=5', 7),
+        (
+            'shape="buttressed_arch", span=4.0, rise=1.2, thickness=0.5, voussoirs=11, '
+            "breadth=1.5, height=2.0, course=0.5",
+            21,
+        ),
+        (
+            'shape="arcade", spans=[4.0, 5.0], embraces=[170.0], thicknesses=[0.6], voussoirs=[9], '
+            "heights=[2.0, 3.0, 2.5], breadths=[1.6], course=1.0",
+            28,
+        ),
+    ],
+)
+def test_shapes_by_name(told, blocks):
+    assert len(build_structure(tomllib.loads(f"structure = {{ {told} }}")).blocks) == blocks
+
+
+BRIDGE = {
+    "structure": {
+        "shape": "bridge",
+        "arches": {"arch": {"span": 4.0, "rise": 1.6, "thickness": 0.45, "voussoirs": 9}},
+        "sidewalls": {
+            "length": 1.0,
+            "height": 0.8,
+            "above": 1.0,
+            "left wall": {},
+            "right wall": {},
+        },
+        "backfill": {"cover": 0.4},
+    },
+    "model": {"fidelity": "rigid", "cells": [1, 1]},
+}
+FILL = {
+    "law": "jointed",
+    "piece_size": "0.8 m",
+    "friction_angle": "35 degree",
+    "cohesion": "20 kPa",
+}
+
+
+def case(fill=None, **tables):
+    """A small bridge, with a fill and other tables."""
+    structure = BRIDGE["structure"] | ({} if fill is None else {"fill": fill})
+    return af.Case.of({**BRIDGE, "structure": structure, **tables})
+
+
+def test_a_fill_is_elastic_unless_it_is_to_be_in_pieces():
+    whole, same, cut = case(), case({"law": "elastic"}), case(FILL)
+    assert whole.structure == same.structure
+    pieces = [block for block in cut.structure.blocks if block.grain]
+    assert len(pieces) > 10
+    between = [joint for joint in cut.structure.joints if joint.contact.name == "fill"]
+    assert {joint.contact.cohesion for joint in between} == {20e3}
+    assert between[0].contact.friction == pytest.approx(0.7002, rel=1e-4)
+
+
+def test_a_case_is_built_in_stages():
+    built = case(FILL, dead_load={"stages": "usual", "layers": 2})
+    assert [stage.name for stage in built.stages] == [
+        "piers and walls", "rings", "centring struck", "fill, layer 1", "fill, layer 2",
+    ]  # fmt: skip
+    assert case().stages is None
+    assert af.cases.dead_load_of_case(built).model.initial_gaps is not None
+
+
+def test_stages_of_a_cases_own():
+    own = [
+        {"blocks": ["left wall", "right wall"]},
+        {"blocks": ["arch"], "centring": True},
+        {"name": "the fill", "blocks": ["backfill"]},
+        {"strike": True},
+    ]
+    stages = case(FILL, dead_load={"stage": own}).stages
+    assert [stage.name for stage in stages] == ["stage 0", "stage 1", "the fill", "stage 3"]
+    found = af.cases.dead_load_of_case(case(FILL, dead_load={"stage": own}))
+    assert found.joints["N"].values.min() >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("fill", "dead_load", "words"),
+    [
+        ({"law": "plastic"}, {}, "structure.fill.law = 'plastic'"),
+        ({"piece_size": 0.5}, {}, "need law = 'jointed'"),
+        ({"law": "jointed", "piece_size": 0.5}, {}, "friction_angle"),
+        (FILL, {"stages": "some"}, "dead_load.stages = 'some'"),
+        (FILL, {"layers": 2}, "needs stages = 'usual'"),
+        (FILL, {"stages": "usual", "stage": [{"blocks": ["arch"]}]}, "stages of its own"),
+        (FILL, {"stage": [{"blocks": ["arch"]}]}, "no stage places"),
+        (FILL, {"steps": 2}, "unknown key 'dead_load.steps'"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(fill, dead_load, words):
+    with pytest.raises(af.InvalidInput, match=words):
+        case(fill, dead_load=dead_load)

@@ -1,0 +1,148 @@
+"""Command line: arguments, exit codes, signals and full disks."""
+
+import os
+import resource
+import signal
+from pathlib import Path
+
+import pytest
+
+import archfem as af
+from archfem.commands.cli import exit_code
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+
+
+def test_an_output_that_is_no_folder_is_an_error_of_one_line(tmp_path, capsys):
+    (tmp_path / "out").write_text("a file")
+    given = ["run", str(RING), "--set", "model.fidelity=rigid", "--out", str(tmp_path / "out")]
+    assert af.commands.main(given) == 1
+    assert "out is a file, and results go into a folder: name another" in capsys.readouterr().err
+
+
+def test_check_command(capsys):
+    assert af.commands.main(["check", str(RING), "--set", "model.fidelity=rigid"]) == 0
+    assert "ready" in capsys.readouterr().out
+    assert af.commands.main(["check", str(RING), "--set", "structure.radus=3"]) == 1
+    assert "did you mean 'radius'" in capsys.readouterr().err
+
+
+def test_run_of_a_ring_that_falls(tmp_path, capsys):
+    given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 1
+    assert "no equilibrium" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (None, 0, ""),
+        (af.InvalidInput("no such key"), 1, "archfem: no such key"),
+        (OSError("disk full"), 1, "archfem: disk full"),
+        (KeyboardInterrupt(), 130, "archfem: interrupted"),
+    ],
+)
+def test_exit_codes_say_how_a_command_ended(error, code, says, capsys):
+    def command():
+        if error is not None:
+            raise error
+
+    assert exit_code(command) == code
+    assert capsys.readouterr().err.strip() == says
+    assert 130 == 130
+
+
+def test_words_that_are_no_command_end_with_two(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        af.commands.main(["rum", "ring.toml"])
+    assert "invalid choice: 'rum'" in capsys.readouterr().err
+
+
+def test_a_quoted_name_may_be_changed(capsys):
+    given = ["--set", 'contacts."stone to stone".friction=0.1', "--set", "model.fidelity=rigid"]
+    assert af.commands.main(["check", str(RING), *given]) == 1
+    assert "no equilibrium" in capsys.readouterr().err  # on so slippery joints
+
+
+def test_a_missing_record_is_told_before_anything_is_computed(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(
+        f'base = "{RING}"\nremove = ["motion"]\n[motion]\nfile = "missing.at2"\n'
+    )
+    for command in (["check"], ["run", "--out", str(tmp_path / "out")]):
+        assert af.commands.main([command[0], str(tmp_path / "case.toml"), *command[1:]]) == 1
+        out, error = capsys.readouterr()
+        assert "there is no record" in error
+        assert "dead load" not in out
+
+
+def test_a_refused_record_leaves_the_others(tmp_path, capsys):
+    (tmp_path / "bad.txt").write_text("words")
+    rows = "".join(f"{0.01 * (k % 5 - 2):.4f}\n" for k in range(200))
+    (tmp_path / "good.txt").write_text("# units g, dt 0.01\n" + rows)
+    files = [str(tmp_path / name) for name in ("bad.txt", "good.txt")]
+    assert af.commands.main(["motion", *files, "--out", str(tmp_path)]) == 1
+    out, error = capsys.readouterr()
+    assert "no line of numbers" in error
+    assert "1 of 2 files were refused" in error
+    assert "good" in out
+    assert {"bad.txt", "good.txt"} < {path.name for path in tmp_path.iterdir()}  # and its pictures
+
+
+COLUMN = """
+[structure]
+shape = "column"
+breadth = 1.0
+heights = [1.0]
+[model]
+fidelity = "rigid"
+[motion]
+synthetic = { seed = 1, duration = 3.0, pga = 1.0 }
+"""
+
+
+@pytest.fixture
+def column(tmp_path):
+    path = tmp_path / "column.toml"
+    path.write_text(COLUMN)
+    return path
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_motion_and_keeps_what_was_computed(
+    column, tmp_path, undrawn, monkeypatch, capsys, number, code
+):
+    def cut_short(case, motion, dead, damping):
+        def press(structure, resultants):
+            if len(seen) == 300:
+                os.kill(os.getpid(), number)
+            seen.append(resultants)
+
+        seen = []
+        return af.time_history(dead.model, motion, dt=0.005, start=dead, until=press)
+
+    monkeypatch.setattr("archfem.cases.run.run_time_history", cut_short)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored here
+    try:
+        assert af.commands.main(["run", str(column), "--out", str(tmp_path / "out")]) == code
+    finally:
+        signal.signal(signal.SIGINT, before)
+    run = af.History.read(tmp_path / "out" / "history.nc", af.Case.read(column).structure)
+    assert run.ending is af.dynamics.Ending.INTERRUPTED
+    assert 0.5 < run.time[-1] < 2.9
+    summary = (tmp_path / "out" / "summary.txt").read_text()
+    assert "outcome: interrupted at" in summary
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_an_error_in_words(column, tmp_path, undrawn, capsys):
+    """A file may not be longer than 20 kB: so it is with a full disk, and the error is alike."""
+    out = tmp_path / "out"
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        assert af.commands.main(["run", str(column), "--out", str(out)]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "history.nc could not be written, for the disk is full" in capsys.readouterr().err
+    assert not (out / "history.nc").exists()
+    assert not list(out.glob(".*.part*"))

@@ -1,0 +1,253 @@
+"""Commands on cases: printed results and written files."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.commands.run import print_results
+
+RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+
+
+def test_run_command(tmp_path, capsys):
+    changes = ["model.fidelity=rigid", "motion.end=2", "output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path / "out"), *given]) == 0
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert made == {
+        "case.toml",
+        "dead.png",
+        "names.png",
+        "modes.txt",
+        "modes.png",
+        "history.nc",
+        "summary.txt",
+        "critical_instant.png",
+        "envelope.png",
+        "joints.png",
+    }
+    run = af.History.read(tmp_path / "out" / "history.nc")
+    assert run.time[-1] == pytest.approx(2.0)
+    assert af.Case.of(tomllib.loads(run.dataset.attrs["case"])).model["fidelity"] == "rigid"
+    said = capsys.readouterr().out
+    assert "joint 17" in said
+    assert (tmp_path / "out" / "modes.txt").read_text(encoding="utf-8") in said
+    assert "damping: 5 % at 8.00 and 16.00 Hz" in said
+
+
+def test_a_rest_without_modes_is_shaken_all_the_same(tmp_path, undrawn, monkeypatch, capsys):
+    def none(model, count, about):
+        raise af.DidNotConverge("no modes")
+
+    monkeypatch.setattr("archfem.statics.modes.modes", none)
+    changes = ["model.fidelity=rigid", "motion.end=0.1", "output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 0
+    assert "no modes about dead load: no modes\ndamping: 5 %" in capsys.readouterr().out
+
+
+def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
+    """Four joints reach |e| = 0.38 at once, and never 0.46."""
+    changes = ["model.fidelity=rigid", "motion.end=4", "analysis.stop_at_mechanism=true"]
+    changes += ["output.animation=false"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert af.commands.main(["run", str(RING), "--out", str(tmp_path / "usual"), *given]) == 0
+    assert "by count: no mechanism, never 4 failed joints" in capsys.readouterr().out
+    loose = ["--set", "criteria.hinge=0.38"]
+    assert (
+        af.commands.main(["run", str(RING), "--out", str(tmp_path / "loose"), *given, *loose]) == 0
+    )
+    run = af.History.read(tmp_path / "loose" / "history.nc")
+    assert run.criteria == af.Criteria(hinge=0.38)
+    assert run.ending is af.dynamics.Ending.EVENT
+    assert run.mechanism.time == run.time[-1]
+    assert (
+        f"by count: local mechanism of arch at {run.mechanism.time:.3f}" in capsys.readouterr().out
+    )
+    assert af.Case.read(tmp_path / "loose" / "case.toml").criteria == run.criteria
+    assert af.Case.read(RING).criteria == af.Criteria()
+
+
+def test_mesh_command(tmp_path):
+    path = tmp_path / "ring.msh"
+    assert (
+        af.commands.main(["mesh", str(RING), "--out", str(path), "--set", "model.cells=[2, 2]"])
+        == 0
+    )
+    assert np.any(["voussoir 3" in line for line in path.read_text().splitlines()])
+
+
+def run(small, *changes):
+    given = [part for change in changes for part in ("--set", change)]
+    return af.commands.main(["run", str(small), "--out", str(small.parent / "out"), *given])
+
+
+def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undrawn, capsys):
+    out = small.parent / "out"
+    assert run(small) == 0
+    made = {path.name for path in out.iterdir()}
+    assert made >= {"first", "second", "spectra.png", "envelope.png", "suite.txt"}
+    assert {path.name for path in (out / "first").iterdir()} == {
+        "history.nc",
+        "summary.txt",
+        "motion.png",
+        "critical_instant.png",
+        "envelope.png",
+        "joints.png",
+    }
+    table = (out / "suite.txt").read_text()
+    assert re.search(r"^first +0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE)  # 1 m/s² by R = 2
+    assert re.search(
+        r"^second .* none( +-){4} +none +- +none( +-){3} +reached 1\.00 s$", table, re.MULTILINE
+    )
+    assert "finished before" not in capsys.readouterr().out
+
+    before = (out / "second" / "history.nc").stat().st_mtime_ns
+    (out / "first" / "history.nc").unlink()
+    assert run(small) == 0
+    said = capsys.readouterr().out
+    assert "second: finished before" in said
+    assert "first: finished before" not in said
+    assert (out / "second" / "history.nc").stat().st_mtime_ns == before
+    assert (out / "suite.txt").read_text() == table
+
+    assert run(small, "suite.scale=2") == 0
+    assert "finished before" not in capsys.readouterr().out
+    table = (out / "suite.txt").read_text()
+    assert re.search(r"^first +1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
+
+
+def told(small, shake):
+    """Carry out a case with something else than `shaken`, as `archfem run` does."""
+    case, out = af.Case.read(small), small.parent / "out"
+    print_results(case, af.cases.run_case(case, out, run_motion=shake), out)
+
+
+@pytest.mark.slow
+def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
+    def broken_off(case, motion, *given):
+        history = af.cases.run_time_history(case, motion, *given)
+        history.dataset.attrs["doubts"] = "energy drifts"
+        if motion.name == "second":
+            history.dataset.attrs["ended"] = "interrupted"
+        return history
+
+    with pytest.raises(KeyboardInterrupt):
+        told(small, broken_off)
+    assert "run the same command again" in capsys.readouterr().err
+    assert run(small) == 3  # what is kept keeps its doubts
+    summary = (small.parent / "out" / "first" / "summary.txt").read_text()
+    assert summary.startswith("in doubt: energy drifts\n")
+    table = (small.parent / "out" / "suite.txt").read_text()
+    assert "in doubt, as their summaries say: first\n" in table
+    said = capsys.readouterr().out
+    assert "first: finished before" in said
+    assert "second: finished before" not in said
+
+
+def test_a_pair_that_fails_does_not_end_the_suite(small, undrawn, capsys):
+    def failing(case, motion, *given):
+        history = af.cases.run_time_history(case, motion, *given)
+        if motion.name == "first":
+            history.dataset.attrs["ended"] = "failed"
+            raise af.DidNotConverge("no equilibrium", history=history)
+        return history
+
+    with pytest.raises(
+        af.DidNotConverge, match="1 of 2 pairs have no equilibrium at some step: first"
+    ):
+        told(small, failing)
+    path = small.parent / "out" / "first" / "history.nc"
+    said = capsys.readouterr().err
+    assert f"what was computed is kept in {path}" in said
+    assert "archfem: first: no equilibrium" in said
+    table = (small.parent / "out" / "suite.txt").read_text()
+    assert re.search(r"^first .* failed ", table, re.MULTILINE)
+    assert re.search(r"^second .* reached ", table, re.MULTILINE)
+    assert af.History.read(path).ending is af.dynamics.Ending.FAILED
+
+
+def test_a_motion_that_fails_is_kept_and_ends_the_command(small, capsys):
+    small.write_text(small.read_text().split("[suite]")[0] + "[motion]\nsynthetic = { seed = 1 }")
+
+    def failing(case, motion, *given):
+        history = af.cases.run_time_history(case, motion.cut(0.0, 0.5), *given)
+        raise af.DidNotConverge("no equilibrium at 0.5 s", history=history)
+
+    with pytest.raises(af.DidNotConverge, match=r"no equilibrium at 0.5 s"):
+        told(small, failing)
+    path = small.parent / "out" / "history.nc"
+    assert f"what was computed is kept in {path}" in capsys.readouterr().err
+    assert af.History.read(path).time[-1] == pytest.approx(0.5)
+    assert not path.with_name("summary.txt").exists()
+
+
+def test_check_tells_how_strong_the_pairs_are(small, capsys):
+    assert af.commands.main(["check", str(small)]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"first +horizontal .* 0\.0510 g", said)  # 1 m/s² by R = 2
+    assert "ready" in said
+
+
+def test_motion_command_measures_and_draws(tmp_path, capsys, at2):
+    for folder, peak in (("a", 0.2), ("b", 0.4)):
+        (tmp_path / folder).mkdir()
+        at2(tmp_path / folder / "x.AT2", [0.0, peak, -0.1, *np.zeros(50)], 0.01)
+    files = [str(tmp_path / folder / "x.AT2") for folder in "ab"]
+    assert af.commands.main(["motion", *files, "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"^x\.AT2 +only one +53 +0\.01 s +0\.2000 g", said, re.MULTILINE)
+    assert re.search(r"^x\.AT2 \(2\) +only one +53 +0\.01 s +0\.4000 g", said, re.MULTILINE)
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert made == {"x.AT2.png", "x.AT2 (2).png", "spectra.png"}
+
+
+def test_motion_command_reads_plain_columns(tmp_path, capsys):
+    path = tmp_path / "plain.txt"
+    path.write_text("0 0\n1 98.0665\n0 0\n0 0\n")
+    keywords = ["--column", "2", "--units", "cm/s2", "--dt", "0.02"]
+    assert af.commands.main(["motion", str(path), *keywords, "--out", str(tmp_path)]) == 0
+    assert re.search(r"only one +4 +0\.02 s +0\.1000 g", capsys.readouterr().out)
+    assert af.commands.main(["motion", str(path), "--out", str(tmp_path)]) == 1
+    assert "plain.txt" in capsys.readouterr().err
+
+
+LIMIT = """
+title = "a ring pushed over"
+[structure]
+shape = "circular_arch"
+radius = 2.95
+thickness = 0.55
+embrace = 159.0
+voussoirs = 17
+[model]
+fidelity = "rigid"
+[limit]
+horizontal = 1.0
+"""
+
+
+def test_limit_analysis_of_a_case(tmp_path, ring, capsys):
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    path.write_text(LIMIT)
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    found = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
+    assert f"at a factor of {found.factor:.4g} on the load" in said
+    assert all(f"joint {number} at the {side}" in said for number, side in found.hinges)
+    assert (out / "limit.txt").read_text() in said
+    assert (out / "collapse.png").is_file()
+    assert (out / "dead.png").is_file()
+    assert af.commands.main(["check", str(path)]) == 0
+    assert f"at a factor of {found.factor:.4g}" in capsys.readouterr().out
+
+
+def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):
+    options = ["--set", "limit.horizontal=1", "--out", str(tmp_path)]
+    assert af.commands.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1
+    assert "'backfill'] are softer than the joints around them" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]

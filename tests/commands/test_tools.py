@@ -1,0 +1,111 @@
+"""Commands animate, doctor and examples."""
+
+import sys
+from importlib import metadata
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem import _optional
+from archfem.commands import tools
+
+
+def test_what_is_there_has_its_version():
+    found = {each.item: each.state for each in tools.diagnose_installation()}
+    assert found["numpy"] == metadata.version("numpy")
+    assert found["archfem"].startswith(metadata.version("archfem"))
+    assert "compiled code" in found
+
+
+def test_all_is_well_ends_with_zero(monkeypatch, capsys):
+    monkeypatch.setattr(tools, "diagnose_installation", lambda: [tools.Diagnosis("archfem", "1.0")])
+    assert af.commands.main(["doctor"]) == 0
+    assert capsys.readouterr().out.split() == ["archfem", "1.0", "all", "is", "well"]
+
+
+def test_what_is_missing_is_told_with_its_remedy(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "archfem.models.fem", None)
+    monkeypatch.setattr(_optional, "OFFSCREEN_LIBRARIES", ("libNone.so",))
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(metadata, "requires", lambda name: ["numpy>=99.1", "nonesuch>=1", "a; b"])
+    assert af.commands.main(["doctor"]) == 1
+    told = capsys.readouterr()
+    for remedy in ("apt-get install python3-dolfinx", "apt-get install libegl1", "numpy>=99.1"):
+        assert remedy in told.out
+    assert "nonesuch" in told.err
+    assert "FEniCSx" in told.err
+
+
+def test_examples_are_listed_and_printed(tmp_path, capsys):
+    assert af.commands.main(["examples"]) == 0
+    assert "ring_falls" in capsys.readouterr().out
+    assert af.commands.main(["example", "ring_falls"]) == 0
+    told = capsys.readouterr()
+    assert 'ring.toml"\ntitle = "A ring that falls' in told.out
+    assert "it refers to ring.toml" in told.err
+    assert af.commands.main(["example", "ring", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "ring.toml").is_file()
+
+
+CASE = """
+title = "A $5 column"
+[structure]
+shape = "column"
+breadth = "0.4 m"
+heights = ["0.8 m", "0.8 m"]
+[model]
+fidelity = "rigid"
+"""
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A folder with the history of a short run of a column, and its case."""
+    folder = tmp_path_factory.mktemp("column")
+    (folder / "case.toml").write_text(CASE, encoding="utf-8")
+    case = af.Case.read(folder / "case.toml")
+    motion = af.Motion(2.0 * np.sin(np.linspace(0.0, 6.0, 41)), 0.005, name="swing")
+    model = af.build(case.structure, fidelity="rigid")
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=10))
+    run.save(folder / "pair" / "history.nc")
+    return folder
+
+
+def test_a_history_is_filmed_beside_its_case(kept, capsys):
+    film = kept / "film.gif"
+    given = ["--out", str(film), "--size", "480x320", "--window", "0.1,0.15", "--fps", "10"]
+    assert af.commands.main(["animate", str(kept / "pair" / "history.nc"), *given]) == 0
+    assert str(film) in capsys.readouterr().out
+    frames = imageio.mimread(film)
+    assert frames[0].shape[:2] == (320, 480)
+    assert len(frames) >= 2
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["pair/history.nc", "--window", "soon"], "--window soon: give 'auto', or two times"),
+        (["pair/history.nc", "--size", "big"], "--size big: give width and height"),
+        (["none.nc"], "there is no history file"),
+    ],
+)
+def test_what_cannot_be_meant_is_told(kept, capsys, given, said):
+    assert af.commands.main(["animate", str(kept / given[0]), *given[1:]]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_a_history_without_a_case_says_how_to_give_one(kept, tmp_path, capsys):
+    alone = tmp_path / "a" / "b" / "history.nc"
+    alone.parent.mkdir(parents=True)
+    alone.write_bytes((kept / "pair" / "history.nc").read_bytes())
+    assert af.commands.main(["animate", str(alone)]) == 1
+    assert "--case CASE.toml" in capsys.readouterr().err
+
+
+def test_a_case_gives_its_title_to_its_structure(kept):
+    assert af.Case.read(kept / "case.toml").structure.name == "A $5 column"
+    untitled = CASE.replace('title = "A $5 column"', "")
+    (kept / "untitled.toml").write_text(untitled, encoding="utf-8")
+    assert af.Case.read(kept / "untitled.toml").structure.name == "column"

@@ -1,0 +1,149 @@
+"""Masses, shapes, friction and convex pieces of blocks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from loose_blocks import G, floor
+
+import archfem as af
+from archfem.dynamics.rigid_body.bodies import (
+    check_cohesionless,
+    drop_straight_vertices,
+    make_bodies,
+    split_convex,
+)
+
+
+def test_mass_and_moment_of_a_box():
+    structure = replace(floor((0.0, 0.0, 0.5, 2.0)), width=3.0)
+    bodies = make_bodies(structure)
+    mass = 20e3 / G * 0.5 * 2.0 * 3.0
+    assert bodies.mass[1] == pytest.approx([mass, mass * (0.5**2 + 2.0**2) / 12.0], rel=1e-12)
+    assert bodies.inverse_mass[1] == pytest.approx(1.0 / bodies.mass[1], rel=1e-15)
+    assert not bodies.inverse_mass[[0, 2]].any()  # the floor, and the ground
+    assert bodies.reach[1] == pytest.approx(np.hypot(0.25, 1.0), rel=1e-12)
+
+
+def test_the_ground_is_where_the_fixed_blocks_end():
+    structure = floor((0.0, 0.0, 0.5, 2.0))
+    assert make_bodies(structure).level == -1.0
+    assert make_bodies(structure, level=-3.0).level == -3.0
+    with pytest.raises(af.errors.InvalidInput, match="above the foot of block 'block 1'"):
+        make_bodies(structure, level=0.1)
+
+
+def test_friction_is_that_of_the_joint_or_the_least():
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=150.0, voussoirs=3)
+    rough = replace(ring.joints[1].contact, friction=0.9)
+    joints = tuple(
+        replace(joint, contact=rough) if k == 1 else joint for k, joint in enumerate(ring.joints)
+    )
+    ring = replace(ring, joints=joints)
+    found = make_bodies(ring).friction
+    assert found[1, 2] == found[2, 1] == 0.9
+    assert found[0, 1] == found[1, 3] == found[2, -1] == 0.6
+    assert make_bodies(ring, friction=0.3).friction[1, 3] == 0.3
+
+
+def test_friction_must_be_known():
+    endless = af.circular_arch(
+        radius=3.0,
+        thickness=0.5,
+        embrace=150.0,
+        voussoirs=3,
+        contact=af.Contact(1e9, 1e9, None),
+    )
+    with pytest.raises(af.errors.InvalidInput, match="give friction"):
+        make_bodies(endless)
+    assert np.isfinite(make_bodies(endless, friction=0.5).friction).all()
+
+
+def test_a_sector_of_a_wide_angle_has_chords():
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=150.0, voussoirs=3)
+    bodies = make_bodies(ring)
+    assert np.bincount(bodies.owner).tolist() == [1, 4, 4, 4, 1]  # 50° in chords of 12.5°
+    cuts = ~bodies.outer
+    assert np.bincount(bodies.owner.repeat(np.diff(bodies.piece_starts)), cuts).tolist() == [
+        0,
+        6,
+        6,
+        6,
+        0,
+    ]
+
+
+def test_joints_with_cohesion_are_refused():
+    ring = af.circular_arch(
+        radius=3.0,
+        thickness=0.5,
+        embrace=150.0,
+        voussoirs=3,
+        contact=af.Contact(1e9, 1e9, 0.6, cohesion=1e4),
+    )
+    with pytest.raises(af.errors.InvalidInput, match=r"cohesion 1e\+04 Pa"):
+        check_cohesionless(ring)
+
+
+def test_a_soft_body_is_doubted(caplog):
+    soil = af.Material(6.25e6, 0.2, 18e3, name="soil")
+    structure = floor((0.0, 0.0, 2.0, 2.0))
+    blocks = (structure.blocks[0], replace(structure.blocks[1], material=soil))
+    check_cohesionless(replace(structure, blocks=blocks))
+    assert "'block 1' is soft" in caplog.text
+
+
+def covered(points, pieces):
+    """Area of the pieces, each convex."""
+    polygons = [shapely.Polygon(points[list(piece)]) for piece in pieces]
+    for polygon in polygons:
+        assert polygon.exterior.is_ccw
+        assert polygon.convex_hull.area == pytest.approx(polygon.area, rel=1e-12)
+    return sum(polygon.area for polygon in polygons), shapely.union_all(polygons).area
+
+
+def test_a_convex_outline_stays_whole():
+    assert split_convex(np.array([(0.0, 0.0), (2.0, 0.0), (3.0, 1.0), (0.0, 2.0)])) == [
+        (0, 1, 2, 3)
+    ]
+
+
+def test_an_angle_becomes_two_pieces():
+    points = np.array([(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)], dtype=float)
+    pieces = split_convex(points)
+    assert len(pieces) == 2
+    assert covered(points, pieces) == pytest.approx((5.0, 5.0), rel=1e-12)
+
+
+def test_a_voussoir_of_chords_is_cut_along_its_depth():
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=90.0, voussoirs=2, chords=4)
+    points = drop_straight_vertices(ring.blocks[1].points)
+    pieces = split_convex(points)
+    assert len(pieces) == 4
+    area = ring.blocks[1].area
+    assert covered(points, pieces) == pytest.approx((area, area), rel=1e-9)
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(st.lists(st.floats(0.2, 1.0), min_size=4, max_size=12))
+def test_any_star_is_covered_once(radii):
+    angles = 2.0 * np.pi * np.arange(len(radii)) / len(radii)
+    points = drop_straight_vertices(
+        np.array(radii)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    )
+    area = shapely.Polygon(points).area
+    assert covered(points, split_convex(points)) == pytest.approx((area, area), rel=1e-9)
+
+
+def test_vertices_on_a_straight_edge_are_left_out():
+    points = np.array([(0, 0), (1, 0), (2, 0), (2, 2), (1, 2), (0, 2), (0, 1)], dtype=float)
+    assert drop_straight_vertices(points).tolist() == [[0, 0], [2, 0], [2, 2], [0, 2]]
+
+
+def test_an_outline_that_crosses_itself_is_refused():
+    points = np.array([(0, 0), (3, 0), (0, 3), (3, 3)], dtype=float)
+    with pytest.raises(af.errors.InvalidStructure, match="crosses itself"):
+        split_convex(points)

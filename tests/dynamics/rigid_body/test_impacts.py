@@ -1,0 +1,109 @@
+"""Impact and friction of single blocks, against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from loose_blocks import KEPT, PULSE, TILT, G, floor, rocking_block, tilted, toppling_time
+
+import archfem as af
+from archfem.dynamics.rigid_body.bodies import LooseBlocks
+from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
+
+INCLINE = np.radians(20.0)
+
+
+def inclined(duration):
+    """A ground whose acceleration turns gravity by the angle of the incline."""
+    count = round(duration / 0.01) + 1
+    level = np.full(count, -G * np.sin(INCLINE))
+    return af.Motion(level, 0.01, np.full(count, G * (np.cos(INCLINE) - 1.0)))
+
+
+def test_a_block_slides_down_an_incline(verified):
+    """½ (sin α - μ cos α) g t²; the first step ends at its end's speed, ½ Δt late."""
+    structure = floor((-0.3, 0.0, 0.3, 0.3), friction=0.3)
+    end = RigidBlockSimulation(structure, dt=1e-3).final_frame(
+        LooseBlocks.as_built(structure), 1.0, inclined(1.0)
+    )
+    slid = 0.5 * G * (np.sin(INCLINE) - 0.3 * np.cos(INCLINE))
+    assert end.poses[1, 0] == pytest.approx(slid, rel=1e-6)
+    assert end.energy.lost == pytest.approx(
+        0.3 * np.cos(INCLINE) * structure.weight * slid, rel=1e-5
+    )
+    verified("block sliding down an incline for 1 s [m]", slid, "closed form", end.poses[1, 0])
+
+
+def test_a_block_sticks_to_an_incline():
+    structure = floor((-0.3, 0.0, 0.3, 0.3), friction=0.5)
+    end = RigidBlockSimulation(structure, dt=1e-3).final_frame(
+        LooseBlocks.as_built(structure), 10.0, inclined(10.0)
+    )
+    assert np.abs(end.poses).max() < 1e-9
+    assert end.time == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("restitution", "height"), [(0.5, 0.25), (0.9, 0.81)])
+def test_a_block_that_lands_flat_rebounds(restitution, height):
+    """e² of the height it fell from, late by up to a step's way at impact: 1 ms of 4.4 m/s."""
+    structure = floor((-0.5, 0.0, 0.5, 1.0))
+    start = LooseBlocks.as_built(structure)
+    start.poses[1, 1] = 1.0
+    falling = RigidBlockSimulation(structure, dt=1e-3, restitution=restitution)
+    frames = list(falling.frames(start, 0.45 + 2.0 * restitution * 0.45, spacing=1e-3))
+    after = [frame.poses[1, 1] for frame in frames if frame.time > 0.46]
+    assert max(after) == pytest.approx(height, abs=4.5e-3)
+    assert np.abs([frame.poses[1, 2] for frame in frames]).max() < 1e-4  # sweeps end at 1e-5
+
+
+def test_a_block_topples(verified):
+    """From rest at 0.02 rad beyond balance to 1 rad: 1.15800 s, by quadrature."""
+    structure = floor((-0.1, 0.0, 0.1, 1.0))
+    exact = toppling_time(0.2, 1.0, 0.02, 1.0)
+    assert exact == pytest.approx(1.15800, abs=1e-5)
+    turns = {}
+    for dt in (2e-3, 1e-3):
+        start = tilted(structure, np.arctan(0.2) + 0.02)
+        found = RigidBlockSimulation(structure, dt=dt).frames(start, 1.3, spacing=dt)
+        times, angles = np.array([(frame.time, -frame.poses[1, 2]) for frame in found]).T
+        turns[dt] = np.interp(1.0, angles[angles < 1.2], times[angles < 1.2])
+    assert turns[1e-3] == pytest.approx(exact, rel=2e-6)
+    verified("block toppling to 1 rad [s]", exact, "quadrature", turns[1e-3])
+    assert turns[2e-3] - exact == pytest.approx(4.0 * (turns[1e-3] - exact), rel=0.1)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3])
+def test_a_rocking_block_loses_what_housner_says(restitution, verified):
+    structure = rocking_block()
+    start = tilted(structure, 0.5 * TILT)
+    falling = RigidBlockSimulation(structure, dt=2e-4, restitution=restitution)
+    frames = falling.frames(start, 3.2, spacing=2e-4)
+    turn, speed = np.array([(frame.poses[1, 2], frame.velocities[1, 2]) for frame in frames]).T
+    tops = np.flatnonzero(speed[1:] * speed[:-1] < 0.0)
+    peaks = np.abs([0.5 * TILT, *turn[tops]])
+    peaks = peaks[peaks > 0.1 * TILT][:5]
+    rates = PULSE * np.sqrt(2.0 * (np.cos(TILT - peaks) - np.cos(TILT)))
+    assert len(rates) == 5
+    assert rates[1:] / rates[:-1] == pytest.approx(KEPT, abs=0.002)
+    case = f"rocking block, restitution {restitution:g}: speed kept by four impacts"
+    verified(case, KEPT, "Housner (1963)", rates[1:] / rates[:-1])
+
+
+def test_what_is_heavy_pushes_what_is_light_as_momentum_says():
+    """Two boxes on a floor without friction meet at 2 m/s: (1 + e) m₁ / (m₁ + m₂) of it."""
+    structure = floor((0.0, 0.0, 1.0, 1.0), (1.5, 0.0, 2.0, 1.0), friction=0.0)
+    start = LooseBlocks.as_built(structure)
+    start.velocities[1, 0] = 2.0
+    falling = RigidBlockSimulation(structure, restitution=0.5)
+    end = falling.final_frame(start, 0.4)
+    assert end.velocities[1:, 0] == pytest.approx([1.0, 2.0], rel=1e-6)
+    lost = 0.5 * 0.75 * (20e3 / G) / 3.0 * 2.0**2  # ½ (1 - e²) of the reduced mass
+    assert end.energy.lost == pytest.approx(lost, rel=1e-4)
+
+
+def test_gravity_is_that_of_the_structure():
+    structure = replace(floor((-0.5, 0.0, 0.5, 1.0)), gravity=1.62)
+    start = LooseBlocks.as_built(structure)
+    start.poses[1, 1] = 1.0
+    end = RigidBlockSimulation(structure).final_frame(start, 0.5)
+    assert end.poses[1, 1] == pytest.approx(1.0 - 0.5 * 1.62 * 0.25, rel=1e-12)

@@ -1,0 +1,76 @@
+"""Speed against error: what is tried and compared, by runs that are known."""
+
+from time import process_time
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics import accuracy
+from archfem.dynamics.accuracy import TimedRun, candidate_settings, compare_runs, reference_settings
+
+
+@pytest.fixture
+def settings(ring):
+    return [*reference_settings(ring), *list(candidate_settings(ring, ("rigid", "faces")))[:4]]
+
+
+def test_the_reference_is_the_finest_and_its_doubt_half_of_it(ring):
+    labels = [each.label for each in reference_settings(ring)]
+    assert labels == ["condensed 12×12 exact 1.25 ms", "condensed 6×6 exact 2.5 ms"]
+
+
+def test_each_scene_is_tried_once(ring):
+    """Three rungs, meshes and steps by four rules; rigid joints with exact facets have no mesh."""
+    labels = [each.label for each in candidate_settings(ring)]
+    assert len(labels) == len(set(labels)) == 3 * (3 * 3 * 4) - 2 * 3
+    assert labels[0] == "rigid 2×2 nodal 10 ms"
+    assert [each for each in labels if each.startswith("rigid 1×1")] == [
+        "rigid 1×1 exact 10 ms",
+        "rigid 1×1 exact 5 ms",
+        "rigid 1×1 exact 2.5 ms",
+    ]
+    assert labels[-1] == "condensed 8×8 exact 2.5 ms"
+
+
+def test_errors_are_the_largest_difference_to_the_reference(settings):
+    """The front has what none beats in both; of it the fastest within the tolerance is chosen."""
+    peaks = [[0.30, 0.2], [0.31, 0.2], [0.30, 0.25], [0.303, 0.2], None, [0.3, 0.202]]
+    seconds = [9.0, 5.0, 0.5, 2.0, 0.1, 3.0]
+    runs = [
+        TimedRun(7, each, None if peak is None else np.array(peak))
+        for each, peak in zip(seconds, peaks, strict=True)
+    ]
+    found = compare_runs(settings, runs, 10.0, 0.003)
+    assert found.reference_error == pytest.approx(0.01)
+    assert [each.error for each in found.trials] == pytest.approx([0.05, 0.003, np.inf, 0.002])
+    assert [each.seconds for each in found.front] == [0.1, 0.5, 2.0, 3.0]
+    assert found.choice.seconds == 3.0  # 0.303 - 0.3 rounds to more than the tolerance
+    assert compare_runs(settings, runs, 10.0, 0.0031).choice.seconds == 2.0
+    assert compare_runs(settings, runs, 10.0, 0.001).choice is None
+    fastest, second, *_ = found.table().splitlines()[-4:]
+    assert "failed" in fastest
+    assert "20" in second.split()
+    with pytest.raises(af.DidNotConverge, match=r"the reference, condensed 12×12 exact 1\.25 ms"):
+        compare_runs(settings, [TimedRun(7, 1.0, None), *runs[1:]], 10.0, 0.003)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_more_time_is_told_than_has_passed(stack, fails, monkeypatch):
+    model = af.build(stack, fidelity="rigid")
+    motion = af.Motion.synthetic(duration=1.0, pga=0.5, seed=1)
+    if fails:
+        true, calls = accuracy.time_history, []
+
+        def failing(*given, **more):
+            calls.append(given)
+            if len(calls) > 1:
+                raise af.DidNotConverge("made to fail")
+            return true(*given, **more)
+
+        monkeypatch.setattr(accuracy, "time_history", failing)
+    begun = process_time()
+    run = accuracy.time_run(model, motion, None, 0.005)
+    assert 0.0 <= run.seconds <= process_time() - begun
+    assert (run.peaks is None) is fails
+    assert run.size == 6

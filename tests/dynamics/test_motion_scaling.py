@@ -1,0 +1,271 @@
+"""Scale factors at first mechanism: closed form, whole runs, the search on made-up runs."""
+
+from functools import partial
+from math import inf
+
+import numpy as np
+import pytest
+from glued import glued
+
+import archfem as af
+from archfem.dynamics.motion_scaling import (
+    COLLAPSE_DEFINITION,
+    CollapseScale,
+    MechanismScales,
+    ScaledRun,
+    collapse_scale,
+    largest_allowed_scale,
+    mechanism_scales,
+    search_scales,
+)
+
+ROUND_OFF = 1.0 + 1e-9
+DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
+Ending = af.dynamics.Ending
+DEFINITIONS = af.dynamics.MECHANISM_DEFINITIONS
+
+
+@pytest.fixture(scope="module")
+def on_piers():
+    structure = af.arch_on_piers(
+        radius=3.0, thickness=0.6, voussoirs=15, pier_breadth=1.2, courses=[0.5] * 3
+    )
+    return af.build(structure, fidelity="rigid")
+
+
+def test_a_slow_push_hinges_a_block_as_statics_says():
+    """e = a h / (2 g b) reaches its limit; the pulse lasts 250 periods of the block."""
+    breadth, height, peak = 0.5, 1.0, 4.0
+    model = af.build(af.column(breadth=breadth, heights=[height]), fidelity="rigid")
+    pulse = 0.5 * peak * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 401)))
+    found = mechanism_scales(
+        model,
+        af.Motion(pulse, dt=0.02),
+        damping=af.Rayleigh(0.05, (10.0, 30.0)),
+        precision=0.01,
+        dt=0.01,
+    )
+    expected = af.Criteria().hinge * 2.0 * model.structure.gravity * breadth / height / peak
+    bracket = found["verified"]
+    assert bracket.lower / 1.01 < expected < 1.01 * bracket.upper  # the pulse is not quite static
+    assert bracket.ratio <= 1.01 * ROUND_OFF
+    assert found.definitions == ("verified",)
+    assert "has no such joints" in found.table()
+
+
+@pytest.mark.slow
+def test_bounds_are_those_of_whole_runs(on_piers):
+    """Each bound again, to the end of the motion, without the event that shortens runs."""
+    motion = af.Motion.synthetic(duration=2.0, pga=6.0, seed=2)
+    given = {"start": af.dead_load(on_piers), "damping": DAMPING, "dt": 0.005}
+    found = mechanism_scales(on_piers, motion, precision=0.2, **given)
+    assert found.definitions == DEFINITIONS
+    for scale in {
+        bound for name in DEFINITIONS for bound in (found[name].lower, found[name].upper)
+    }:
+        run = af.time_history(on_piers, motion.scaled(scale), **given)
+        met = af.first_mechanisms(run)
+        for name in DEFINITIONS:
+            if scale <= found[name].lower:
+                assert met[name] is None
+            elif scale == found[name].upper:
+                assert met[name] == found[name].run.mechanisms[name]
+    assert all(found[name].ratio <= 1.2 * ROUND_OFF for name in DEFINITIONS)
+    assert found["any four joints"].upper <= min(found[name].upper for name in DEFINITIONS[:3])
+
+
+def pretended(fails, ended=lambda scale: Ending.FINISHED):
+    """Runs that fail by a rule of the scale alone."""
+
+    def shaken(scale):
+        hit = af.limit.Mechanism("local", "arch", (0,), 1.0)
+        found = {name: hit if fails[name](scale) else None for name in DEFINITIONS}
+        return ScaledRun(scale, found, ended(scale), f"in words at {scale:.3g}")
+
+    return shaken
+
+
+def searched(fails, *, ended=lambda scale: Ending.FINISHED, precision=0.05, between=(0.05, 5.0)):
+    """Brackets of such runs."""
+    return search_scales(pretended(fails, ended), DEFINITIONS, precision, between)
+
+
+THRESHOLDS = dict(zip(DEFINITIONS, (0.21, 0.74, 0.75, 3.1), strict=True))
+
+
+def beyond(threshold):
+    return lambda scale: scale >= threshold
+
+
+def test_search_closes_in_on_every_threshold():
+    found = searched({name: beyond(each) for name, each in THRESHOLDS.items()}, precision=0.02)
+    for name, threshold in THRESHOLDS.items():
+        assert found[name].lower < threshold <= found[name].upper
+        assert found[name].ratio <= 1.02 * ROUND_OFF
+    assert len(found.runs) <= 10 + 5 * 4  # ladder, and ln(√2) / ln(1.02) halved to 1 for each
+
+
+@pytest.mark.slow
+def test_every_run_of_a_search_has_the_criteria(on_piers):
+    motion = af.Motion.synthetic(duration=2.0, pga=6.0, seed=2)
+    given = {"damping": DAMPING, "criteria": af.Criteria(hinge=0.4, failures=60), "dt": 0.005}
+    found = mechanism_scales(on_piers, motion, precision=1.0, **given)
+    assert found.definitions == ("verified",)  # there are no sixty joints
+    assert len(found.runs) > 1
+    for run in found.runs:
+        whole = af.time_history(on_piers, motion.scaled(run.scale), **given)
+        assert run.mechanisms["verified"] == af.first_mechanisms(whole)["verified"]
+    usual = af.first_mechanisms(whole, af.Criteria())["verified"]
+    assert run.mechanisms["verified"] != usual  # the criteria tell
+
+
+def test_what_fails_nowhere_or_everywhere_is_said():
+    always, never = (lambda _: True), (lambda _: False)
+    fails = dict(zip(DEFINITIONS, (always, never, never, beyond(2.0)), strict=True))
+    found = searched(fails, between=(0.1, 3.0))
+    assert (found["any four joints"].lower, found["any four joints"].upper) == (0.0, 0.1)
+    assert (found["four in a ring"].lower, found["four in a ring"].upper) == (3.0, inf)
+    assert found["verified"].upper == pytest.approx(2.0, rel=0.05)
+
+
+def test_no_motion_beyond_what_a_motion_may_be_is_tried():
+    """A block so broad that it hinges nowhere, and so rough that it slides nowhere."""
+    broad = af.build(glued(af.column(breadth=10.0, heights=[0.5])), fidelity="rigid")
+    strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
+    found = mechanism_scales(broad, strong, criteria=af.Criteria(hinge=0.5, friction=100.0))
+    assert found.runs[-1].scale == pytest.approx(5.0 * 9.80665 / 20.0)
+
+
+def test_survivals_above_a_failure_are_noted():
+    """A window that fails, below scales that survive: the smallest failure found counts."""
+    fails = {name: beyond(0.3) for name in DEFINITIONS}
+    fails["verified"] = lambda scale: 0.45 < scale < 0.6 or scale >= 2.0
+    found = searched(fails)
+    bracket = found["verified"]
+    assert 0.45 <= bracket.upper <= 0.45 * 1.05
+    assert 1.0 in bracket.above
+    assert "survives also" in found.table()
+    assert not found["any four joints"].above
+
+
+def test_a_run_without_equilibrium_counts_as_failed():
+    found = searched(
+        dict.fromkeys(DEFINITIONS, lambda _: False),
+        ended=lambda scale: Ending.FAILED if scale >= 1.3 else Ending.FINISHED,
+    )
+    for name in DEFINITIONS:
+        assert found[name].lower < 1.3 <= found[name].upper
+    words = f"in words at {found['verified'].upper:.3g}"
+    assert found.table().count(words) == len(DEFINITIONS)
+
+
+def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
+    """By Newmark's method, undamped, energy comes from nowhere before all joints fail at once."""
+    newmark = partial(af.time_history, scheme=af.dynamics.Newmark())
+    monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", newmark)
+    model = af.build(glued(ring), fidelity="rigid")
+    motion = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
+    ours = af.Criteria(hinge=0.5, failures=18, friction=10.0)
+    found = mechanism_scales(model, motion, criteria=ours, between=(1.0, 1.0), dt=0.005)
+    (run,) = found.runs
+    assert run.has_failed
+    assert run.outcome.startswith("failed at")
+    assert found["any four joints"].upper == 1.0
+
+
+def test_ctrl_c_keeps_what_is_known(caplog):
+    found = searched(
+        {name: beyond(2.5) for name in DEFINITIONS},
+        ended=lambda scale: Ending.INTERRUPTED if scale > 1.9 else Ending.FINISHED,
+    )
+    assert [run.scale for run in found.runs] == pytest.approx([1.0, 2.0**0.5, 2.0])
+    assert found.interrupted
+    assert "interrupted after 3 runs" in caplog.text
+    assert found["verified"].lower == pytest.approx(2.0**0.5)  # the broken-off run tells nothing
+    assert found["verified"].run is None
+
+
+def test_ctrl_c_between_runs_keeps_what_is_known():
+    made = pretended({name: beyond(2.5) for name in DEFINITIONS})
+
+    def shaken(scale):
+        if scale > 1.9:
+            raise KeyboardInterrupt
+        return made(scale)
+
+    found = search_scales(shaken, DEFINITIONS, 0.05, (0.05, 5.0))
+    assert found.interrupted
+    assert [run.scale for run in found.runs] == pytest.approx([1.0, 2.0**0.5])
+
+
+def test_hand_made_runs():
+    hit = af.limit.Mechanism("local", "arch", (1, 2, 3, 4), 1.5)
+    met = {scale: hit if scale in (2.0, 4.0) else None for scale in (1.0, 2.0, 3.0, 4.0)}
+    runs = [
+        ScaledRun(scale, {"verified": found}, Ending.FINISHED, "") for scale, found in met.items()
+    ]
+    found = MechanismScales(("verified",), tuple(runs))["verified"]
+    assert (found.lower, found.upper, found.above) == (1.0, 2.0, (3.0,))
+    assert found.run.mechanisms["verified"] is hit
+
+
+def test_refusals(on_piers, motion):
+    with pytest.raises(af.InvalidInput, match="precision 0 between"):
+        mechanism_scales(on_piers, motion, precision=0.0)
+    with pytest.raises(af.InvalidInput, match="the smaller first"):
+        mechanism_scales(on_piers, motion, between=(2.0, 1.0))
+
+
+def test_a_search_makes_forty_runs_at_most():
+    found = searched({name: beyond(0.7) for name in DEFINITIONS}, precision=1e-12)
+    assert len(found.runs) == 40
+    assert found["verified"].lower < 0.7 <= found["verified"].upper
+
+
+def fallen(*scales):
+    """Runs at some scales, those of a negative one fallen."""
+    made = (
+        af.dynamics.CollapseState("fallen" if s < 0 else "stands", {}, 0.1, None, True)
+        for s in scales
+    )
+    runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))
+    return MechanismScales((COLLAPSE_DEFINITION,), tuple(runs))
+
+
+def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
+    found = CollapseScale({0.01: fallen(1.0, -2.0, 3.0, -4.0), 0.005: fallen(0.5, 1.5, -2.5, 2.7)})
+    assert (found.lower, found.upper) == (1.0, 2.5)
+    assert found.above == (2.7, 3.0)
+    assert found.bracket(0.005).upper == 2.5
+    never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
+    assert (never.lower, never.upper, never.above) == (1.0, inf, ())
+
+
+@pytest.mark.parametrize(
+    ("between", "limits"),
+    [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
+)
+def test_collapse_is_not_sought_beyond_what_a_motion_may_be(between, limits, monkeypatch):
+    """Five g, of a motion of 20 m/s²; one scale where the least of those asked for is beyond."""
+    asked = []
+    monkeypatch.setattr(
+        "archfem.dynamics.motion_scaling.search_scales",
+        lambda shaken, what, precision, found: asked.append(found),
+    )
+    block = af.column(breadth=1.0, heights=[1.0])
+    model = af.build(block, fidelity="rigid", displacements="large")
+    strong = af.Motion(np.array([0.0, 20.0, 0.0]), dt=0.01)
+    collapse_scale(model, strong, between=between)
+    assert asked == [pytest.approx(limits)] * 2
+
+
+def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
+    """However weak they are; one that is none may be multiplied by anything."""
+    weak, strong = np.array([0.0, 0.01, -0.02]), np.array([0.0, 0.03, -0.05])
+    five_g = 5.0 * 9.80665
+    assert largest_allowed_scale(af.Motion(weak, 0.01)) == pytest.approx(five_g / 0.02)
+    for others in ({"vertical": strong}, {"transverse": strong}):
+        assert largest_allowed_scale(af.Motion(weak, 0.01, **others)) == pytest.approx(
+            five_g / 0.05
+        )
+    assert largest_allowed_scale(af.Motion(0.0 * weak, 0.01)) == inf

@@ -1,0 +1,130 @@
+"""Newton's method on the whole structure: its history, its tangent, and when it is selected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from glued import glued
+from scipy import sparse
+
+import archfem as af
+from archfem.dynamics.solvers.band_lu import (
+    band_of,
+    factorise_band,
+    half_width,
+    narrow_order,
+    solve_band,
+)
+from archfem.dynamics.solvers.integrator import Stepper
+from archfem.dynamics.solvers.newton import NewtonSolver
+from archfem.dynamics.solvers.selection import MAX_NEWTON_HALF_WIDTH, select_solver, stepper_for
+
+DT = 0.005
+
+MOTION = af.Motion.synthetic(duration=5.0, pga=6.0, seed=1)
+
+
+def sliding_ring(fidelity="rigid", friction=0.3, damping=None):
+    """Equation of motion of a ring whose joints slide, and its state at rest."""
+    bare = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
+    joints = [replace(j, contact=replace(j.contact, friction=friction)) for j in bare.joints]
+    model = af.build(replace(bare, joints=tuple(joints)), fidelity=fidelity, cells=(2, 2))
+    equation, dead = af.dynamics.Equation(model, MOTION, damping), af.dead_load(model)
+    return equation, equation.at_rest(dead.q, memory=dead.model.memory)
+
+
+def _steps(equation, start, widest):
+    """A hundred steps from a state, the tangent a band up to some half-width."""
+    return list(Stepper(equation, NewtonSolver(equation, widest)).batches(start, DT, 0.5))
+
+
+@pytest.mark.parametrize("damping", [None, af.StiffnessDamping(0.05, 8.0)])
+@pytest.mark.parametrize("widest", [40, 0], ids=["band", "sparse factor"])
+def test_it_gives_the_history_of_snes(damping, widest):
+    """And the same bits again, whether the tangent is a band or sparse."""
+    equation, start = sliding_ring(damping=damping)
+    runs = [_steps(equation, start, widest) for _ in range(2)]
+    assert not any(batch.fallback for batch in runs[0])
+    result, again = (np.concatenate([b.resultants for b in batches]) for batches in runs)
+    assert np.array_equal(result, again)
+    exact = af.dynamics.SnesSolver(equation).batches(start, DT, 0.5)
+    expected = np.concatenate([batch.resultants for batch in exact])
+    assert np.abs(result - expected).max() < 1e-7 * np.abs(result).max()
+    assert np.abs(runs[0][-1].state(len(runs[0][-1].times) - 1).memory).max() > 1e-4
+
+
+def test_a_chain_of_rigid_stones_has_a_band_of_two_stones():
+    equation, _ = sliding_ring()
+    assert NewtonSolver.of(equation).half_width == 5  # six coordinates, less one
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "scheme", "damping", "method"),
+    [
+        ("rigid", af.dynamics.Conserving(), "closed", "newton"),
+        ("rigid", af.dynamics.Newmark(), "none", "newton"),
+        ("full", af.dynamics.Conserving(), "closed", "compliance"),
+        ("monolithic", af.dynamics.Conserving(), "closed", "snes"),
+    ],
+)
+def test_the_width_of_the_band_selects(ring, fidelity, scheme, damping, method):
+    model = af.build(glued(ring), fidelity=fidelity, cells=(4, 4))
+    rayleigh = af.Rayleigh(0.05, (8.0, 16.0), damping)
+    equation = af.dynamics.Equation(model, MOTION, rayleigh, scheme)
+    assert stepper_for("auto", equation).name == method
+    if method != "snes":
+        narrow = NewtonSolver.of(equation).half_width <= MAX_NEWTON_HALF_WIDTH
+        assert narrow == (method == "newton")
+
+
+def test_large_displacements_select_it_whatever_the_width(ring):
+    model = af.build(ring, fidelity="faces", cells=(4, 4), displacements="large")
+    assert select_solver(af.dynamics.Equation(model, MOTION)).name == "newton"
+
+
+def test_supports_that_have_moved_are_refused_by_schemes_at_an_instant(ring):
+    model = af.build(glued(ring), fidelity="rigid")
+    moved = model.settled(af.Settlement(0, (0.0, -1e-3, 0.0)))
+    equation = af.dynamics.Equation(moved, MOTION, scheme=af.dynamics.Newmark())
+    for method in ("newton", "compliance"):
+        with pytest.raises(af.InvalidInput, match="supports have not moved"):
+            stepper_for(method, equation)
+        assert stepper_for(method, af.dynamics.Equation(moved, MOTION)).name == method
+
+
+def banded(rng, size, half):
+    """A random matrix of some half-width."""
+    places = np.arange(size)
+    matrix = rng.standard_normal((size, size))
+    matrix[np.abs(places[:, None] - places) > half] = 0.0
+    return matrix
+
+
+@pytest.mark.parametrize(("size", "half"), [(1, 0), (2, 1), (7, 3), (40, 5), (40, 12), (9, 8)])
+def test_a_band_is_solved_with_row_exchanges(size, half):
+    """Of matrices with any diagonal, also one of zeros."""
+    rng = np.random.default_rng(size + half)
+    for diagonal in (1.0, 1e-9, 0.0 if half else 1.0):
+        matrix = banded(rng, size, half)
+        matrix[np.arange(size), np.arange(size)] *= diagonal
+        band, right = band_of(sparse.csr_matrix(matrix), half), rng.standard_normal(size)
+        solution = right.copy()
+        assert factorise_band(band)
+        solve_band(band, solution)
+        error = np.abs(matrix @ solution - right).max()
+        assert error < 1e-10 * np.abs(matrix).max() * max(np.abs(solution).max(), 1.0)
+
+
+def test_a_singular_band_is_reported():
+    matrix = banded(np.random.default_rng(0), 12, 3)
+    matrix[:, 5] = 0.0
+    assert not factorise_band(band_of(sparse.csr_matrix(matrix), 3))
+
+
+def test_the_narrower_order_is_taken():
+    """Of a shuffled chain that of Cuthill and McKee, of an ordered one the given one at most."""
+    chain = sparse.diags([1.0, 1.0, 1.0], [-1, 0, 1], (30, 30)).tocsr()
+    shuffle = np.random.default_rng(2).permutation(30)
+    for matrix in (chain, chain[shuffle][:, shuffle]):
+        order, width = narrow_order(matrix.tocsr())
+        assert width == half_width(matrix[order][:, order]) == 1

@@ -1,0 +1,49 @@
+"""Is what was compiled beforehand what runs need?"""
+
+import numba.core.event as event
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.dynamics.warm_up import COMPILED_VARIANTS, compile_variant
+
+
+class Compilations(event.Listener):
+    """Counts what is compiled and not found on disk or in memory."""
+
+    def __init__(self):
+        self.count = 0
+
+    def on_start(self, _):
+        self.count += 1
+
+    def on_end(self, _):
+        pass
+
+
+@pytest.mark.parametrize("kind", [each for each in COMPILED_VARIANTS if "large" not in each])
+def test_a_run_finds_it_all(kind):
+    """Of another structure, on another rung, by another rule."""
+    compile_variant(kind)
+    method, scheme = kind.split(", ")
+    counting = Compilations()
+    contact = af.Contact(1e9, 4e8, friction=None if scheme == "Newmark" else 0.6)
+    model = af.build(
+        af.column(breadth=1.0, heights=[1.0, 1.0], contact=contact),
+        fidelity="faces",
+        quadrature="nodal",
+    )
+    with event.install_listener("numba:compile", counting):
+        af.time_history(
+            model,
+            af.Motion(np.full(9, 0.3), 0.01),
+            dt=0.01,
+            method=method,
+            scheme=getattr(af.dynamics, scheme)(),
+        )
+    assert counting.count == 0
+
+
+def test_a_kind_that_is_not_known_is_refused():
+    with pytest.raises(af.InvalidInput, match="method 'band' does not exist"):
+        compile_variant("band, Newmark")

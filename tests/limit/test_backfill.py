@@ -1,0 +1,274 @@
+"""Fill in limit analysis: strength, columns and fans of load, self-weight programme."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from backfilled import arch_bridge, column_above, fill_of, row_of_stones
+from scipy.integrate import quad
+
+import archfem as af
+from archfem.limit.backfill import (
+    EQUILIBRIUM_TOLERANCE,
+    Fill,
+    FillProfile,
+    is_balanced,
+    slice_blocks,
+)
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+
+ROUND_OFF = 1e-12
+
+
+def test_rankine_coefficients():
+    for angle, passive in ((0.0, 1.0), (30.0, 3.0), (45.0, 3.0 + 2.0 * 2.0**0.5)):
+        fill = Fill(friction_angle=angle, mobilisation=1.0)
+        least, most = fill.pressures(np.array([0.0, 1e3]))
+        np.testing.assert_allclose(most, [0.0, passive * 1e3], rtol=ROUND_OFF)
+        np.testing.assert_allclose(least, [0.0, 1e3 / passive], rtol=ROUND_OFF)
+
+
+def test_cohesion_adds_to_passive_and_takes_from_active_pressure():
+    """Mohr's circle that touches c + σ tan φ: σ_1 - σ_3 = (σ_1 + σ_3) sin φ + 2 c cos φ."""
+    angle, c, vertical = 32.0, 5e3, np.array([60e3, 90e3])
+    least, most = Fill(friction_angle=angle, cohesion=c, mobilisation=1.0).pressures(vertical)
+    sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+    for small, large in ((vertical, most), (least, vertical)):
+        touch = (large + small) * sine + 2.0 * c * cosine
+        np.testing.assert_allclose(large - small, touch, rtol=ROUND_OFF)
+    shallow, _ = Fill(friction_angle=angle, cohesion=c).pressures(np.array([1e3]))
+    assert shallow == 0.0  # a crack: soil does not pull
+
+
+def test_mobilisation_and_active_are_parts_and_active_is_the_floor():
+    sigma = np.array([1e4])
+    fill = Fill(friction_angle=30.0, mobilisation=0.5, active=0.5)
+    assert fill.pressures(sigma) == (pytest.approx(1e4 / 6.0), pytest.approx(1.5e4))
+    least, most = Fill(friction_angle=30.0, mobilisation=0.0).pressures(sigma)
+    assert least == most == pytest.approx(1e4 / 3.0)
+
+
+@pytest.mark.parametrize("dispersal", ["boussinesq", "uniform"])
+def test_all_of_a_load_is_between_the_edges_of_its_fan(dispersal):
+    fill = Fill(friction_angle=30.0, dispersal=dispersal, spread=40.0)
+    edge = np.tan(np.radians(40.0))
+    found = fill.share(np.array([-np.inf, -2.0 * edge, -edge, 0.0, edge, np.inf]))
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.0, 0.5, 1.0, 1.0], atol=ROUND_OFF)
+    slopes = np.linspace(-edge, edge, 50)
+    np.testing.assert_allclose(fill.share(slopes) + fill.share(-slopes), 1.0, rtol=ROUND_OFF)
+    assert (np.diff(fill.share(slopes)) > 0.0).all()
+
+
+def test_boussinesq_is_the_stress_under_a_line_load():
+    """σ_z = 2 P z³ / (π (x² + z²)²), integrated over a level at a depth of 1.7 m."""
+    fill, depth = Fill(friction_angle=30.0, spread=35.0), 1.7
+
+    def stress(x):
+        return 2.0 * depth**3 / (np.pi * (x * x + depth * depth) ** 2)
+
+    edge = depth * np.tan(np.radians(35.0))
+    whole = quad(stress, -edge, edge)[0]
+    for x in (-0.9, 0.1, 0.7):
+        part = quad(stress, -edge, x)[0] / whole
+        assert fill.share(np.array(x / depth)) == pytest.approx(part, rel=1e-9)  # of quadrature
+
+
+def test_a_uniform_fan_of_one_in_two():
+    fill = Fill(friction_angle=30.0, dispersal="uniform", spread=np.degrees(np.arctan(0.5)))
+    assert fill.share(np.array(0.25)) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"friction_angle": 0.6}, "give degrees"),
+        ({"friction_angle": 70.0}, "give degrees"),
+        ({"friction_angle": -1.0}, "below 0"),
+        ({"friction_angle": "35"}, "has no unit"),
+        ({"cohesion": 2e6}, "give Pa"),
+        ({"mobilisation": 1.5}, "a part of the pressure"),
+        ({"active": 3.0}, "a part of the pressure"),
+        ({"dispersal": "elastic"}, "is not known"),
+        ({"spread": 90.0}, "degrees from the vertical"),
+        ({"spread": 0.52}, "looks like radians: give 29.79 for 0.52 rad"),
+        ({"spread": 0.0}, "degrees from the vertical"),
+    ],
+)
+def test_a_fill_that_cannot_be_meant_is_refused(given, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        Fill(**{"friction_angle": 35.0, **given})
+
+
+AREA_ROUND_OFF = 1e-9
+FINE = 5e-3
+"""Of places within a fan: it is summed over pieces of 1/2000 of the structure."""
+
+
+def profile(structure):
+    stones = np.ones(len(structure.blocks), dtype=bool)
+    stones[list(find_yielding_blocks(structure))] = False
+    stones[[block.part == "paving" for block in structure.blocks]] = False
+    return FillProfile(structure, stones)
+
+
+@pytest.mark.parametrize("build", [arch_bridge, row_of_stones])
+def test_slices_cover_every_block(build):
+    structure = build()
+    cut = slice_blocks(structure)
+    for number, block in enumerate(structure.blocks):
+        own = cut.block == number
+        assert cut.area[own].sum() == pytest.approx(block.area, rel=AREA_ROUND_OFF)
+        x = (cut.area * cut.middle)[own].sum() / cut.area[own].sum()
+        assert x == pytest.approx(block.centroid[0], rel=AREA_ROUND_OFF, abs=AREA_ROUND_OFF)
+
+
+def test_every_stone_carries_the_column_above_it():
+    structure = arch_bridge(width=3.0)
+    carrier, foot, weight = profile(structure).columns()
+    for number, block in enumerate(structure.blocks):
+        if block.part != "arch":
+            continue
+        expected, x = column_above(structure, number)
+        own = carrier == number
+        assert weight[own].sum() == pytest.approx(expected, rel=1e-6)  # corners merged within 1e-6
+        assert (weight * foot[:, 0])[own].sum() / expected == pytest.approx(x, rel=1e-6)
+    whole = fill_of(structure)
+    assert weight.sum() == pytest.approx(3.0 * whole.area * whole.material.unit_weight, rel=1e-9)
+
+
+def test_nothing_of_an_eroded_fill_under_paving_is_lost_between_two_rings():
+    arches = [
+        af.shapes.Arch(span=4.7, embrace=157.0, thickness=0.5, voussoirs=14, name="west arch"),
+        af.shapes.Arch(span=5.8, embrace=159.0, thickness=0.6, voussoirs=17, name="east arch"),
+    ]
+    walls = [
+        af.shapes.Sidewall(length=2.8, height=2.0, above=above, name=f"{side} wall")
+        for side, above in (("west", 0.0), ("east", 0.8))
+    ]
+    structure = af.bridge(
+        arches=arches,
+        piers=[af.shapes.Pier(gap=1.0, height=2.0)],
+        sidewalls=walls,
+        backfill=af.shapes.Backfill(cover=0.5, erosion=0.4),
+        paving=af.shapes.Paving(thickness=0.2),
+        width=4.7,
+    )
+    found = profile(structure)
+    resting = [b for b, stone in zip(structure.blocks, found.stones, strict=True) if not stone]
+    weight = 4.7 * sum(block.area * block.material.unit_weight for block in resting)
+    carrier, _, weights = found.columns()
+    assert weights.sum() == pytest.approx(weight, rel=AREA_ROUND_OFF)
+    parts = {structure.blocks[number].part for number in carrier}
+    assert parts >= {"west arch", "east arch", "pier", "west wall", "east wall"}
+
+
+def test_paving_rests_on_what_is_under_the_fill():
+    bare, paved = (profile(row_of_stones(paving=paving)).columns() for paving in (0.0, 0.2))
+    each = 0.5 * 0.2 * af.STONE.unit_weight
+    for stone in range(1, 13):
+        added = paved[2][paved[0] == stone].sum() - bare[2][bare[0] == stone].sum()
+        assert added == pytest.approx(each, rel=AREA_ROUND_OFF)
+
+
+def test_overburden_is_unit_weight_times_depth():
+    found = profile(row_of_stones(cover=1.5, paving=0.2))
+    stress = 1.5 * af.masonry.BACKFILL.unit_weight + 0.2 * af.STONE.unit_weight
+    assert found.overburden(np.array([2.2, 0.5]), 1.0) == pytest.approx(stress, rel=1e-6)
+    assert found.overburden(np.array([2.2, 2.0]), 1.0) == pytest.approx(4e3, rel=1e-6)
+
+
+@pytest.mark.parametrize("dispersal", ["boussinesq", "uniform"])
+@pytest.mark.parametrize("x", [3.0, 2.83, 3.31])
+def test_a_fan_on_a_level_row(dispersal, x):
+    cover, fill = 1.2, af.limit.Fill(friction_angle=35.0, dispersal=dispersal, spread=45.0)
+    block, points, part = profile(row_of_stones(cover)).fan(np.array([x, 0.5 + cover]), fill)
+    assert part.sum() == pytest.approx(1.0, rel=AREA_ROUND_OFF)
+    assert part @ points[:, 0] == pytest.approx(x, abs=FINE * cover)
+    for stone in range(12):
+        ends = (np.array([0.5 * stone, 0.5 * (stone + 1)]) - x) / cover
+        expected = float(np.diff(fill.share(ends))[0])
+        assert part[block == stone + 1].sum() == pytest.approx(expected, abs=AREA_ROUND_OFF)
+
+
+def test_a_fan_on_an_arch_brings_all_of_the_load_straight_down():
+    """Radial stress brings the same to any face: of an arch, the part between rays to its corners.
+
+    The moment about the load vanishes only on a level face, so the part of each stone is compared.
+    """
+    structure, fill = arch_bridge(), af.limit.Fill(friction_angle=35.0)
+    top = max(block.points[:, 1].max() for block in structure.blocks)
+    x = 3.4
+    block, _, part = profile(structure).fan(np.array([x, top]), fill)
+    assert part.sum() == pytest.approx(1.0, rel=AREA_ROUND_OFF)
+    for number in np.unique(block):
+        edge = structure.blocks[number].points
+        back = edge[np.argsort(edge[:, 1] + 0.0 * edge[:, 0])[-2:]]
+        ends = np.sort((back[:, 0] - x) / (top - back[:, 1]))
+        expected = float(np.diff(fill.share(ends))[0])
+        assert part[block == number].sum() == pytest.approx(expected, abs=1e-6)
+
+
+def test_more_cover_spreads_a_load_wider():
+    fill = af.limit.Fill(friction_angle=35.0)
+    spread, peak = [], []
+    for cover in (0.3, 0.8, 1.5, 2.5):
+        block, points, part = profile(row_of_stones(cover)).fan(np.array([2.75, 0.5 + cover]), fill)
+        spread.append(part @ (points[:, 0] - 2.75) ** 2)
+        peak.append(max(part[block == stone].sum() for stone in set(block)))
+    assert (np.diff(spread) > 0.0).all()
+    assert (np.diff(peak) < 0.0).all()
+
+
+def test_a_stone_that_stands_up_shades_what_is_behind_it():
+    low = row_of_stones(1.0)
+    tall = [
+        af.Block(
+            tuple((x, 1.3 if y == 0.5 else y) for x, y in block.outline),
+            block.material,
+            block.name,
+            part=block.part,
+            role=block.role,
+        )
+        if block.name == "stone 7"
+        else block
+        for block in low.blocks
+        if block.name != "soil"
+    ]
+    right, left = ((4.0, 6.0), (0.0, 3.5))
+    soil = af.Block(
+        (
+            (left[0], 0.5),
+            (left[1], 0.5),
+            (left[1], 1.3),
+            (right[0], 1.3),
+            (right[0], 0.5),
+            (right[1], 0.5),
+            (right[1], 1.5),
+            (left[0], 1.5),
+        ),
+        af.masonry.BACKFILL,
+        "soil",
+        part="soil",
+        role="other",
+    )
+    structure = af.masonry.assembled([*tall, soil], af.masonry.SOIL_TO_STONE)
+    fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
+    block, _, part = profile(structure).fan(np.array([3.4, 1.5]), fill)
+    # Rays to the right reach the foot of stone 7 at slope 0.1, and its top's far end at 3.
+    assert part[block == 8].sum() == pytest.approx(0.5 - 0.05, rel=1e-6)
+    assert part[block > 8].sum() == 0.0
+    assert part.sum() == pytest.approx(1.0, rel=AREA_ROUND_OFF)
+
+
+def test_what_misses_the_structure_goes_into_the_ground():
+    fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread=45.0)
+    _, _, part = profile(row_of_stones(1.0)).fan(np.array([0.0, 1.5]), fill)
+    assert part.sum() == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("free", [1, 200])
+@pytest.mark.parametrize(("share", "stands"), [(0.98, True), (1.02, False)])
+def test_what_is_missing_may_be_the_rounding_of_as_many_blocks_as_move(free, share, stands):
+    dead = SimpleNamespace(blocks=SimpleNamespace(structure=SimpleNamespace(free=range(free))))
+    fall = SimpleNamespace(value=share * EQUILIBRIUM_TOLERANCE * free)
+    assert is_balanced(fall, dead) is stands

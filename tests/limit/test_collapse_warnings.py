@@ -1,0 +1,66 @@
+"""What a limit analysis warns of: on made-up joints, at the bounds from which it does."""
+
+import logging
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from archfem.limit import collapse
+
+
+@pytest.fixture
+def warned(caplog):
+    """What was logged so far, in one line."""
+    with caplog.at_level(logging.WARNING, "archfem"):
+        yield lambda: " ".join(caplog.messages)
+
+
+@pytest.mark.parametrize(
+    ("each", "said"), [((0.0, 0.0), ""), ((0.02, 0.0, 0.05), "up to 0.05,"), ((0.01,), "0.01,")]
+)
+def test_the_steepest_dilatancy_that_is_left_out_is_told(each, said, warned):
+    joints = [SimpleNamespace(contact=SimpleNamespace(dilatancy=value)) for value in each]
+    collapse.warn_dilatancy(SimpleNamespace(joints=joints))
+    assert said in warned()
+    assert bool(warned()) == bool(said)
+
+
+def test_joints_that_slide_are_told_with_their_factor(warned):
+    collapse.warn_sliding([], [], 0.3)
+    assert not warned()
+    collapse.warn_sliding([2, 5], ["a", "b"], 0.31416)
+    assert "joints [2, 5] (a, b) slide" in warned()
+    assert "factor 0.3142 is" in warned()
+
+
+@pytest.mark.parametrize(
+    ("shear", "friction", "failing", "count"),
+    [
+        (23.999, 0.5, {0, 1}, 0),  # c A of what is closed 4 N, and 0.5 of 40 N
+        (24.00002, 0.5, {0, 1}, 0),  # within a millionth of both parts of it
+        (24.001, 0.5, {0, 1}, 2),
+        (-24.001, 0.5, {0, 1}, 2),
+        (24.001, 0.5, {1}, 1),  # others hold
+        (24.001, np.inf, {0, 1}, 0),  # and never slide
+    ],
+)
+def test_joints_that_more_cohesion_holds_than_is_closed_are_told(
+    shear, friction, failing, count, warned, monkeypatch
+):
+    """Of 10 N of cohesion, 40 % is closed."""
+    monkeypatch.setattr(
+        collapse, "closed_fractions", lambda structure, normal, moment: np.full(2, 0.4)
+    )
+    structure = SimpleNamespace(
+        cohesion=np.full(2, 10.0),
+        friction=np.full(2, friction),
+        joints=[SimpleNamespace(name="bed 0"), SimpleNamespace(name="bed 1")],
+    )
+    forces = {"N": np.full(2, 40.0), "V": np.full(2, shear), "M": np.zeros(2)}
+    joints = {name: SimpleNamespace(values=values) for name, values in forces.items()}
+    collapse.warn_cohesion(structure, failing, joints, 0.31416)
+    assert bool(warned()) == bool(count)
+    if count:
+        assert warned().startswith(f"{count} joints such as 'bed {min(failing)}' fail partly open")
+        assert "factor 0.3142 is" in warned()

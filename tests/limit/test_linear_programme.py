@@ -1,0 +1,96 @@
+"""Rigid-block equilibrium as a linear programme: loads, gaps, balance and crushing cuts."""
+
+import numpy as np
+import pytest
+from kinematics import gaps
+from mechanisms import arch
+from scipy import sparse
+
+import archfem as af
+from archfem.limit.backfill import self_weight_programme
+from archfem.limit.linear_programme import RigidBlocks, rigid_load
+
+
+@pytest.fixture
+def motion():
+    """Of all blocks of the arch, supports included."""
+    return np.random.default_rng(3).standard_normal((19, 3))
+
+
+def test_gaps_are_those_of_the_points_at_the_joints(motion):
+    found = RigidBlocks(arch()).gaps(motion)
+    assert pytest.approx(gaps(arch(), motion), abs=1e-12) == found.T
+
+
+def test_forces_do_the_work_of_their_balance(motion):
+    """F and V on the gaps of a motion, against what they leave on the blocks."""
+    blocks = RigidBlocks(arch())
+    motion[[0, -1]] = 0.0
+    forces = np.random.default_rng(4).standard_normal(3 * 18)
+    intrados, extrados, slip = blocks.gaps(motion)
+    work = forces @ np.concatenate([-intrados, -extrados, slip])
+    left = blocks.balance @ forces
+    assert left @ (motion[1:-1].ravel() / blocks.coordinate_units) == pytest.approx(work)
+
+
+def test_loads_are_forces_at_centroids():
+    structure = arch()
+    weights = [b.area * b.material.unit_weight for b in structure.blocks[1:-1]]
+    push = af.PointLoad(0.0, (2e3, -1e3))
+    found = rigid_load(structure, [af.BodyForce(0.5, -1.0), push]).reshape(-1, 3)
+    block, point = push.place(structure)
+    x, y = point - structure.blocks[block].centroid
+    expected = np.outer(weights, [0.5, -1.0, 0.0])
+    expected[block - 1] += [2e3, -1e3, -1e3 * x - 2e3 * y]
+    assert found == pytest.approx(expected)
+
+
+SIDEWAYS = af.BodyForce(1.0)
+
+
+def ring(**changes):
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
+    return af.circular_arch(**(given | changes))
+
+
+def test_strength_moves_the_hinge_inside_the_joint():
+    """The base crushes over W / (σ w): the block tilts about the middle of that strip."""
+    block = af.column(breadth=0.6, heights=[2.4], width=0.5)
+    strip = block.weight / (0.5 * af.units.MPa * 0.5)
+    found = af.collapse_factor(block, live=SIDEWAYS, strength=0.5 * af.units.MPa)
+    assert found.factor == pytest.approx((0.6 - strip) / 2.4, rel=1e-6)  # cuts: 1e-7 of σ w h
+    assert found.hinges == ((0, "extrados"),)
+
+
+def test_strength_lowers_the_factor_steadily():
+    factors = [
+        af.collapse_factor(ring(), live=SIDEWAYS, strength=s * af.units.MPa).factor
+        for s in (0.3, 1, 10, 1e6)
+    ]
+    assert np.all(np.diff(factors) > 0.0)
+    assert factors[-1] == pytest.approx(af.collapse_factor(ring(), live=SIDEWAYS).factor, rel=1e-5)
+    assert (
+        af.collapse_factor(ring(), live=SIDEWAYS, strength=0.1 * af.units.MPa).outcome
+        == "infeasible"
+    )
+
+
+def test_strong_joints_respect_the_stress_block():
+    structure, strength = ring(), 0.5 * af.units.MPa
+    joints = af.collapse_factor(structure, live=SIDEWAYS, strength=strength).joints
+    most = joints["N"] * joints["depth"] / 2 - joints["N"] ** 2 / (2 * strength * structure.width)
+    crushing = strength * structure.width * joints["depth"]
+    assert float((abs(joints["M"]) - most).max()) < 1e-6 * float((crushing * joints["depth"]).max())
+
+
+def test_further_unknowns_keep_within_their_limit():
+    """Of a stay that holds a column back with up to T at its top, λ W h/2 = W b/2 + T h."""
+    block = af.column(breadth=0.6, heights=[2.4])
+    _, dead = self_weight_programme(block, "coulomb", None, None)
+    sideways = dead.with_load_factor(rigid_load(block, [SIDEWAYS]))
+    for limit in (0.0, 0.05, 0.1):
+        pull = rigid_load(block, [af.PointLoad(0.0, (-block.weight, 0.0))])
+        column = sparse.csr_matrix(-dead.blocks.dimensionless(pull)[:, None])
+        found = sideways.with_unknowns(column, np.zeros(1), limit).solve()
+        assert -found.value == pytest.approx(0.25 + 2.0 * limit, rel=1e-6)
+        assert found.unknowns[0] == pytest.approx(limit, abs=1e-9)

@@ -1,0 +1,267 @@
+"""Mechanisms by motion: verified programme, and the check of loops before it."""
+
+from dataclasses import replace
+
+import kinematics
+import numpy as np
+import pytest
+import xarray as xr
+from mechanisms import ALTERNATING, FOUR, WEIGHT, arch, beside, failing, filled, piers
+
+import archfem as af
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.mechanism_kinematics import (
+    LoopCheck,
+    first_verified_mechanism,
+    verified_mechanism,
+)
+
+
+def test_four_alternating_hinges_are_a_mechanism():
+    structure = arch()
+    found = verified_mechanism(structure, failing(structure, ALTERNATING))
+    assert (found.kind, found.moved.part, found.agrees) == ("local", "arch", True)
+    assert found.moved.blocks == tuple(range(1, 18))
+    assert found.moved.joints == (0, 6, 12, 17)
+    assert "agree" in str(found)
+
+
+def test_motion_turns_about_the_face_in_contact():
+    structure = arch()
+    found = verified_mechanism(structure, failing(structure, ALTERNATING))
+    jumps = kinematics.jumps(structure, found.motion)
+    for number, (joint, jump) in enumerate(zip(structure.joints, jumps, strict=True)):
+        opening = jump @ structure.normals[number]
+        assert jump @ joint.tangent == pytest.approx([0.0, 0.0], abs=1e-7)
+        contact = 0 if ALTERNATING.get(number, -0.5) < 0.0 else 1
+        assert opening[contact] == pytest.approx(0.0, abs=1e-7)
+        if number in ALTERNATING:
+            assert opening[1 - contact] > 1e-3
+        else:
+            assert opening[1 - contact] == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    "hinges",
+    [
+        {0: 0.5, 6: 0.5, 12: 0.5, 17: 0.5},
+        {0: -0.5, 6: -0.5, 12: 0.5, 17: 0.5},
+        {4: 0.5, 5: 0.5, 6: 0.5, 7: 0.5},
+    ],
+    ids=["one face", "in pairs", "neighbours"],
+)
+def test_four_hinges_in_the_wrong_places_are_counted_but_do_not_move(hinges):
+    structure = arch()
+    found = verified_mechanism(structure, failing(structure, hinges))
+    assert found.kind == "none"
+    assert found.counted.kind == "local"
+    assert not found.agrees
+    assert "disagree" in str(found)
+    assert found.moved.blocks == ()
+    assert not found.motion.any()
+
+
+def test_joints_of_a_motion_are_those_that_work_in_it():
+    """A fifth hinge, on the wrong face, fails and stays shut."""
+    structure = arch()
+    joints = failing(structure, ALTERNATING | {1: -0.5, 2: 0.5})
+    found = verified_mechanism(structure, joints)
+    assert found.counted.joints == (0, 1, 2, 6, 12, 17)
+    gaps = np.abs(kinematics.gaps(structure, found.motion)).max(axis=1)
+    assert found.moved.joints == tuple(np.flatnonzero(gaps > 1e-6))
+    assert set(found.moved.joints) < set(found.counted.joints)
+
+
+def test_three_hinges_do_not_move_and_are_not_counted():
+    structure = arch()
+    found = verified_mechanism(structure, failing(structure, {0: -0.5, 8: 0.5, 17: -0.5}))
+    assert (found.kind, found.counted, found.agrees) == ("none", None, True)
+
+
+def test_a_hinge_short_of_the_edge_counts_from_the_limit_on():
+    structure = arch()
+    hinges = {joint: 0.93 * e for joint, e in ALTERNATING.items()}  # |e| = 0.465
+    joints = failing(structure, hinges)
+    assert verified_mechanism(structure, joints).kind == "local"
+    assert verified_mechanism(structure, joints, limit=0.48).kind == "none"
+
+
+def test_a_sliding_block_moves_though_nobody_counts_it():
+    structure = af.column(breadth=0.6, heights=[1.0, 1.0])
+    found = verified_mechanism(structure, failing(structure, sliding={1: 0.61}))
+    assert (found.kind, found.moved.blocks, found.counted) == ("local", (2,), None)
+    slip = found.motion[2] - found.motion[1]
+    assert slip[0] == pytest.approx(1.0)  # toward the extrados, as V > 0 says: right
+    assert slip[1:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_a_block_that_came_apart_may_lift():
+    structure = af.column(breadth=0.6, heights=[1.0])
+    found = verified_mechanism(structure, failing(structure, apart=[0]))
+    assert found.motion[1, 1] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("courses", "kind", "part"),
+    [
+        (1, "local", "arch"),
+        (4, "semi-global", "arch + right pier"),
+        (12, "semi-global", "arch + right pier"),
+    ],
+)
+def test_taller_piers_join_the_mechanism(courses, kind, part):
+    """The mechanism of limit analysis, read back from its eccentricities alone."""
+    structure = piers(courses)
+    collapse = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None)
+    found = verified_mechanism(structure, collapse.joints)
+    assert (found.kind, found.moved.part) == (kind, part)
+    assert found.agrees
+    sharp = verified_mechanism(structure, collapse.joints, limit=0.4999)  # none but its own hinges
+    moving = [k for k, own in enumerate(collapse.motion) if np.abs(own).max() > 1e-6]
+    assert list(sharp.moved.blocks) == moving
+
+
+def test_piers_moving_both_are_global():
+    structure = piers(2)
+    bases = {0: 0.5, 19: 0.5}
+    crown = {9: 0.5, 10: 0.5}
+    haunches = {5: -0.5, 14: -0.5}
+    found = verified_mechanism(structure, failing(structure, bases | crown | haunches))
+    assert found.kind == "global"
+    assert found.moved.part == "left pier + arch + right pier"
+    assert found.counted.kind == "global"
+
+
+def history(structure, instants):
+    """Joints over time, one state a second, with an eccentricity for each joint given."""
+    steps = [failing(structure, hinges) for hinges in instants]
+    return xr.concat(steps, dim="time", coords="minimal", compat="override").assign_coords(
+        time=np.arange(len(instants), dtype=float)
+    )
+
+
+def test_first_motion_and_first_count_in_a_history():
+    structure = arch()
+    wrong = dict.fromkeys(ALTERNATING, 0.5)
+    joints = history(structure, [{}, {0: -0.5}, wrong, wrong, ALTERNATING, {}])
+    assert af.limit.counted_mechanism(joints).time == 2.0
+    found = first_verified_mechanism(structure, joints)
+    assert (found.moved.time, found.kind) == (4.0, "local")
+    assert found.counted.time == 4.0
+    assert first_verified_mechanism(structure, joints.isel(time=slice(0, 4))) is None
+
+
+def test_several_instants_or_other_joints_are_refused():
+    structure = arch()
+    with pytest.raises(af.InvalidInput, match="give one instant"):
+        verified_mechanism(structure, history(structure, [{}, {}]))
+    with pytest.raises(af.InvalidInput, match="18 joints of this structure"):
+        verified_mechanism(structure, failing(arch(5)))
+
+
+def test_a_motion_of_other_parts_alone_is_no_mechanism():
+    structure = beside("side wall")
+    wall = len(structure.joints) - 1
+    joints = failing(structure, {wall: 0.5})
+    found = verified_mechanism(structure, joints)
+    assert (found.kind, found.moved.part, found.agrees) == ("none", "", True)
+    assert found.moved.blocks == (len(structure.blocks) - 1,)
+    assert found.moved.joints == (wall,)
+    steps = joints.expand_dims(time=[0.0, 1.0])
+    assert first_verified_mechanism(structure, steps) is None
+    both = verified_mechanism(structure, failing(structure, FOUR | {wall: 0.5}))
+    assert (both.kind, both.moved.part) == ("semi-global", "arch + right pier")
+    assert both.moved.blocks[-1] == len(structure.blocks) - 1
+
+
+def test_the_same_pile_is_judged_where_it_is_a_pier():
+    structure = beside("pier 2")
+    found = verified_mechanism(structure, failing(structure, {len(structure.joints) - 1: 0.5}))
+    assert (found.kind, found.moved.part) == ("local", "pier 2")
+
+
+def random_state(structure, rng):
+    """A few joints that hinge, slide or come apart."""
+    resultants = np.zeros((len(structure.joints), 3))
+    resultants[:, 0] = WEIGHT
+    for joint in rng.choice(len(structure.joints), rng.integers(2, 9), replace=False):
+        what = rng.choice(5, p=[0.4, 0.4, 0.08, 0.08, 0.04])
+        arm = 0.5 * WEIGHT * structure.joints[joint].depth
+        resultants[joint] = [
+            (WEIGHT, 0.0, arm),
+            (WEIGHT, 0.0, -arm),
+            (WEIGHT, 0.7 * WEIGHT, 0.0),
+            (WEIGHT, -0.7 * WEIGHT, 0.0),
+            (0.0, 0.0, 0.0),
+        ][what]
+    return af.joints.joint_dataset(structure, resultants)
+
+
+@pytest.mark.parametrize("structure", [piers(chords=1), filled(), beside("side wall")], ids="abc")
+def test_loops_rule_out_only_what_the_programme_rules_out(structure):
+    """Two formulations: the cone of gaps that close every loop, and the programme in motions."""
+    verifier, rng = af.limit.Verifier(structure), np.random.default_rng(1)
+    agreed = {True: 0, False: 0}
+    for _ in range(60):
+        joints = random_state(structure, rng)
+        moves = verifier.verify(joints).kind != "none"
+        permitted = verifier.loop_check.permits_motion(verifier.freedoms(joints))
+        assert permitted or not moves
+        agreed[moves] += permitted == moves
+    assert agreed[True] > 10
+    assert agreed[False] > 10
+    assert sum(agreed.values()) >= 59  # hinges almost in a line are left to the programme
+
+
+def test_self_stresses_do_no_work_and_joints_in_no_loop_have_none():
+    """A column beside a ring, on the same ground: Gᵀ R = 0, three to the ring's one loop."""
+    ring = af.circular_arch(radius=2.0, thickness=0.5, embrace=120.0, voussoirs=3, chords=1)
+    column = af.column(breadth=1.0, heights=[1.0, 1.0])
+    first = len(ring.blocks)
+    away = np.array([10.0, 0.0])
+    blocks = tuple(
+        replace(block, outline=tuple(map(tuple, block.points + away)), name=f"far {block.name}")
+        for block in column.blocks
+    )
+    joints = tuple(
+        replace(
+            joint,
+            blocks=(joint.lower + first, joint.higher + first),
+            intrados=tuple(joint.intrados + away),
+            extrados=tuple(joint.extrados + away),
+            name=f"far {joint.name}",
+        )
+        for joint in column.joints
+    )
+    both = replace(ring, blocks=ring.blocks + blocks, joints=ring.joints + joints)
+    rigid = RigidBlocks(both)
+    stresses = LoopCheck(rigid, ("arch",)).stresses
+    assert stresses.shape == (3 * len(both.joints), 3)
+    assert rigid.kinematics.T @ stresses == pytest.approx(0.0, abs=1e-12)
+    in_column = np.tile(np.arange(len(both.joints)) >= len(ring.joints), 3)
+    assert not stresses[in_column].any()
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("wall", "moves"), [((1.0, 1.0), True), ((0.0, 0.0), False)])
+def test_a_block_on_ice_slides_away_from_a_wall(side, wall, moves):
+    """Its bed lets it slide either way, and a wall beside it open: it goes away from the wall."""
+
+    def box(x, y, name, fixed=False):
+        corners = ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))
+        return af.Block(corners, af.STONE, name, fixed, part="pier", role="pier")
+
+    beside = (1.0, 1.5) if side > 0.0 else (-1.5, -1.0)
+    blocks = (
+        box((-1.5, 1.5), (-0.5, 0.0), "ground", True),
+        box((-1.0, 1.0), (0.0, 1.0), "block"),
+        box(beside, (0.0, 1.0), "wall", True),
+    )
+    contact, x = af.masonry.STONE_TO_STONE, side * 1.0
+    joints = (
+        af.Joint((0, 1), (-1.0, 0.0), (1.0, 0.0), contact, "bed", "pier", "pier"),
+        af.Joint((1, 2), (x, 0.0), (x, 1.0), contact, "side", "pier", "pier"),
+    )
+    screen = LoopCheck(RigidBlocks(af.Structure(blocks, joints)), ("pier",))
+    freedoms = np.array([0.0, wall[0], 0.0, wall[1], 2.0, 0.0])  # openings at both ends, slips
+    assert screen.permits_motion(freedoms) is moves

@@ -1,0 +1,331 @@
+"""Sliding along a joint without opening it, in limit analysis."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from kinematics import gaps
+from scipy import sparse
+from scipy.optimize import Bounds, LinearConstraint, milp
+
+import archfem as af
+from archfem.limit.backfill import self_weight_programme
+from archfem.limit.collapse import Outcome
+from archfem.limit.linear_programme import RigidBlocks, rigid_load
+from archfem.limit.nonassociated import MAX_START_COUNT, descend, find_solution, starting_forces
+
+EXACT = 1e-7
+"""Relative: the programme is solved to 1e-9 block weights."""
+
+SIDEWAYS = af.BodyForce(1.0)
+
+LENGTH, HEIGHT = 0.4, 0.175
+"""Of a brick of the walls of Ferris and Tin-Loi [m]."""
+
+
+def ring(**changes):
+    given = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 17}
+    return af.circular_arch(**(given | changes))
+
+
+def rough(friction, cohesion=0.0):
+    return replace(af.masonry.STONE_TO_STONE, friction=friction, cohesion=cohesion)
+
+
+def glue(structure):
+    """Cohesion times area of each joint [N]."""
+    stress = np.array([joint.contact.cohesion for joint in structure.joints])
+    return stress * structure.depths * structure.width
+
+
+def wall(courses, friction=0.65, length=LENGTH, height=HEIGHT):
+    """Courses of bricks from the bottom, in brick lengths; an opening is a negative length."""
+    breadth = length * sum(map(abs, courses[0]))
+    ground = ((0.0, -height), (breadth, -height), (breadth, 0.0), (0.0, 0.0))
+    blocks = [af.Block(ground, af.STONE, "ground", fixed=True, part="ground")]
+    for row, course in enumerate(courses):
+        ends = length * np.cumsum([0.0, *map(abs, course)])
+        low, high = row * height, (row + 1) * height
+        for k, (left, right) in enumerate(pairwise(ends)):
+            if course[k] > 0.0:
+                outline = ((left, low), (right, low), (right, high), (left, high))
+                blocks.append(af.Block(outline, af.STONE, f"brick {row}.{k}", part="wall"))
+    return af.masonry.assembled(blocks, rough(friction))
+
+
+FOUR, FOUR_CUT = [1.0] * 4, [0.5, 1.0, 1.0, 1.0, 0.5]
+FIVE, FIVE_CUT = [1.0] * 5, [0.5, 1.0, 1.0, 1.0, 1.0, 0.5]
+ONE_HOLE, ONE_HOLE_CUT = [1.0, 0.5, -1.0, 0.5, 1.0], [0.5, 1.0, -1.0, 1.0, 0.5]
+TWO_HOLES = [1.0, -1.0, 1.0, -1.0, 1.0]
+TWO_HOLES_CUT = [0.5, 0.5, -1.0, 0.5, 0.5, -1.0, 0.5, 0.5]
+SOLID = [FIVE_CUT, FIVE, FIVE_CUT]
+WALLS = {
+    1: [FIVE_CUT, FIVE] * 3,
+    2: [FIVE_CUT, FIVE] * 5,
+    3: [FOUR, FOUR_CUT, FOUR, *[ONE_HOLE_CUT, ONE_HOLE] * 2, ONE_HOLE_CUT, FOUR, FOUR_CUT, FOUR],
+    4: [*SOLID, *[TWO_HOLES, TWO_HOLES_CUT] * 2, TWO_HOLES, *SOLID],
+}
+"""Bonds of the four walls of Ferris and Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224; μ = 0.65."""
+
+LEAST = {1: 0.63898, 2: 0.55742, 3: 0.35582, 4: 0.26374}
+"""Least factors found here, which `check` shows to be solutions. They are not from the paper."""
+
+
+def check(structure, live, found):
+    """Everything that a solution without dilatancy must fulfil, from the result alone."""
+    blocks = RigidBlocks(structure)
+    n, v, m = (found.joints[key].values for key in "NVM")
+    ends = np.stack([n / 2.0 - m / structure.depths, n / 2.0 + m / structure.depths])
+    forces = np.concatenate([*ends, v]) / blocks.force_unit
+    dead, push = (rigid_load(structure, [each]) for each in (af.BodyForce(0.0, -1.0), live))
+    load = blocks.dimensionless(dead + found.factor * push)
+    assert np.abs(blocks.balance @ forces - load).max() < EXACT * len(structure.free)
+    largest = n.max()
+    assert ends.min() > -EXACT * largest
+    resistance = glue(structure) + structure.friction * n
+    assert np.max(np.abs(v) - resistance) < EXACT * largest
+    opening_in, opening_out, slip = gaps(structure, found.motion).T
+    moved = max(np.abs(slip).max(), opening_in.max(), opening_out.max())
+    openings = np.stack([opening_in, opening_out])
+    assert openings.min() > -1e-6 * moved
+    assert np.max(openings[ends > 1e-6 * largest], initial=0.0) < 1e-6 * moved
+    left = resistance * np.abs(slip) - v * slip
+    assert left.max() < 1e-6 * largest * moved  # slides only against friction used up
+    known = found.solutions
+    assert known.bracket[0] <= found.factor * (1.0 + EXACT) + EXACT
+    assert known.between[0] == pytest.approx(found.factor)
+    assert known.between[1] <= known.bracket[1] * (1.0 + EXACT)
+    assert max(known.unbalanced, known.excess, known.opening, known.gap) < 1e-6
+
+
+def least_by_integers(structure, live, force=30.0, motion=30.0):
+    """Least factor by a mixed-integer programme: a second formulation, with a proof of its own.
+
+    Each end is open or pressed, each joint slides one way, the other, or not, with end forces up to
+    `force` block weights and gaps up to `motion` times what the live load moves on average.
+    """
+    blocks = RigidBlocks(structure)
+    dead, push = (
+        blocks.dimensionless(rigid_load(structure, [each]))
+        for each in (af.BodyForce(0.0, -1.0), live)
+    )
+    count, size = len(structure.joints), len(push)
+    motion = motion / np.abs(push).sum()
+    one, mu = sparse.identity(count), sparse.diags(structure.friction)
+    glued = glue(structure) / blocks.force_unit
+    most = 2.0 * (force * structure.friction + glued)
+    gap = blocks.balance.T.tocsr()
+    minus_in, minus_out, slip = gap[:count], gap[count : 2 * count], gap[2 * count :]
+    widths = (
+        [count] * 3 + [1, size] + [count] * 6
+    )  # F_i F_e V | λ | v | s+ s- | open, slide: 0 or 1
+    rows = [
+        ({0: blocks.balance[:, :count], 1: blocks.balance[:, count : 2 * count]}
+         | {2: blocks.balance[:, 2 * count :], 3: -push[:, None]}, dead, dead),
+        ({4: push[None, :]}, 1.0, 1.0),
+        ({4: slip, 5: -one, 6: one}, 0.0, 0.0),
+        *(({4: -g, b: -motion * one}, -np.inf, 0.0) for g, b in ((minus_in, 7), (minus_out, 8))),
+        *(({4: g}, -np.inf, 0.0) for g in (minus_in, minus_out)),
+        *(({f: one, b: force * one}, -np.inf, force) for f, b in ((0, 7), (1, 8))),
+        *(({s: one, b: -motion * one}, -np.inf, 0.0) for s, b in ((5, 9), (6, 10))),
+        *(({0: mu, 1: mu, 2: sign * one}, -glued, np.inf) for sign in (-1.0, 1.0)),
+        *(({0: mu, 1: mu, 2: sign * one, b: sparse.diags(most)}, -np.inf, most - glued)
+          for sign, b in ((-1.0, 9), (1.0, 10))),
+        ({9: one, 10: one}, -np.inf, 1.0),
+    ]  # fmt: skip
+    whole, lows, highs = [], [], []
+    for parts, low, high in rows:
+        tall = next(iter(parts.values())).shape[0]
+        line = [parts.get(k, np.zeros((tall, width))) for k, width in enumerate(widths)]
+        whole.append(sparse.hstack([sparse.csr_matrix(part) for part in line]))
+        lows.append(np.broadcast_to(low, tall))
+        highs.append(np.broadcast_to(high, tall))
+    low = [0.0] * 2 + [-force, 0.0, -np.inf, 0.0, 0.0] + [0.0] * 4
+    high = [force] * 3 + [np.inf, np.inf, motion, motion] + [1.0] * 4
+    cost = np.repeat([0.0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0], widths)
+    found = milp(
+        cost,
+        constraints=LinearConstraint(
+            sparse.vstack(whole), np.concatenate(lows), np.concatenate(highs)
+        ),
+        bounds=Bounds(np.repeat(low, widths), np.repeat(high, widths)),
+        integrality=np.repeat([0] * 7 + [1] * 4, widths),
+        options={"mip_rel_gap": 1e-6},
+    )
+    assert found.status == 0
+    return found.fun
+
+
+def test_a_push_on_the_crown_slides_a_ring_without_opening_it():
+    structure = af.circular_arch(
+        radius=3.0, thickness=0.6, embrace=120.0, voussoirs=15, contact=rough(0.5)
+    )
+    push = af.PointLoad(0.0, (-1e3, 0.0))
+    upper = af.collapse_factor(structure, live=push)
+    found = af.collapse_factor(structure, live=push, friction="nonassociated")
+    assert found.factor < 0.95 * upper.factor
+    assert found.sliding
+    check(structure, push, found)
+
+
+def test_sliding_without_dilatancy_changes_nothing_where_nothing_slides():
+    plain, without = (
+        af.collapse_factor(ring(), live=SIDEWAYS, friction=f).factor
+        for f in ("coulomb", "nonassociated")
+    )
+    assert without == pytest.approx(plain, rel=EXACT)
+
+
+@pytest.mark.parametrize("number", [pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3, 4)])
+def test_walls_of_ferris_and_tin_loi(number):
+    structure = wall(WALLS[number])
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    associated = af.collapse_factor(structure, live=SIDEWAYS).factor
+    check(structure, SIDEWAYS, found)
+    assert found.factor < associated == pytest.approx(found.solutions.bracket[1], rel=EXACT)
+    assert found.factor == pytest.approx(LEAST[number], rel=1e-4)
+
+
+HALVES = [[0.5, 0.5], [1.0]]
+
+
+@pytest.mark.parametrize(
+    ("structure", "drop"),
+    [
+        pytest.param(wall(HALVES * 2, 0.5), 0.01, marks=pytest.mark.slow),
+        pytest.param(wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0, marks=pytest.mark.slow),
+        pytest.param(
+            ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0, marks=pytest.mark.slow
+        ),
+        (ring(voussoirs=7, thickness=0.8, contact=rough(0.3, 1e3)), 0.0),
+    ],
+    ids=["pile", "corner", "ring", "glued ring"],
+)
+def test_a_mixed_integer_programme_finds_nothing_weaker(structure, drop, verified):
+    """To a dozen joints it ends in seconds; at sixteen it proved nothing in a minute."""
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    assert len(structure.joints) <= 12
+    known = least_by_integers(structure, SIDEWAYS)
+    assert found.factor == pytest.approx(known, rel=1e-5)
+    what = f"{len(structure.joints)} joints, cohesion up to {glue(structure).max():g} N"
+    case = f"sliding without dilatancy, {what}: factor"
+    verified(case, known, "mixed-integer programme", found.factor)
+    upper = af.collapse_factor(structure, live=SIDEWAYS).factor
+    assert found.factor <= (1.0 - drop) * upper * (1.0 + EXACT)
+
+
+def random_structure(seed):
+    chance = np.random.default_rng(seed)
+    friction = float(chance.uniform(0.35, 0.8))
+    if seed % 2:
+        shape = {
+            "thickness": float(chance.uniform(0.5, 0.9)),
+            "voussoirs": int(chance.integers(5, 14)),
+        }
+        return ring(embrace=float(chance.uniform(90.0, 150.0)), contact=rough(friction), **shape)
+    rows = int(chance.integers(2, 5))
+    courses = [[1.0, 1.0], [0.5, 1.0, 0.5]] * rows
+    return wall(courses[:rows], friction, height=float(chance.uniform(0.1, 0.4)))
+
+
+@pytest.mark.parametrize(
+    "seed", [k if k < 4 else pytest.param(k, marks=pytest.mark.slow) for k in range(30)]
+)
+def test_random_rings_and_walls_are_weaker_without_dilatancy(seed):
+    structure = random_structure(seed)
+    associated = af.collapse_factor(structure, live=SIDEWAYS)
+    if associated.outcome is not Outcome.COLLAPSES:
+        pytest.skip("does not stand")
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    assert found.factor <= associated.factor * (1.0 + EXACT)
+    check(structure, SIDEWAYS, found)
+
+
+def test_a_block_held_between_walls_lifts_at_its_weight():
+    """Dilatancy would wedge it for ever; without, walls that do not press let it go."""
+    block = [((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+    cheeks = [((-1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 1.0))]
+    cheeks.append(((1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0)))
+    blocks = [af.Block(block[0], af.STONE, "block")]
+    blocks += [af.Block(o, af.STONE, f"cheek {k}", fixed=True) for k, o in enumerate(cheeks)]
+    structure = af.masonry.assembled(blocks, rough(0.6))
+    lift = af.PointLoad(0.5, (0.0, 1.0))
+    assert af.collapse_factor(structure, live=lift).outcome is Outcome.UNBOUNDED
+    found = af.collapse_factor(structure, live=lift, friction="nonassociated")
+    assert found.outcome is Outcome.COLLAPSES
+    assert found.factor == pytest.approx(structure.weight, rel=1e-6)
+
+
+def test_from_the_strongest_solution_the_search_goes_down_to_the_weakest():
+    """A wall that slides at two factors, of which the mixed-integer programme finds the least."""
+    structure = random_structure(10)
+    _, dead = self_weight_programme(structure, "nonassociated", None, None)
+    asked = dead.with_load_factor(rigid_load(structure, [SIDEWAYS]))
+    starts = starting_forces(asked, asked.solve(), MAX_START_COUNT, 0)
+    found = [turn for forces in starts if (turn := find_solution(asked, forces))]
+    strongest = min(found, key=lambda turn: turn.state.value)
+    assert -strongest.state.value == pytest.approx(0.67229, rel=1e-4)
+    values = [-turn.state.value for turn in descend(asked, strongest, strongest.state.forces, 30)]
+    assert values == sorted(values, reverse=True)
+    assert values[-1] == pytest.approx(least_by_integers(structure, SIDEWAYS), rel=1e-5)
+    from_none = [-turn.state.value for turn in descend(asked, None, starts[0], 30)]
+    assert min(from_none) == pytest.approx(values[-1], rel=EXACT)
+
+
+def test_without_friction_a_column_resists_nothing():
+    found = af.collapse_factor(
+        af.column(breadth=0.6, heights=[2.4], contact=rough(0.0)),
+        live=SIDEWAYS,
+        friction="nonassociated",
+    )
+    assert found.factor == pytest.approx(0.0, abs=1e-9)
+    assert found.outcome is Outcome.COLLAPSES
+
+
+def test_a_settlement_without_dilatancy_pushes_at_least_as_hard():
+    structure = ring(embrace=120.0, voussoirs=9, contact=rough(0.4))
+    spread = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+    plain, without = (
+        af.collapse_factor(structure, live=spread, friction=f) for f in ("coulomb", "nonassociated")
+    )
+    assert without.outcome is Outcome.SETTLES
+    assert without.factor >= plain.factor * (1.0 - EXACT)
+    assert without.solutions.bracket[0] == pytest.approx(plain.factor, rel=EXACT)
+
+
+def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
+    monkeypatch.setattr("archfem.limit.nonassociated.find_solution", lambda *_: None)
+    monkeypatch.setattr("archfem.limit.nonassociated.descend", lambda *_, **__: [])
+    structure = ring(embrace=120.0, voussoirs=9, contact=rough(0.4))
+    push = af.PointLoad(0.0, (-1e3, 0.0))
+    found = af.collapse_factor(structure, live=push, friction="nonassociated")
+    upper = af.collapse_factor(structure, live=push).factor
+    assert found.outcome is Outcome.BRACKETED
+    assert found.solutions.bracket == pytest.approx((found.factor, upper))
+    assert 0.0 < found.factor < upper
+    assert np.isnan(found.joints["N"]).all()
+
+
+def test_the_words_tell_names_and_where_solutions_lie():
+    structure = wall(HALVES, 0.5)
+    words = str(af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated"))
+    assert "brick" in words
+    assert "solutions without dilatancy found from" in words
+    pressed = af.collapse_factor(
+        af.column(breadth=1.0, heights=[1.0, 1.0]),
+        live=af.PointLoad(x=0.0, force=(0.0, -1e3)),
+        friction="nonassociated",
+    )
+    assert str(pressed.solutions) == (
+        "without dilatancy it does not either: no factor is too large"
+    )
+
+
+def test_where_dilatancy_locks_a_strut_solutions_may_have_any_factor_above_a_bound():
+    """Its own load presses three stones between walls; nothing is known of the largest factor."""
+    dry = af.Contact(1e9, 3e8, 0.6)
+    strut = af.circular_arch(radius=5.0, thickness=1.0, embrace=20.0, voussoirs=3, contact=dry)
+    found = af.collapse_factor(strut, live=af.PointLoad(0.0, (0.0, -1e4)), friction="nonassociated")
+    assert found.factor == np.inf
+    assert 0.0 < found.solutions.bracket[0] < found.solutions.bracket[1] == np.inf

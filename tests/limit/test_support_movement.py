@@ -1,0 +1,262 @@
+"""How far a support moves before what stands on it falls, in the geometry that it takes."""
+
+from dataclasses import replace
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.limit import support_movement
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.support_movement import DisplacedBlocks, End, largest_movement
+
+TOLERANCE = 1e-4
+"""Width of the last step, as a share of the movement asked for: the default."""
+
+SPREAD = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
+SINK = af.Settlement("left abutment", (0.0, -1.0, 0.0))
+
+
+def rough(friction):
+    return replace(af.masonry.STONE_TO_STONE, friction=friction)
+
+
+def semicircle(thickness, voussoirs, **given):
+    shape = {"radius": 1.0, "embrace": 180.0}
+    return af.circular_arch(**shape, thickness=thickness, voussoirs=voussoirs, **given)
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def turned(points, about, to, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return to + (points - about) @ np.array([[c, s], [-s, c]])
+
+
+class ThreeHinges:
+    """A ring in three-hinged states, by plane geometry and moments alone.
+
+    Joints and faces of the hinges are given from the left. What lies left of the first moves with
+    the left abutment.
+    """
+
+    def __init__(self, ring):
+        self.ends = np.array([joint.ends for joint in ring.joints])
+        self.stones = np.array([block.centroid for block in ring.blocks[1:-1]])
+        self.weights = np.array([block.area for block in ring.blocks[1:-1]])
+
+    def admissible(self, joints, faces, shift):
+        """Whether the thrust line through three hinges stays within the displaced ring."""
+        a, b, c = joints
+        pivots = [self.ends[joint, face] for joint, face in zip(joints, faces, strict=True)]
+        start = pivots[0] + shift
+        reach = pivots[2] - start
+        sides = [np.linalg.norm(pivots[1] - pivots[0]), np.linalg.norm(pivots[2] - pivots[1])]
+        span = np.linalg.norm(reach)
+        along = (sides[0] ** 2 - sides[1] ** 2 + span**2) / (2.0 * span)
+        if along**2 >= sides[0] ** 2:
+            return False
+        up = np.array([-reach[1], reach[0]]) / span
+        sense = np.sign(cross(pivots[2] - pivots[0], pivots[1] - pivots[0]))
+        top = start + along * reach / span + sense * np.sqrt(sides[0] ** 2 - along**2) * up
+        first = angle(pivots[1] - pivots[0], top - start)
+        second = angle(pivots[2] - pivots[1], pivots[2] - top)
+        turns = -first, first - second, second  # of the left on the right part: opens the extrados
+        if any((turn < 0.0) != (face == 1) for turn, face in zip(turns, faces, strict=True)):
+            return False
+        k = np.arange(len(self.ends))
+        ends = np.where((k < a)[:, None, None], self.ends + shift, self.ends)
+        ends[a:b] = turned(self.ends[a:b], pivots[0], start, first)
+        ends[b:c] = turned(self.ends[b:c], pivots[1], top, second)
+        stones = np.where((k[:-1] < a)[:, None], self.stones + shift, self.stones)
+        stones[a:b] = turned(self.stones[a:b], pivots[0], start, first)
+        stones[b:c] = turned(self.stones[b:c], pivots[1], top, second)
+        hinges = [start, top, pivots[2]]
+        force = self.reaction(stones, joints, hinges)
+        return self.inside(stones, ends, joints, start, force)
+
+    def reaction(self, stones, joints, hinges):
+        """Of what lies left of the first hinge on the rest: moments about the other two."""
+        rows, known = [], []
+        for pivot, last in zip(hinges[1:], joints[1:], strict=True):
+            arm = hinges[0] - pivot
+            rows.append([-arm[1], arm[0]])
+            part = slice(joints[0], last)
+            known.append(self.weights[part] @ (stones[part] - pivot)[:, 0])
+        return np.linalg.solve(rows, known)
+
+    def inside(self, stones, ends, joints, start, force):
+        """Whether the resultant passes every other joint between its ends, in compression."""
+        for k in sorted(set(range(len(ends))) - set(joints)):
+            part, sign = (
+                (slice(joints[0], k), 1.0) if k > joints[0] else (slice(k, joints[0]), -1.0)
+            )
+            through = force - sign * np.array([0.0, self.weights[part].sum()])
+            about = [
+                cross(start - p, force) - sign * self.weights[part] @ (stones[part] - p)[:, 0]
+                for p in ends[k]
+            ]
+            across = ends[k, 1] - ends[k, 0]
+            if about[0] * about[1] > 1e-9 or cross(through, across) < 0.0:
+                return False
+        return True
+
+    def stands(self, shift):
+        size = len(self.ends)
+        return any(
+            self.admissible(joints, faces, shift)
+            for joints in combinations(range(size), 3)
+            for faces in product((0, 1), repeat=3)
+        )
+
+
+def angle(a, b):
+    return np.arctan2(cross(a, b), a @ b)
+
+
+def hinges_of(stage):
+    joints, faces = zip(*stage.hinges, strict=True)
+    return joints, [("intrados", "extrados").index(face) for face in faces]
+
+
+@pytest.mark.parametrize(
+    ("thickness", "voussoirs", "settlement", "jumps"),
+    [(0.15, 8, SPREAD, 0), (0.12, 60, SPREAD, 1), (0.2, 8, SINK, 0), (0.15, 30, SINK, 1)],
+)
+def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(
+    thickness, voussoirs, settlement, jumps
+):
+    ring = semicircle(thickness, voussoirs)
+    found = largest_movement(ring, settlement, friction=None)
+    assert found.end is End.FALLS
+    hinged, shift = ThreeHinges(ring), np.array(settlement.motion[:2])
+    for stage in found.stages[1:]:
+        assert hinged.admissible(*hinges_of(stage), stage.share * shift)
+    last = hinges_of(found.stages[-1])
+    assert not hinged.admissible(*last, (found.largest + 3.0 * TOLERANCE) * shift)
+    assert len(found.sequence) == 2 + jumps
+
+
+@pytest.mark.parametrize(("thickness", "settlement"), [(0.15, SPREAD), (0.2, SINK)])
+def test_it_falls_where_no_three_hinges_at_all_hold_the_thrust_line(
+    thickness, settlement, verified
+):
+    ring = semicircle(thickness, 8)
+    found = largest_movement(ring, settlement, friction=None)
+    hinged, shift = ThreeHinges(ring), np.array(settlement.motion[:2])
+    assert hinged.stands((found.largest - TOLERANCE) * shift)
+    assert not hinged.stands((found.largest + 3.0 * TOLERANCE) * shift)
+    way = "spread" if settlement is SPREAD else "sink"
+    case = f"semicircle, t/R = {thickness:g}, largest {way} of a support over R"
+    verified(
+        case, "the same", "three hinges by plane geometry", f"{found.largest:.4f}", difference=3e-4
+    )
+
+
+def test_it_leaps_where_only_far_hinges_would_hold():
+    ring = semicircle(0.2, 10)
+    found = largest_movement(ring, SINK, friction=None)
+    assert found.end is End.LEAPS
+    hinged, shift = ThreeHinges(ring), np.array(SINK.motion[:2])
+    beyond = (found.largest + 3.0 * TOLERANCE) * shift
+    assert hinges_of(found.stages[-1]) == ((0, 5, 8), [1, 1, 0])
+    assert not hinged.admissible((0, 5, 8), (1, 1, 0), beyond)
+    assert hinged.admissible((0, 6, 9), (1, 1, 0), beyond)
+
+
+def test_weights_lose_what_the_thrust_does():
+    ring = semicircle(0.2, 12)
+    found = largest_movement(ring, SPREAD, friction=None)
+    shares, works = np.array([(stage.share, stage.work) for stage in found.stages]).T
+    works[0] = 2.0 * works[1] - works[2]  # at rest the thrust is any of many
+    fallen = -found.displacement[:, 1] * [block.area * 20e3 for block in ring.blocks]
+    done = np.diff(shares) @ (works[1:] + works[:-1]) / 2.0
+    assert done == pytest.approx(fallen[1:-1].sum(), rel=1e-3)
+
+
+def test_either_abutment_may_move():
+    ring = semicircle(0.2, 12)
+    left = largest_movement(ring, SPREAD, friction=None)
+    right = largest_movement(ring, af.Settlement("right abutment", (1.0, 0.0, 0.0)), friction=None)
+    assert right.largest == pytest.approx(left.largest, abs=TOLERANCE)
+    assert [stage.work for stage in right.stages[1:9]] == pytest.approx(
+        [stage.work for stage in left.stages[1:9]], rel=1e-6
+    )
+
+
+def test_a_column_on_ground_that_tilts():
+    """It falls where its centre passes the corner, and slides before where that is beyond μ."""
+    stocky = af.column(breadth=1.0, heights=[0.5, 1.0], contact=rough(0.6))
+    tilt = af.Settlement("base", (0.0, 0.0, 1.0))
+    tall = largest_movement(stocky, tilt, friction=None)
+    assert (tall.end, stocky.blocks[0].name) == (End.FALLS, "base")
+    assert tall.largest == pytest.approx(np.arctan(1.0 / 1.5), abs=2.0 * TOLERANCE)
+    slid = largest_movement(stocky, tilt)
+    assert slid.end is End.SLIDES
+    assert slid.largest == pytest.approx(np.arctan(0.6), abs=2.0 * TOLERANCE)
+    assert slid.settlement.motion == pytest.approx((0.0, 0.0, slid.largest))
+
+
+def test_a_small_movement_is_held_and_a_strut_locks():
+    held = largest_movement(semicircle(0.2, 12), af.Settlement(0, (-0.01, 0.0, 0.0)))
+    assert (held.end, held.largest) == (End.HOLDS, pytest.approx(1.0))
+    flat = af.circular_arch(span=4.0, rise=0.2, thickness=1.0, voussoirs=9)
+    stuck = largest_movement(flat, af.Settlement("left abutment", (1.0, 0.0, 0.0)))
+    assert (stuck.end, stuck.largest) == (End.LOCKS, 0.0)
+
+
+def test_the_last_step_ends_where_it_is_asked_to(monkeypatch):
+    """Steps of three tenths, and one of a tenth."""
+    monkeypatch.setattr(support_movement, "MAX_MOVEMENT_STEP", 0.3)
+    ring = af.circular_arch(radius=2.0, thickness=0.4, embrace=120.0, voussoirs=7, chords=1)
+    spread = af.Settlement("right abutment", (1e-3, 0.0, 0.0))
+    found = largest_movement(ring, spread)
+    assert found.end is End.HOLDS
+    assert [each.share for each in found.stages] == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.0])
+
+
+def test_the_first_thrust_is_that_of_the_small_movement():
+    ring = semicircle(0.15, 30)
+    small = af.collapse_factor(ring, live=SPREAD, friction=None)
+    found = largest_movement(ring, af.Settlement("left abutment", (-1e-3, 0.0, 0.0)), friction=None)
+    assert 1e3 * found.stages[1].work == pytest.approx(small.factor, rel=1e-3)
+    assert found.stages[1].hinges == small.hinges
+
+
+def test_the_words_name_the_joints():
+    found = largest_movement(semicircle(0.15, 8), SPREAD, friction=None)
+    assert "moves by -0.2269 m" in str(found)
+    assert "1 (joint 1) intrados, 4 (joint 4) extrados" in str(found)
+    assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
+
+
+def test_gaps_of_displaced_blocks_are_rates_of_what_is_open():
+    ring = semicircle(0.2, 6)
+    chance = np.random.default_rng(2)
+    blocks = DisplacedBlocks(ring, 0.05 * chance.standard_normal((8, 3)))
+    motion, small = chance.standard_normal((8, 3)), 1e-6
+    ahead, back = (blocks.moved(sign * small * motion).current_gaps for sign in (1.0, -1.0))
+    np.testing.assert_allclose(blocks.gaps(motion), (ahead - back) / (2 * small), atol=1e-7)
+    at_rest = DisplacedBlocks(ring, np.zeros((8, 3)))
+    assert np.abs(at_rest.current_gaps).max() < 1e-12
+    linear = RigidBlocks(ring).gaps(motion)
+    np.testing.assert_allclose(at_rest.gaps(motion), linear, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: largest_movement(semicircle(0.05, 12), SPREAD), "does not stand"),
+        (lambda: largest_movement(semicircle(0.2, 12), af.Settlement(0, (0, 0, 0))), "nothing"),
+        (lambda: largest_movement(semicircle(0.2, 12), af.Settlement(3, (1, 0, 0))), "supports"),
+        (lambda: largest_movement(semicircle(0.2, 12), SPREAD, friction="none"), "not known"),
+        (lambda: largest_movement(semicircle(0.2, 12), SPREAD, tolerance=0.5), "not between"),
+        (lambda: largest_movement(semicircle(0.2, 12), af.BodyForce(1.0)), "settlement"),
+    ],
+)
+def test_input_that_cannot_be_meant_is_refused(call, message):
+    with pytest.raises(af.InvalidInput, match=message):
+        call()

@@ -1,0 +1,111 @@
+"""NTC 2018, ASCE 7-22 and EN 1998-1-1:2024 at their corners.
+
+The coefficients and branches were compared with other people's transcriptions of the codes; where
+two of those differed, nothing was taken from either: the user gives such a value.
+"""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.motion.design_spectra import Asce2022, Eurocode2024, Ntc2018
+
+ROUND_OFF = 1e-12
+
+
+@pytest.mark.parametrize(
+    ("site", "ag", "f0", "factor"),
+    [
+        # Table 3.2.IV: formula and both bounds of each category.
+        ("A", 0.25, 2.4, 1.0),
+        ("B", 0.261, 2.42, 1.147352),
+        ("B", 0.05, 2.4, 1.2),
+        ("B", 0.6, 2.4, 1.0),
+        ("C", 0.15, 2.4, 1.484),
+        ("C", 0.261, 2.42, 1.321028),
+        ("C", 0.02, 2.4, 1.5),
+        ("C", 0.6, 2.4, 1.0),
+        ("D", 0.25, 2.5, 1.4625),
+        ("D", 0.02, 2.4, 1.8),
+        ("D", 0.35, 3.0, 0.9),
+        ("E", 0.25, 2.5, 1.3125),
+        ("E", 0.05, 2.4, 1.6),
+        ("E", 0.6, 2.4, 1.0),
+    ],
+)
+def test_subsoil_of_ntc(site, ag, f0, factor):
+    assert Ntc2018(ag, f0, 0.35, site).soil == pytest.approx(factor, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("site", "ratio"),  # C_C at T_C* = 0.35 s, to the digits of a calculator
+    [("A", 1.0), ("B", 1.3570), ("C", 1.4847), ("D", 2.1129), ("E", 1.7501)],
+)
+def test_corners_of_ntc(site, ratio):
+    rise, falls, far = Ntc2018(0.25, 2.5, 0.35, site).corners
+    assert falls == pytest.approx(ratio * 0.35, rel=1e-4)  # of the rounded ratios
+    assert rise == pytest.approx(falls / 3.0, rel=ROUND_OFF)
+    assert far == pytest.approx(2.6, rel=ROUND_OFF)
+
+
+def test_ntc_at_its_corners():
+    """L'Aquila, 475 years: a_g 0.261 g, F_0 2.42, T_C* 0.35 s, subsoil C on a slope of 1.2."""
+    spectrum = Ntc2018(0.261, 2.42, 0.35, "C", topography=1.2)
+    ground = 0.261 * 1.2 * (1.7 - 0.6 * 2.42 * 0.261)
+    falls = 1.05 * 0.35**0.67
+    periods = [0.0, falls / 6.0, falls / 3.0, falls, 1.0, 2.644, 4.0]
+    level = 2.42 * ground
+    over = [
+        1.0 / 2.42,
+        (1.0 + 1.0 / 2.42) / 2.0,
+        1.0,
+        1.0,
+        falls,
+        falls / 2.644,
+        falls * 2.644 / 16,
+    ]
+    assert spectrum.horizontal(periods) == pytest.approx(level * np.array(over), rel=ROUND_OFF)
+    upright = 1.2 * 0.261 * 1.35 * 2.42 * 0.261**0.5
+    over = [1.0 / 2.42, 1.0, 1.0, 0.15, 0.15 / 16.0]
+    found = spectrum.vertical([0.0, 0.05, 0.15, 1.0, 4.0])
+    assert found == pytest.approx(upright * np.array(over), rel=ROUND_OFF)
+    damped = Ntc2018(0.261, 2.42, 0.35, "C", topography=1.2, damping=0.15)
+    assert damped.horizontal([0.0, 0.3]) == pytest.approx([ground, level * 0.5**0.5], rel=ROUND_OFF)
+
+
+def test_asce_at_its_corners():
+    spectrum = Asce2022(sds=1.2, sd1=0.6, tl=8.0)
+    found = spectrum.horizontal([0.0, 0.05, 0.1, 0.5, 1.0, 8.0, 16.0])
+    assert found == pytest.approx([0.48, 0.84, 1.2, 1.2, 0.6, 0.075, 0.01875], rel=ROUND_OFF)
+
+
+def test_eurocode_of_2024_at_its_corners():
+    spectrum = Eurocode2024(0.5, 0.15, f_alpha=1.2, f_beta=1.6)
+    falls, far = 0.4, 1.0 + 0.15 * 9.80665
+    assert spectrum.corners == pytest.approx((0.1, falls, far), rel=ROUND_OFF)
+    found = spectrum.horizontal([0.0, 0.02, 0.06, 0.1, 0.4, 1.0, far, 4.0])
+    expected = [0.24, 0.24, 0.42, 0.6, 0.6, 0.24, 0.24 / far, 0.24 * far / 16.0]
+    assert found == pytest.approx(expected, rel=ROUND_OFF)
+    rock = Eurocode2024(0.5, 0.09, 1.0, 1.0, topography=1.2)
+    assert rock.corners == pytest.approx((0.05, 0.18, 2.0), rel=ROUND_OFF)
+    assert rock.horizontal([0.05, 2.0]) == pytest.approx([0.6, 0.054], rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Ntc2018(0.2, 2.5, 0.3, "S1"), "subsoil 'S1' is unknown"),
+        (lambda: Ntc2018(0.2, 2.1, 0.3, "A"), "F_0 2.1 is not from 2.2"),
+        (lambda: Ntc2018(2.56, 2.5, 0.3, "A"), "a_g in g, below 2"),
+        (lambda: Ntc2018(0.2, 2.5, 0.3, "A", topography=2.0), "not from 1 to 1.4"),
+        (lambda: Ntc2018(0.2, 2.5, 0.3, "A").horizontal(4.1), "defined up to 4 s"),
+        (lambda: Asce2022(1.0, 0.5, 0.4), "not beyond T_S"),
+        (lambda: Asce2022(1.0, 0.0, 8.0), "expected more than 0"),
+        (lambda: Asce2022(1.0, 0.5, 8.0).vertical(0.1), "give one by points"),
+        (lambda: Eurocode2024(5.0, 0.1, 1.0, 1.0), "T_C = S_beta/S_alpha = 0.02 s is not between"),
+        (lambda: Eurocode2024(0.5, 0.1, 1.0, 1.0).vertical(0.1), "give one by points"),
+    ],
+)
+def test_what_the_codes_do_not_define_is_refused(build, message):
+    with pytest.raises(af.InvalidInput, match=message):
+        build()

@@ -1,0 +1,152 @@
+"""Without PETSc and SLEPc: SciPy finds the same equilibria and modes."""
+
+import sys
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import archfem as af
+from archfem._optional import FENICSX_PACKAGES
+from archfem.statics import dense_eigensolver, modes, newton, newton_iteration, slepc_eigensolver
+from archfem.statics.newton import EquilibriumSolver, Newton
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """As if FEniCSx and what it stands on were not installed."""
+
+    def found(name):
+        return None if name in FENICSX_PACKAGES else name
+
+    for module in (newton, modes):
+        monkeypatch.setattr(module, "find_spec", found)
+
+
+def kinked(q):
+    """The force of a spring that is stiff where it is closed, under a load."""
+    return np.where(q < 0.0, 2.0, 1e-3) * q + 1.0
+
+
+def stiffness(q):
+    return sparse.csr_matrix([[2.0 if q[0] < 0.0 else 1e-3]])
+
+
+@pytest.mark.parametrize("search", ["basic", "cp", "bt"])
+def test_a_kink_is_solved_exactly(alone, search):
+    solved = EquilibriumSolver(1).solve(kinked, stiffness, np.array([5.0]), 1.0, [search])
+    assert solved.q[0] == pytest.approx(-0.5, rel=1e-9)
+
+
+def test_dead_load_and_modes_are_those_of_petsc(ring, monkeypatch):
+    """Both solve to 1e-10 of the load."""
+    model = af.build(ring, fidelity="rigid")
+    monkeypatch.setattr(newton, "MAX_SCIPY_UNKNOWNS", 0)
+    usual = af.dead_load(model)
+    for module in (newton, modes):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    other = af.dead_load(model)
+    assert other.q == pytest.approx(usual.q, rel=1e-8, abs=1e-8 * np.abs(usual.q).max())
+    squares, shapes = slepc_eigensolver.find_lowest_modes(model.closed_tangent(), model.mass, 4)
+    found, also = dense_eigensolver.find_lowest_modes(model.closed_tangent(), model.mass, 4)
+    assert found == pytest.approx(squares, rel=1e-8)
+    assert np.abs(shapes.T @ (model.mass @ also)) == pytest.approx(np.eye(4), abs=1e-6)
+
+
+def test_full_steps_of_what_is_small_do_without_petsc(monkeypatch):
+    """PETSc searches along a step; options are for it alone, and so is what is large."""
+    monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
+    start = np.array([5.0])
+    light = EquilibriumSolver(1, prefer_scipy=True)
+    assert light.solve(kinked, stiffness, start, 1.0, ["basic"]).q[0] == pytest.approx(-0.5)
+    with pytest.raises(af.errors.NotInstalled):
+        light.solve(kinked, stiffness, start, 1.0, ["cp"])
+    with pytest.raises(af.errors.NotInstalled):
+        EquilibriumSolver(1, Newton(petsc={"snes_monitor": ""}), prefer_scipy=True)
+    many = EquilibriumSolver(newton.MAX_SCIPY_UNKNOWNS + 1, prefer_scipy=True)
+    with pytest.raises(af.errors.NotInstalled):
+        many.solve(kinked, stiffness, start, 1.0, ["basic"])
+
+
+@pytest.mark.parametrize(
+    ("force", "tangent", "says"),
+    [
+        (lambda q: q * 0.0 + 1.0, lambda q: sparse.csr_matrix([[0.0]]), "the tangent is singular"),
+        (lambda q: q + np.nan, stiffness, "the residual is not a number"),
+        (lambda q: np.exp(q), lambda q: sparse.csr_matrix([[np.exp(q[0])]]), "too many iterations"),
+    ],
+)
+def test_what_has_no_solution_says_why(alone, force, tangent, says):
+    with pytest.raises(af.DidNotConverge, match=says):
+        EquilibriumSolver(1).solve(force, tangent, np.array([0.0]), 1.0, ["basic"])
+
+
+@pytest.mark.parametrize(
+    ("search", "force"), [("cp", lambda q: 1.0 + q**2), ("bt", lambda q: 1.0 + 0.0 * q)]
+)
+def test_a_step_that_leads_nowhere_down(alone, search, force):
+    with pytest.raises(af.DidNotConverge, match="no way down"):
+        EquilibriumSolver(1).solve(force, stiffness, np.array([5.0]), 1.0, [search])
+
+
+def test_a_search_down_the_residual_finds_what_full_steps_go_to_and_fro_over(alone):
+    """arctan from 2, whose full steps grow; it needs no energy, and the root is 0."""
+
+    def slope(q):
+        return sparse.csr_matrix([[1.0 / (1.0 + q[0] ** 2)]])
+
+    with pytest.raises(af.DidNotConverge), np.errstate(over="ignore"):
+        EquilibriumSolver(1).solve(np.arctan, slope, np.array([2.0]), 1.0, ["basic"])
+    solved = EquilibriumSolver(1).solve(np.arctan, slope, np.array([2.0]), 1.0, ["bt"])
+    assert abs(solved.q[0]) < 1e-10  # the tolerance of a solve, relative to a load of 1
+
+
+@pytest.mark.parametrize("least", [-1e6, 1e-9])
+def test_a_mechanism_has_no_modes(alone, least):
+    """Nor has what is held by no more than the rounding of the stiffest coordinate, 1e-7 here."""
+    stiff = sparse.diags([least, 2.0, 1e6]).tocsr()
+    with pytest.raises(af.DidNotConverge, match="singular or negative"):
+        dense_eigensolver.find_lowest_modes(stiff, sparse.identity(3, format="csr"), 2)
+
+
+def test_rounding_is_that_of_the_highest_square_of_one_coordinate():
+    """K / M of each by itself: 4, 3 and 2 per second squared."""
+    stiff, mass = (sparse.diags(each).tocsr() for each in ([4.0, 6.0, 6.0], [1.0, 2.0, 3.0]))
+    one = sparse.identity(3, format="csr")
+    least = dense_eigensolver.zero_threshold(one, one)
+    assert dense_eigensolver.zero_threshold(stiff, mass) == pytest.approx(4.0 * least, rel=1e-12)
+
+
+def test_what_only_petsc_and_slepc_can_do_says_how_they_are_had(monkeypatch):
+    monkeypatch.setitem(sys.modules, "archfem.statics.snes", None)
+    with pytest.raises(af.errors.NotInstalled, match="python3-dolfinx"):
+        EquilibriumSolver(1, Newton(petsc={"pc_type": "svd"}))
+    many = sparse.identity(3001, format="csr")
+    with pytest.raises(af.errors.NotInstalled, match="conda-forge"):
+        dense_eigensolver.find_lowest_modes(many, many, 1)
+
+
+@pytest.mark.parametrize("library", ["PETSc", "SciPy"])
+def test_what_only_rounding_holds_is_no_equilibrium(library, request):
+    """A stiff block that flies away, but for a stiffness of the size of rounding: 1e9 m far."""
+    if library == "SciPy":
+        request.getfixturevalue("alone")
+    stiff = sparse.csr_matrix([[1e11, -1e11], [-1e11, 1e11 + 1e-4]])
+    load = np.array([0.0, 1e5])
+    with pytest.raises(af.DidNotConverge, match=r"rounding holds it|singular|iterations"):
+        EquilibriumSolver(2).solve(lambda q: stiff @ q - load, lambda q: stiff, np.zeros(2), 1e5)
+
+
+@pytest.mark.parametrize(
+    ("zero", "share"), [(0.3, 0.3), (1.0, 1.0), (700.0, 700.0), (6e5, 0.0), (5e5, 5e5)]
+)
+def test_the_lowest_place_along_a_step(zero, share):
+    """Where the slope vanishes: a step may be doubled twenty times, to 2^19 = 524288 of it."""
+    assert newton_iteration._find_critical_point(lambda along: along - zero) == pytest.approx(
+        share, rel=1e-9
+    )
+
+
+def test_where_energy_rises_no_step_is_taken():
+    assert newton_iteration._find_critical_point(lambda along: 0.0) == 0.0
+    assert newton_iteration._find_critical_point(lambda along: along + 1.0) == 0.0

@@ -1,0 +1,61 @@
+"""Results show themselves: a picture, a line or two, and the same for notebooks."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib import import_module
+
+import pytest
+from matplotlib.figure import Figure
+
+import archfem as af
+from archfem._display import ResultDisplay
+
+
+@pytest.fixture(scope="module")
+def things():
+    """One of each, of two stones on top of one another whose name has marks of HTML."""
+    stones = af.column(breadth=0.4, heights=[0.8, 0.8])
+    stones = replace(stones, name="two <b>stones</b> for $5 or $6")
+    model = af.build(stones, fidelity="rigid")
+    motion = af.Motion([0.0, 0.5, 0.0], 0.01, name="tap")
+    return [
+        stones,
+        af.dead_load(model),
+        af.time_history(model, motion, dt=0.005),
+        af.pushover(model, af.BodyForce(1.0)),
+        af.collapse_factor(stones, live=af.BodyForce(1.0)),
+        af.modes(model, 2),
+        motion,
+    ]
+
+
+def test_there_are_seven_kinds(things):
+    assert {type(each) for each in things} == set(ResultDisplay.__subclasses__())
+
+
+def test_each_draws_itself(things):
+    for each in things:
+        assert isinstance(each.plot(), Figure), type(each)
+        assert isinstance(each._repr_html_(), str)
+
+
+def test_each_is_told_in_a_line_or_two(things):
+    for each in things:
+        words = repr(each)
+        assert words.startswith(type(each).__name__)
+        assert len(words) < 250
+        assert "\n" not in words
+        assert "<b>" not in each._repr_html_()
+    assert "2 blocks that move, 1 fixed, 2 joints" in repr(things[0])
+    assert "factor 0.25" in repr(things[4])  # b / h of the whole column, 0.4 / 1.6
+
+
+def test_pictures_are_loaded_when_asked_for():
+    script = """
+import sys, archfem as af
+repr(af.column(breadth=0.4, heights=[0.8]))
+print("matplotlib" in sys.modules)
+"""
+    ran = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert ran.stdout.strip() == "False"
