@@ -23,7 +23,7 @@ def case(monkeypatch):
         monkeypatch.setattr(f"{module}.reference_settings", lambda structure: REFERENCES)
     monkeypatch.setattr(
         "archfem.studies.convergence.candidate_settings",
-        lambda structure: candidate_settings(structure, **GIVEN, steps=STEPS),
+        lambda structure: candidate_settings(structure, *GIVEN.values(), STEPS),
     )
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     motion = {"synthetic": {"duration": 0.5, "pga": 2.0, "seed": 1}}
