@@ -51,7 +51,7 @@ def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
 
 def test_settings_that_ran_are_not_run_again(case, tmp_path, monkeypatch):
     first = case_accuracy(case, tmp_path)
-    monkeypatch.setattr("archfem.studies.convergence.timed", None)
+    monkeypatch.setattr("archfem.studies.convergence.time_run", None)
     again = case_accuracy(case, tmp_path)
     assert again == first
 
