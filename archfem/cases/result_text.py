@@ -10,6 +10,11 @@ from archfem._files import align_columns
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.verdict import (
+    MECHANISM_DEFINITIONS,
+    PUBLISHED_DEFINITION,
+    DetectedMechanism,
+)
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -18,7 +23,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.limit.collapse import Collapse, Outcome
-from archfem.limit.mechanism_count import Mechanism, duration_text, episode
+from archfem.limit.mechanism_count import duration_text
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 from archfem.motion.intensity_measures import measure_intensity
 from archfem.motion.matching import Match
@@ -62,40 +67,49 @@ def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> Resul
     return ResultTable(head, rows)
 
 
+# Columns of `tabulate_runs` before those of the mechanisms
+RUN_COLUMNS = ("pair", "outcome", "doubts", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N")
+RUN_COLUMNS += ("apart", "displacement", "residual")
+
+
 def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
-    """Tabulate the runs of a suite: ground motion, critical joint, mechanisms, and ending."""
-    head = ["pair", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"]
-    head += ["by count", "at", "for", "opens", "joints", "Demirel & Aldemir", "at"]
-    head += ["verified", "at", "for", "opens", "end"]
+    """Tabulate the runs of a suite: verdict, ground motion, critical joint, and mechanisms.
+
+    A mechanism has its class, time, duration and opening; the last row counts the runs with one.
+    """
+    definitions = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
     endings = {Ending.FINISHED: "reached", Ending.EVENT: "ended"}
     rows = []
     for name, run in runs.items():
-        joints = assessed_joints(run.joints)
+        verdict, joints = run.verdict, assessed_joints(run.joints)
         size = abs(joints["eccentricity"])
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
-        verified = ["unknown", "-", "-", "-"]  # without the structure, as of a file read alone
-        if run.structure is not None:
-            verified = _mechanism_cells(run.verified.moved if run.verified else None, run)
         horizontal, vertical = np.abs(run.dataset["ground"].values).max(axis=0)
-        ending = f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"
         rows.append(
             [
                 name,
+                verdict.outcome,
+                str(len(verdict.doubts) or "none"),
                 f"{horizontal:.2f} m/s²",
                 f"{vertical:.2f} m/s²",
                 format_ratio(float(size.max())),
                 str(joints["name"].values[int(largest.values.argmax())]),
                 format_ratio(float(joints["friction"].max())),
                 f"{int(apart.sum())} joints" if apart.any() else "-",
-                *_mechanism_cells(run.mechanism, run),
-                join_joint_names(run.mechanism.names) if run.mechanism else "-",
-                *_mechanism_cells(run.demirel_aldemir, run)[:2],
-                *verified,
-                ending if run.fall is None else f"{ending}, {run.fall.kind}",
+                f"{verdict.displacement / mm:.3g} mm",
+                f"{verdict.residual / mm:.3g} mm",
+                *(_mechanism_cell(verdict.mechanisms, definition) for definition in definitions),
+                f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s",
             ]
         )
-    return ResultTable(head, rows)
+    verdicts = [run.verdict for run in runs.values()]
+    counts = [
+        f"{sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)} of {len(runs)}"
+        for name in definitions
+    ]
+    rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])
+    return ResultTable([*RUN_COLUMNS, *definitions, "end"], rows)
 
 
 def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
@@ -160,7 +174,7 @@ def describe_dead_load(result: DeadLoadResult) -> str:
     )
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
-    return "\n".join([*lines, *(f"in doubt: {warning}" for warning in result.warnings)])
+    return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in result.doubts)])
 
 
 def describe_collapse(structure: Structure, collapse: Collapse) -> str:
@@ -193,7 +207,7 @@ def describe_run(structure: Structure, run: History, dead: xr.Dataset) -> str:
     """Describe a run: verdict, quality of the numbers, joints, and use of strength."""
     strength = utilisation_text(structure, run.joints)
     table = tabulate_joints(run.joints, dead).text
-    return "\n\n".join([run.verdict, describe_run_quality(run), table, strength])
+    return "\n\n".join([str(run.verdict), describe_run_quality(run), table, strength])
 
 
 def describe_run_quality(run: History) -> str:
@@ -208,9 +222,7 @@ def describe_run_quality(run: History) -> str:
     return (
         f"outcome: {run.outcome}; {attrs['steps']} steps by '{attrs['method']}'\n"
         f"energy: drifts by {attrs['energy_drift']:+.1e} of the largest exchanged at most\n"
-        f"displacements: no block farther than {attrs['largest_displacement'] / mm:.3g} mm\n"
-        f"model: fidelity '{attrs['fidelity']}', {predicted}\n"
-        f"warnings: {len(run.warnings) or 'none'}"
+        f"model: fidelity '{attrs['fidelity']}', {predicted}"
     )
 
 
@@ -221,13 +233,15 @@ def format_ratio(value: float) -> str:
     return f"{value:.3f}" if value < 100.0 else "> 100"
 
 
-def _mechanism_cells(mechanism: Mechanism | None, run: History) -> list[str]:
-    """Four cells of a mechanism: kind, time, duration and opening."""
-    if mechanism is None or mechanism.time is None:
-        return ["none", "-", "-", "-"]
-    duration = episode(run.joints, mechanism)
-    opening = "-" if duration.opening is None else f"{duration.opening / mm:.3g} mm"
-    return [mechanism.kind, _seconds(mechanism.time), duration_text(duration.duration), opening]
+def _mechanism_cell(mechanisms: Mapping[str, DetectedMechanism | None], definition: str) -> str:
+    """Return the cell of a mechanism: class, time, duration and opening."""
+    if definition not in mechanisms:  # it does not apply, or the structure is unknown
+        return "-"
+    found = mechanisms[definition]
+    if found is None:
+        return "none"
+    opening = "" if found.opening is None else f", {found.opening / mm:.3g} mm"
+    return f"{found.mechanism.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"
 
 
 def _seconds(value: float) -> str:

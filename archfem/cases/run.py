@@ -29,10 +29,10 @@ from archfem.dynamics.time_history import Record, time_history
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse
 from archfem.models.builder import build
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium, dead_load, dead_load_warnings
+from archfem.statics.equilibrium import Equilibrium, dead_load, dead_load_doubts
 from archfem.statics.stress import strength_use
 
 if TYPE_CHECKING:
@@ -113,10 +113,10 @@ class DeadLoadResult:
         return None if model.cells.stress is None else strength_use(model, self.dead.q)
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the model's fidelity and of the equilibrium, a sentence each."""
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Doubts about the model's fidelity and the equilibrium."""
         friction = self.case.criteria.friction
-        return (*self.dead.model.warnings, *dead_load_warnings(self.dead, friction))
+        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, friction))
 
     @cached_property
     def damping(self) -> tuple[Viscous | None, str]:
@@ -381,8 +381,7 @@ def _run_motion(
     except DidNotConverge as error:
         history, failure = partial_history(error), error
     seconds = perf_counter() - start
-    warnings = dict.fromkeys((*at_rest.warnings, *history.warnings))  # each once, in order
-    history.dataset.attrs["doubts"] = "\n".join(warnings)
+    history = history.with_doubts((*at_rest.doubts, *history.doubts))
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)

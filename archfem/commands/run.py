@@ -56,9 +56,9 @@ def check(options: argparse.Namespace) -> int:
     elif case.motion is not None:
         motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
-    ready = f"in doubt, {len(at_rest.warnings)} times, as above" if at_rest.warnings else "ready"
+    ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
-    return EXIT_DOUBTFUL if at_rest.warnings else 0
+    return EXIT_DOUBTFUL if at_rest.doubts else 0
 
 
 def modes(options: argparse.Namespace) -> None:
@@ -170,7 +170,7 @@ def print_results(case: Case, results: Iterable[Result], folder: Path) -> bool:
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
-    return bool(at_rest.warnings) or any(run.warnings for run in runs.values())
+    return bool(at_rest.doubts) or any(run.doubts for run in runs.values())
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:
@@ -230,7 +230,7 @@ def _print_pairs(
     from archfem.cases.result_folder import write_pairs
 
     text = tabulate_runs(runs).text
-    if doubtful := [name for name, run in runs.items() if run.warnings]:
+    if doubtful := [name for name, run in runs.items() if run.doubts]:
         text += f"\n\nin doubt, as their summaries say: {', '.join(doubtful)}"
     print(f"{suite.name}, scale {suite.scale:g}, R = {suite.reduction:g}\n{text}")
     print_written(write_pairs(runs, at_rest, text, folder))

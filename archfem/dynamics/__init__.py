@@ -12,7 +12,7 @@
     motion_scaling    scale of a motion at first mechanism or collapse
     recorder          recording of a run
     rigid_body        free rigid blocks with impacts and friction
-    run_text          text of a run: extremes and mechanisms
+    verdict           outcome, doubts, displacements and mechanisms of a run
     schemes           time integration schemes, Rayleigh and stiffness damping
     solvers           solvers of a time step: newton, compliance, snes
     state             State, Step, Batch

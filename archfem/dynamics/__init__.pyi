@@ -8,7 +8,6 @@ from .events import MovingMechanism as MovingMechanism
 from .fall import CollapseState as CollapseState
 from .fall import classify_collapse as classify_collapse
 from .fall import release_blocks as release_blocks
-from .history import MECHANISM_DEFINITIONS as MECHANISM_DEFINITIONS
 from .history import Ending as Ending
 from .history import History as History
 from .history import first_mechanisms as first_mechanisms
@@ -29,3 +28,6 @@ from .state import Batch as Batch
 from .state import State as State
 from .time_history import Record as Record
 from .time_history import last_state as last_state
+from .verdict import MECHANISM_DEFINITIONS as MECHANISM_DEFINITIONS
+from .verdict import DetectedMechanism as DetectedMechanism
+from .verdict import Verdict as Verdict

@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem._validation import is_one_of
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
@@ -29,6 +30,7 @@ from archfem.joints.criteria import (
 from archfem.joints.resultants import eccentricity_and_friction, joint_dataset
 from archfem.limit.mechanism_count import (
     MECHANISM_KINDS,
+    OVER_RECORD,
     Mechanism,
     counted_mechanism,
     counted_mechanisms,
@@ -163,7 +165,7 @@ StopCondition = Event | Callable[[Structure, Array], str | None]
 
 @dataclass(frozen=True, kw_only=True)
 class CountedMechanism:
-    """Event: enough joints of a part, or of several parts, fail at once to make a mechanism.
+    """Event: enough joints of a part, or of several parts, have failed to make a mechanism.
 
     A joint fails by a hinge, by sliding or by loss of contact. The condition must last for the
     duration of the criteria. The reason says whether the blocks can also move.
@@ -171,11 +173,15 @@ class CountedMechanism:
     Attributes:
         criteria: failure criteria of joints and number of failures of a mechanism; None for those
             of the run. Criteria given here alone become those of the run.
-        kinds: classes that end the run, of "local", "semi-global" and "global".
+        kinds: classes that end the run, of "local", "semi-global" and "global"; "local" alone with
+            over="record".
+        over: "instant" counts joints that have failed at once; "record" counts each joint from its
+            first failure on, within one ring or one pier, see `limit.mechanism_over_record`.
 
     Args:
         criteria: as above.
         kinds: as above.
+        over: as above.
         limit: |e| of a hinge, instead of criteria [-].
         failures: number of failures of a mechanism, instead of criteria.
 
@@ -185,6 +191,7 @@ class CountedMechanism:
 
     criteria: Criteria | None = None
     kinds: tuple[str, ...] = MECHANISM_KINDS
+    over: str = "instant"
     limit: InitVar[float | None] = None
     failures: InitVar[int | None] = None
 
@@ -192,6 +199,13 @@ class CountedMechanism:
         criteria = merge_criteria(self.criteria, hinge=limit, failures=failures)
         object.__setattr__(self, "criteria", criteria)
         _check_kinds(self.kinds)
+        if not is_one_of(self.over, ("instant", "record")):
+            raise InvalidInput(f"over = {self.over!r}: count failures over 'instant' or 'record'")
+        if self.over == "record" and "local" not in self.kinds:
+            raise InvalidInput(
+                f"kinds = {self.kinds!r}: over='record' counts in one ring or pier, and its "
+                "mechanism is 'local'; leave kinds out"
+            )
 
     def start_monitor(self, structure: Structure, criteria: Criteria) -> EventMonitor:
         """Create the monitor of one run; its reason names the failed joints.
@@ -200,6 +214,8 @@ class CountedMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
+        if self.over == "record":
+            return _monitor_record(structure, criteria)
         verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
 
         def count(joints: xr.Dataset) -> Mechanism | None:
@@ -312,8 +328,9 @@ class EveryMechanism:
         parts = np.array([structure.joints[number].part for number in scanned])
         columns = np.searchsorted(scanned, verifier.rigid_regions.joints)
         required = {"verified", *applicable_definitions(structure, criteria)}
-        timers = {name: DurationCounter(criteria.duration) for name in required}
+        timers = {name: DurationCounter(criteria.duration) for name in required - {OVER_RECORD}}
         met: set[str] = set()
+        ever_failed = RecordCounter(structure, criteria)
 
         def moves(state: FailureState) -> bool:
             pattern = (state.side, state.slides, state.apart, state.sense)
@@ -329,9 +346,13 @@ class EveryMechanism:
                 for part in select_assessed_parts(roles)
             }
             counted = matching_definitions(count, roles, criteria.failures)
-            return counted | ({"verified"} if "verified" not in met and moves(state) else set())
+            failed = {_joint_condition(scanned[k]) for k in np.flatnonzero(state.failed).tolist()}
+            moving = {"verified"} if "verified" not in met and moves(state) else set()
+            return counted | failed | moving
 
         def reason(conditions: frozenset[str], _: Array, step: float) -> str | None:
+            if ever_failed.add_step(conditions, step):
+                met.add(OVER_RECORD)
             # every timer takes every step: one that does not hold starts again
             met.update(
                 name for name, time in timers.items() if time.add_step(name in conditions, step)
@@ -339,6 +360,56 @@ class EveryMechanism:
             return "a mechanism by each definition" if met >= required else None
 
         return FailureMonitor(FailureScan(structure, criteria, scanned, conditions_of), 1, reason)
+
+
+class RecordCounter:
+    """Counts the joints of each ring and pier that have failed at any time of a run."""
+
+    def __init__(self, structure: Structure, criteria: Criteria) -> None:
+        assessed = np.flatnonzero(structure.judged).tolist()
+        self._waiting = {_joint_condition(number): structure.joints[number] for number in assessed}
+        self._timers: dict[str, DurationCounter] = {}  # of joints that fail at present
+        self._criteria = criteria
+        self.failed: dict[str, list[str]] = {}  # names of joints, by part
+
+    def add_step(self, conditions: frozenset[str], step: float) -> str | None:
+        """Add the failed joints of a step; return the part in which enough have failed, or None."""
+        duration = self._criteria.duration
+        self._timers = {
+            name: self._timers.get(name) or DurationCounter(duration)
+            for name in conditions & self._waiting.keys()
+        }
+        for name, timer in self._timers.items():
+            if timer.add_step(True, step):
+                joint = self._waiting.pop(name)
+                self.failed.setdefault(joint.part, []).append(joint.name)
+        complete = (
+            part for part, names in self.failed.items() if len(names) >= self._criteria.failures
+        )
+        return next(complete, None)
+
+
+def _joint_condition(number: int) -> str:
+    """Return the condition that a joint has failed."""
+    return f"joint {number}"
+
+
+def _monitor_record(structure: Structure, criteria: Criteria) -> FailureMonitor:
+    """Return a monitor that ends a run once enough joints of one part have failed over it."""
+    assessed, ever_failed = np.flatnonzero(structure.judged), RecordCounter(structure, criteria)
+
+    def failed(state: FailureState) -> frozenset[str]:
+        return frozenset(_joint_condition(number) for number in assessed[state.failed].tolist())
+
+    def reason(conditions: frozenset[str], _: Array, step: float) -> str | None:
+        part = ever_failed.add_step(conditions, step)
+        if part is None:
+            return None
+        names = join_joint_names(ever_failed.failed[part])
+        return f"a mechanism of {part} over the record, by {names}"
+
+    scan = FailureScan(structure, criteria, assessed.tolist(), failed)
+    return FailureMonitor(scan, 1, reason)
 
 
 def resolve_criteria(criteria: Criteria | None, until: StopCondition | None) -> Criteria:

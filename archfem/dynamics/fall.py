@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem.dynamics.rigid_body.bodies import Bodies, LooseBlocks, make_bodies
+from archfem.dynamics.rigid_body.bodies import LooseBlocks, make_bodies
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.state import Batch, State
 from archfem.errors import InvalidInput
@@ -85,43 +85,50 @@ class CollapseState:
         kind: "stands", "dislocated", "partly fallen" or "fallen".
         time: time of the first frame with a lost block, None without [s].
         blocks: names of the lost blocks, in the order of the structure.
-        residual: largest displacement of a corner of any free block at the end [m].
+        displacement: largest displacement of any corner of a free block, see `Verdict` [m].
+        residual: the same at the end [m].
         resting: whether all blocks were at rest at the end; if not, more may fall.
     """
 
     kind: str
     time: float | None
     blocks: tuple[str, ...]
+    displacement: float
     residual: float
     resting: bool
 
     @property
     def text(self) -> str:
-        """Predicate of a sentence whose subject is the structure."""
-        left = f"the largest displacement left is {self.residual:.3g} m"
-        still = "" if self.resting else ", and blocks still move"
+        """Kind of collapse, with the time and the lost blocks."""
+        still = "" if self.resting else ", while blocks still move"
         if self.time is None:
-            return f"{'stands' if self.kind == 'stands' else 'stands, dislocated'}; {left}{still}"
-        names = join_names(self.blocks, "; ")
-        return f"is {self.kind}, at {self.time:.2f} s first; lost: {names}; {left}{still}"
+            return f"{self.kind}{still}"
+        return f"{self.kind}, first at {self.time:.2f} s; lost: {join_names(self.blocks)}{still}"
 
 
-def classify_collapse(structure: Structure, frames: Iterable[LooseBlocks]) -> CollapseState:
+def classify_collapse(
+    structure: Structure, frames: Iterable[LooseBlocks], start: Array | None = None
+) -> CollapseState:
     """Return the state of collapse from the positions of blocks over time.
 
     Args:
         structure: structure of free and fixed blocks.
         frames: frames of the run in order, such as those of `RigidBlockSimulation.frames`; the last
             one gives the residual displacement.
+        start: poses of all blocks from which displacements count, such as those under dead load
+            (n_blocks, 3) [m, m, rad]; by default those as built.
 
     Raises:
         InvalidInput: there is no frame.
     """
-    fill = find_yielding_blocks(structure)
-    free = [number for number in structure.free if number not in fill] or list(structure.free)
+    free = list_stones(structure)
+    start = np.zeros((len(structure.blocks), 3)) if start is None else start
+    farthest = residual = 0.0
     sizes = np.sqrt([structure.blocks[number].area for number in free])
     lost, time, last = np.zeros(len(free), dtype=bool), None, None
     for last in frames:
+        residual = _largest_displacement(structure, free, last.poses, start)
+        farthest = max(farthest, residual)
         poses = last.poses[free]
         lost |= (poses[:, 1] < -0.5 * sizes) | (np.abs(poses[:, 2]) > np.pi / 4.0)
         if time is None and lost.any():
@@ -130,12 +137,12 @@ def classify_collapse(structure: Structure, frames: Iterable[LooseBlocks]) -> Co
         raise InvalidInput(
             "a run of no frames says nothing: give those of RigidBlockSimulation.frames"
         )
-    residual = _residual_displacement(make_bodies(structure, 0.0), free, last.poses)
     numbers = [number for number, gone in zip(free, lost, strict=True) if gone]
     return CollapseState(
         _collapse_kind(structure, numbers, residual),
         time,
         tuple(structure.blocks[number].name for number in numbers),
+        farthest,
         residual,
         bool(getattr(last, "resting", False)),
     )
@@ -157,14 +164,26 @@ def _collapse_kind(
     return "partly fallen" if parts - {blocks[number].part for number in lost} else "fallen"
 
 
-def _residual_displacement(bodies: Bodies, free: list[int], poses: Array) -> float:
-    """Return the largest displacement of a corner of any free block [m]."""
-    body = np.repeat(bodies.owner, np.diff(bodies.piece_starts))
-    arms, pose = bodies.arms, poses[body]
-    c, s = np.cos(pose[:, 2]) - 1.0, np.sin(pose[:, 2])
-    x = pose[:, 0] + c * arms[:, 0] - s * arms[:, 1]
-    y = pose[:, 1] + s * arms[:, 0] + c * arms[:, 1]
-    return float(np.hypot(x, y)[np.isin(body, free)].max())
+def list_stones(structure: Structure) -> list[int]:
+    """Return the free blocks that are no backfill, or all free blocks where there are no others."""
+    fill = find_yielding_blocks(structure)
+    return [number for number in structure.free if number not in fill] or list(structure.free)
+
+
+def _largest_displacement(
+    structure: Structure, blocks: Sequence[int], poses: Array, start: Array
+) -> float:
+    """Return the largest displacement of a corner of some blocks between two poses [m]."""
+
+    def corners(block: int, pose: Array) -> Array:
+        arms = np.asarray(structure.blocks[block].points) - structure.blocks[block].centroid
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        return pose[:2] + arms @ np.array([[c, s], [-s, c]])
+
+    return max(
+        float(np.linalg.norm(corners(k, poses[k]) - corners(k, start[k]), axis=1).max())
+        for k in blocks
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,18 +224,23 @@ def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bo
     observer, stones = model.observer(), _between_stones(model.structure)
     rotations = observer.faces(observer.read(state.q))[1, stones]
     overturns = float(np.abs(rotations).max(initial=0.0)) > min_rotation
-    return overturns and not standing_state(model, state).resting
+    return overturns and not _rests(release_blocks(model, state).start)
 
 
 def simulate_fall(
-    model: Model, state: State, motion: Motion, settling_time: float = 20.0
+    model: Model, start: State, state: State, motion: Motion, settling_time: float = 20.0
 ) -> tuple[xr.Dataset, CollapseState]:
-    """Follow the loose blocks of a model until they rest, at most a time after the motion [s]."""
+    """Follow the loose blocks of a model until they rest, at most a time after the motion [s].
+
+    Displacements count from the start of the run.
+    """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + settling_time
     simulation = RigidBlockSimulation(_with_sliding_joints(model.structure))
     frames = list(simulation.frames(released.start, end, motion, spacing=0.02))
-    return _fall_dataset(frames, motion, released), classify_collapse(model.structure, frames)
+    poses, _ = model.rigid_motions(start.q, start.velocity)
+    fall = classify_collapse(model.structure, frames, poses)
+    return _fall_dataset(frames, motion, released), fall
 
 
 def _fall_dataset(
@@ -246,11 +270,16 @@ def _fall_dataset(
     )
 
 
-def standing_state(model: Model, state: State, rest_speed: float = 5e-4) -> CollapseState:
-    """Return the state of collapse of a structure without separated blocks; speed in [m/s]."""
+def standing_state(model: Model, start: State, state: State) -> CollapseState:
+    """Return the state of collapse of a structure without separated blocks."""
     loose = release_blocks(model, state).start
-    resting = bool(np.abs(loose.velocities[:, :2]).max() <= rest_speed)
-    return replace(classify_collapse(model.structure, [loose]), resting=resting)
+    poses, _ = model.rigid_motions(start.q, start.velocity)
+    return replace(classify_collapse(model.structure, [loose], poses), resting=_rests(loose))
+
+
+def _rests(loose: LooseBlocks, rest_speed: float = 5e-4) -> bool:
+    """Return whether no block moves faster than a speed [m/s]."""
+    return bool(np.abs(loose.velocities[:, :2]).max() <= rest_speed)
 
 
 def _with_sliding_joints(structure: Structure, friction: float = 0.6) -> Structure:

@@ -1,5 +1,6 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -15,14 +16,21 @@ from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.fall import CollapseState
-from archfem.dynamics.run_text import extremes_text, mechanism_text, one_line
+from archfem.dynamics.verdict import (
+    MECHANISM_DEFINITIONS,
+    PUBLISHED_DEFINITION,
+    Verdict,
+    brief_mechanism_remarks,
+    detect_mechanisms,
+    extremes_remark,
+    total_duration_remark,
+)
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria, step_lengths, with_failure_flags
+from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import select_joint, write_joint_table
 from archfem.limit.mechanism_count import (
     Mechanism,
     counted_mechanism,
-    counted_mechanisms,
     demirel_aldemir_mechanism,
 )
 from archfem.limit.mechanism_kinematics import (
@@ -31,19 +39,13 @@ from archfem.limit.mechanism_kinematics import (
     verified_mechanism,
 )
 from archfem.masonry.structure import Structure
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model
 
 SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
     "higher block slips toward the extrados; rotation > 0 opens the intrados; "
     "gravity along -y; displacements relative to the ground"
 )
-
-MECHANISM_DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
-"""Definitions of a mechanism, in the order of tables."""
-
-# Criterion of `demirel_aldemir_mechanism`, satisfied whenever "four in a ring" is
-PUBLISHED_DEFINITION = "Demirel and Aldemir"
 
 
 class Ending(StrEnum):
@@ -150,15 +152,26 @@ class History(ResultDisplay):
         return Ending(self.dataset.attrs["ended"])
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings on the validity of the run, one sentence each.
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Reasons why the run may be wrong, each with its remedy.
 
         They concern energy drift above 5 % at any step, rotations and displacements too large for
-        a model of small displacements, a fidelity that does not suit a block, and a predicted error
-        above its tolerance. Files of earlier versions have none.
+        a model of small displacements, damping that drags loose blocks, a missed tolerance of the
+        steps, a fidelity that does not suit a block, and a predicted error above its tolerance.
         """
-        text = str(self.dataset.attrs.get("doubts", ""))
-        return tuple(words for words in text.split("\n") if words)
+        lines = str(self.dataset.attrs.get("doubts", "")).splitlines()
+        return tuple(
+            Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)
+        )
+
+    def with_doubts(self, doubts: Iterable[Doubt]) -> "History":
+        """Return the same run with other doubts.
+
+        Args:
+            doubts: doubts in place of those of the run; repeated ones count once.
+        """
+        text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in dict.fromkeys(doubts))
+        return History(self.dataset.assign_attrs(doubts=text), self.structure)
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
@@ -199,47 +212,43 @@ class History(ResultDisplay):
             str(attrs["fall"]),
             None if np.isnan(time) else time,
             tuple(name for name in str(attrs["fall_blocks"]).split("\n") if name),
+            float(attrs.get("displacement", np.nan)),
             float(attrs["fall_residual"]),
             bool(attrs["fall_resting"]),
         )
 
     @cached_property
-    def verdict(self) -> str:
-        """Assessment of the run: a sentence on extremes, and a line for each mechanism.
-
-        The sentence states the largest hinge rotation, slip and displacement, and the residual
-        displacement. The lines state the first mechanism by count, by Demirel and Aldemir and, if
-        the history has its structure, verified, with duration and opening, and whether earlier ones
-        were too short to count. Warnings, and an outcome other than the end of the motion, precede.
-        """
-        names = None
-        if self.structure is not None:
-            names = [block.name for block in self.structure.blocks]
-        attrs = self.dataset.attrs
+    def verdict(self) -> Verdict:
+        """Assessment of the run; `str(run.verdict)` describes it in words."""
+        attrs, joints = self.dataset.attrs, self.joints
+        mechanisms = detect_mechanisms(joints, self.structure)
+        if self.fall is not None:
+            outcome = self.fall.kind
+        elif attrs.get("displacements") == "large":
+            outcome = "unknown"
+        else:
+            outcome = "mechanism" if any(mechanisms.values()) else "no mechanism"
         finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
-        lines = ["" if self.fall is None else f"the structure {self.fall.text}"]
-        lines += [f"in doubt: {words}" for words in self.warnings]
-        lines += ["" if finished else f"outcome: {self.outcome}", extremes_text(self.dataset)]
-        lines += mechanism_text(self.joints, self._first, names, self._first_of_any_duration)
-        return "\n".join(line for line in lines if line)
-
-    @property
-    def _first(self) -> dict[str, Mechanism | None]:
-        """First mechanism, or None, by each method of detection."""
-        first = {"by count": self.mechanism, "by Demirel and Aldemir": self.demirel_aldemir}
-        if self.structure is not None:
-            first["verified"] = None if self.verified is None else self.verified.moved
-        return first
-
-    @property
-    def _first_of_any_duration(self) -> dict[str, Mechanism | None]:
-        """First mechanisms by each method without a minimum duration."""
-        if step_lengths(self.time).min() >= self.criteria.duration:
-            return self._first
-        return self.with_criteria(replace(self.criteria, duration=0.0))._first
+        remarks = [] if finished else [f"the run {self.outcome}"]
+        remarks += extremes_remark(self.dataset)
+        remarks += brief_mechanism_remarks(joints, self.structure, mechanisms)
+        if mechanisms["any joints at once"] is not None:
+            remarks.append(total_duration_remark(joints))
+        return Verdict(
+            outcome=outcome,
+            doubts=self.doubts,
+            displacement=float(attrs.get("displacement", np.nan)),
+            residual=float(attrs.get("residual", np.nan)),
+            mechanisms=mechanisms,
+            fall=self.fall,
+            remarks=tuple(remarks),
+        )
 
     def _summary(self) -> str:
-        return one_line(self.dataset)
+        title, times = self.dataset.attrs.get("title", ""), self.time
+        return (
+            f"History '{title}': {len(times)} records to {times[-1]:.4g} s; {self.verdict.headline}"
+        )
 
     def joint(self, joint: str | int) -> xr.Dataset:
         """Return the variables of one joint over time.
@@ -392,7 +401,10 @@ def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure
 
 def with_fall(history: History, fall: CollapseState) -> History:
     """Return a history with the state of collapse at its end."""
+    attrs = history.dataset.attrs
     dataset = history.dataset.assign_attrs(
+        displacement=max(float(attrs["displacement"]), fall.displacement),
+        residual=fall.residual,
         fall=fall.kind,
         fall_time=np.nan if fall.time is None else fall.time,
         fall_blocks="\n".join(fall.blocks),
@@ -419,9 +431,10 @@ def partial_history(error: DidNotConverge) -> History:
 def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str, Mechanism | None]:
     """Find the first mechanism of a run by each definition.
 
-    - "any four joints": four joints of rings and piers, anywhere, hinge or slide at once;
-    - "four in a ring": four of one ring do, whatever else fails (local);
-    - "ring and pier": four of one ring and one pier do, at least one of each (semi-global);
+    - "any joints at once": four joints of rings and piers, anywhere, hinge or slide at once;
+    - "one part at once": four of one ring or one pier do, whatever else fails (local);
+    - "ring and pier at once": four of one ring and one pier do, at least one of each (semi-global);
+    - "one part over the record": four of one ring or one pier do, each at some time;
     - "verified": the failed joints permit a motion of rings or piers, however many they are;
     - "Demirel and Aldemir": as they word it, four of one ring, its class by the failures of piers.
 
@@ -443,25 +456,17 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
             "this history has no structure, which a verified mechanism needs: read it with "
             "History.read(path, structure)"
         )
-    joints = with_failure_flags(run.joints, criteria)
-    motion = first_verified_mechanism(run.structure, joints)
-    return {
-        **counted_mechanisms(joints),
-        "verified": None if motion is None else motion.moved,
-        PUBLISHED_DEFINITION: demirel_aldemir_mechanism(joints),
-    }
+    judged = run if criteria is None else run.with_criteria(criteria)
+    found = {name: judged.verdict.mechanisms.get(name) for name in MECHANISM_DEFINITIONS}
+    found[PUBLISHED_DEFINITION] = judged.verdict.mechanisms[PUBLISHED_DEFINITION]
+    return {name: detected and detected.mechanism for name, detected in found.items()}
 
 
 def corner_displacements(model: Model, fields: Array) -> xr.Dataset:
     """Return the displacements of the corners of the free blocks, for each row of coordinates."""
     structure, cells = model.structure, model.cells
-    points, names = [], []
-    for number in structure.free:
-        block = structure.blocks[number]
-        nodes = np.flatnonzero(cells.block == number)
-        for corner in block.points:
-            points.append(nodes[np.linalg.norm(cells.places[nodes] - corner, axis=1).argmin()])
-            names.append(block.name)
+    points = cells.corners(structure)
+    names = [structure.blocks[number].name for number in cells.block[points]]
     displacements = np.array([cells.displacement(q)[points] for q in fields])
     x, y = cells.places[points].T
     return xr.Dataset(

@@ -31,7 +31,7 @@ from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import Structure
 from archfem.models import builder as plain
 from archfem.models.discretisation import Discretisation
-from archfem.models.model import Model, Prediction
+from archfem.models.model import Doubt, Model, Prediction
 from archfem.models.rigid import build_rigid_model
 from archfem.motion.motion import Motion
 
@@ -220,10 +220,10 @@ def select_model(
     prediction = Prediction(
         *(error, step_error, tolerance, steps.dt, steps.step_tolerance, candidates, small, spread)
     )
-    model, warnings = model.with_prediction(prediction), _warnings(prediction, model_error, allowed)
-    for words in warnings:
-        logger.warning("%s", words)
-    model.warnings = (*model.warnings, *warnings)
+    model, doubts = model.with_prediction(prediction), _doubts(prediction, model_error, allowed)
+    for doubt in doubts:
+        logger.warning("%s", doubt)
+    model.doubts = (*model.doubts, *doubts)
     return model
 
 
@@ -293,22 +293,25 @@ def _candidate_models(
             yield settings, model, estimator.model_error(model, steps)
 
 
-def _warnings(prediction: Prediction, model_error: float, allowed: float) -> list[str]:
-    """Return warnings on a selection, with remedies."""
-    warnings = []
+def _doubts(prediction: Prediction, model_error: float, allowed: float) -> list[Doubt]:
+    """Return doubts about a selection."""
+    doubts = []
     if not prediction.is_met:
-        warnings.append(_unmet_tolerance(prediction, model_error, allowed))
+        doubts.append(_doubt_unmet_tolerance(prediction, model_error, allowed))
     error, tolerance = prediction.small_displacement_error, prediction.tolerance
     if error > tolerance:
         effect = f"errs by {error:.2g} in |e|" if error < 1.0 else "lets stand what falls"
-        warnings.append(
-            f"to take displacements as small {effect}, and the tolerance is {tolerance:g}: joints "
-            "turn and slide too far; build(…, displacements='large') follows them"
+        doubts.append(
+            Doubt(
+                f"to take displacements as small {effect}, and the tolerance is {tolerance:g}: "
+                "joints turn and slide too far",
+                "build(…, displacements='large') follows them",
+            )
         )
-    return warnings
+    return doubts
 
 
-def _unmet_tolerance(prediction: Prediction, model_error: float, allowed: float) -> str:
+def _doubt_unmet_tolerance(prediction: Prediction, model_error: float, allowed: float) -> Doubt:
     """Return why a tolerance is not met, and the remedy."""
     if prediction.chaotic_spread > max(model_error, allowed):
         remedy = (
@@ -321,4 +324,4 @@ def _unmet_tolerance(prediction: Prediction, model_error: float, allowed: float)
         remedy = "the time step errs: leave dt out, and steps choose their length"
     else:
         remedy = "no shorter steps are tried: results of impacts depend on more than the steps"
-    return f"no setting meets the tolerance; the best is {prediction.text}; {remedy}"
+    return Doubt(f"no setting meets the tolerance; the best is {prediction.text}", remedy)

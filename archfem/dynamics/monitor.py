@@ -19,11 +19,12 @@ import logging
 
 import numpy as np
 from scipy import sparse
+from scipy.integrate import trapezoid
 
 from archfem._typing import Array
-from archfem.dynamics.state import Batch, State
+from archfem.dynamics.state import Batch
 from archfem.errors import DidNotConverge
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model, Observer
 
 logger = logging.getLogger("archfem")
 
@@ -38,8 +39,8 @@ ENERGY_DRIFT_ERROR = 0.5
 # six arches and columns was wrong by 0.01 to 0.03
 SMALL_ROTATION_LIMIT = 0.01
 
-# Steps between two checks of the displacements of all points
-DISPLACEMENT_CHECK_INTERVAL = 32
+# Steps between two checks of the slip of paired facets
+FACET_CHECK_INTERVAL = 32
 
 
 class EnergyMeter:
@@ -84,7 +85,7 @@ class EnergyBalance:
 
     def __init__(self, kinetic: float, potential: float) -> None:
         self._stored = kinetic + potential
-        self._work = self._loss = 0.0
+        self._work = self.loss = 0.0
         # Smaller exchanges than 1e-3 of the energy stored under self-weight are neglected: forces
         # vary with its root, that is by 3 % of the weight
         self.largest_exchange = max(kinetic, 1e-3 * abs(potential), 1e-300)
@@ -93,24 +94,58 @@ class EnergyBalance:
         """Add steps; return the drift at each [J], and relative to the largest exchange [-]."""
         kinetic, potential, work, loss = steps.T
         change = kinetic + potential - self._stored
-        works, losses = self._work + np.cumsum(work), self._loss + np.cumsum(loss)
+        works, losses = self._work + np.cumsum(work), self.loss + np.cumsum(loss)
         drift: Array = change - works + losses
-        self._work, self._loss = works[-1], losses[-1]
+        self._work, self.loss = works[-1], losses[-1]
         exchanged = np.max([kinetic, np.abs(change), np.abs(works), losses], axis=0)
         largest = np.maximum.accumulate(np.maximum(exchanged, self.largest_exchange))
         self.largest_exchange = float(largest[-1])
         return drift, drift / largest
 
 
-class RunMonitor:
-    """Validity checks of a run: one warning per kind, and an error once the run is wrong."""
+class CornerDisplacements:
+    """Largest and present displacement of each free block's corners, from the start of a run."""
 
-    def __init__(self, model: Model, start: Batch, *, damps: bool = False) -> None:
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+        self.blocks, self._first = np.unique(observer.corner_blocks, return_index=True)
+        self._start: Array | None = None
+
+    def add(self, times: Array, readings: Array) -> None:
+        """Add the readings of the next steps (steps, r)."""
+        corners = self._observer.corners(readings)
+        if self._start is None:
+            self._start, self.time = corners[0], np.full(len(self.blocks), times[0])
+            self._square = np.zeros(len(self.blocks))
+        # squares are compared, since their order is that of the distances
+        squares = np.square(corners - self._start).sum(axis=-1)
+        squares = np.maximum.reduceat(squares, self._first, axis=1)
+        farthest = squares.argmax(axis=0)
+        largest = squares[farthest, np.arange(len(farthest))]
+        self.time = np.where(largest > self._square, times[farthest], self.time)
+        self._square, self._last = np.maximum(largest, self._square), squares[-1]
+
+    @property
+    def largest(self) -> Array:
+        """Largest displacement of a corner of each free block (blocks,) [m]."""
+        return np.sqrt(self._square)
+
+    @property
+    def residual(self) -> Array:
+        """Displacement of the farthest corner of each free block at the last step (blocks,) [m]."""
+        return np.sqrt(self._last)
+
+
+class RunMonitor:
+    """Validity checks of a run: one doubt per kind, and an error once the run is wrong."""
+
+    def __init__(
+        self, model: Model, start: Batch, *, damps: bool = False, mass_damping: float = 0.0
+    ) -> None:
         self.model = model
         # largest drift at any step, relative to the largest exchange until then [-]
         self.worst_drift, self._worst_time = 0.0, 0.0
-        # of the middle of any block at any step, and of any point at the periodic checks [m]
-        self.largest_displacement = 0.0
+        self.displacements = CornerDisplacements(model.observer())
         self.largest_turn = 0.0  # of any joint at any step [rad]
         self._balance = EnergyBalance(*start.energy[0, :2])
         self._damps = damps  # whether the scheme has numerical damping, so that losses are expected
@@ -121,12 +156,25 @@ class RunMonitor:
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
-        self._warnings = {f"model {k}": words for k, words in enumerate(model.warnings)}
+        self._doubts = {f"model {k}": doubt for k, doubt in enumerate(model.doubts)}
+        self._mass_damping = mass_damping  # coefficient of the mass matrix [1/s]
+        self._mass_damping_loss = 0.0  # [J]
+        self._kinetic = start.energy[0, 0]
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings so far, those of the model included, one sentence each."""
-        return tuple(self._warnings.values())
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Doubts so far, those of the model included."""
+        return tuple(self._doubts.values())
+
+    @property
+    def largest_displacement(self) -> float:
+        """Largest displacement of any corner from the start of the run [m]."""
+        return float(self.displacements.largest.max())
+
+    @property
+    def mass_damping_share(self) -> float:
+        """Energy lost to damping proportional to mass, over all losses [-]."""
+        return self._mass_damping_loss / max(self._balance.loss, 1e-300)
 
     def add(self, batch: Batch, readings: Array) -> Array:
         """Add the next steps and return the energy drift at each (steps,) [J]."""
@@ -141,24 +189,24 @@ class RunMonitor:
             if len(beyond):
                 first = int(beyond[0])
                 self._drift_error = float(batch.times[first]), float(fractions[first])
-        largest = float(np.linalg.norm(self._observer.middles(readings), axis=-1).max())
-        self.largest_displacement = max(self.largest_displacement, largest)
+        self.displacements.add(batch.times, readings)
+        if self._mass_damping:
+            # the power is a v·M v, with v·M v twice the kinetic energy
+            kinetic = np.append(self._kinetic, batch.energy[:, 0])
+            times = np.append(self._last.time, batch.times)
+            power = 2.0 * self._mass_damping * kinetic
+            self._mass_damping_loss += float(trapezoid(power, times))
+            self._kinetic = kinetic[-1]
         if self._small:
             rotation = float(np.abs(self._observer.faces(readings)[:, 1]).max())
             self.largest_turn = max(self.largest_turn, rotation)
-        # displacements of all points cost a sparse product, hence not at every step
-        offset = -self._steps % DISPLACEMENT_CHECK_INTERVAL
-        for k in range(offset, len(batch.times), DISPLACEMENT_CHECK_INTERVAL):
-            self._measure_points(batch.state(k))
+        # facets cost a sparse product, hence not at every step
+        for k in range(-self._steps % FACET_CHECK_INTERVAL, len(batch.times), FACET_CHECK_INTERVAL):
+            slip = self.model.face_mismatch(batch.state(k).q)
+            self._mismatch = max(self._mismatch, slip)
         self._steps += len(batch.times)
         self._before, self._last = self._last, batch.state(len(batch.times) - 1)
         return drift
-
-    def _measure_points(self, state: State) -> None:
-        """Update the largest displacement of any point, and the slip of paired facets."""
-        largest = np.abs(self.model.cells.displacement(state.q)).max()
-        self.largest_displacement = max(self.largest_displacement, float(largest))
-        self._mismatch = max(self._mismatch, self.model.face_mismatch(state.q))
 
     def check_run(self) -> None:
         """Raise an error if the steps added are wrong, and warn if they are doubtful."""
@@ -193,29 +241,29 @@ class RunMonitor:
         """Warn of energy drift."""
         if abs(self.worst_drift) > ENERGY_DRIFT_WARNING:
             change = "had come from nowhere" if self.worst_drift > 0.0 else "was lost to the scheme"
-            self._warn(
+            self._add_doubt(
                 "energy",
                 f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst_drift):.0%} of "
-                f"the largest exchanged {change}; compare with the scheme Conserving, with a "
-                "smaller dt, or with more damping",
+                f"the largest exchanged {change}",
+                "compare with the scheme Conserving, with a smaller dt, or with more damping",
             )
 
     def _check_small_displacements(self, time: float) -> None:
         """Warn of rotations and displacements that are not small."""
         if self.largest_turn > SMALL_ROTATION_LIMIT:
-            self._warn(
+            self._add_doubt(
                 "turn",
                 f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
-                "displacements as small errs by 0.01 and more in |e| there; compare with "
-                "build(…, displacements='large')",
+                "displacements as small errs by 0.01 and more in |e| there",
+                "compare with build(…, displacements='large')",
             )
         if self.largest_displacement > self._depth:
-            self._warn(
+            self._add_doubt(
                 "displacement",
                 f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
                 f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
-                "displacements that this model assumes; read it as collapse, or follow it with "
-                "build(…, displacements='large')",
+                "displacements that this model assumes",
+                "read it as collapse, or follow it with build(…, displacements='large')",
             )
 
     def _check_facets(self, time: float, doubtful: float = 0.1) -> None:
@@ -223,17 +271,19 @@ class RunMonitor:
         slip, name = self._mismatch
         if slip <= doubtful:
             return
-        words = (
+        doubt = Doubt(
             f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
-            "they are paired as meshed: take fewer cells, fidelity 'faces' or 'rigid' for stones, "
-            "or cut the fill with jointed_fill"
+            "they are paired as meshed",
+            "take fewer cells, fidelity 'faces' or 'rigid' for stones, or cut the fill with "
+            "jointed_fill",
         )
         if slip > 1.0:
-            raise DidNotConverge(words, last=self._before)
-        self._warn("facets", words)
+            raise DidNotConverge(str(doubt), last=self._before)
+        self._add_doubt("facets", doubt.cause, doubt.remedy)
 
-    def _warn(self, kind: str, words: str) -> None:
-        """Log the first warning of a kind in a run, and store the latest."""
-        if kind not in self._warnings:
-            logger.warning("%s", words)
-        self._warnings[kind] = words
+    def _add_doubt(self, kind: str, cause: str, remedy: str) -> None:
+        """Log the first doubt of a kind in a run, and store the latest."""
+        doubt = Doubt(cause, remedy)
+        if kind not in self._doubts:
+            logger.warning("%s", doubt)
+        self._doubts[kind] = doubt

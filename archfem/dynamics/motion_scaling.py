@@ -18,7 +18,6 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import (
-    MECHANISM_DEFINITIONS,
     Ending,
     first_mechanisms,
     partial_history,
@@ -26,6 +25,7 @@ from archfem.dynamics.history import (
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism

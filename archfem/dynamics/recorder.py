@@ -10,12 +10,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
+from archfem.dynamics.fall import list_stones
 from archfem.dynamics.history import SIGN_CONVENTION, Ending, History, corner_displacements
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset
-from archfem.models.model import Model, Observer
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
 _EFFORT_ATTRIBUTES = {
@@ -48,41 +49,6 @@ class GrowingArray:
         return self._array[: self.count]
 
 
-class BlockDisplacements:
-    """Largest and residual displacement of each block's middle, from the start of a run."""
-
-    def __init__(self, observer: Observer) -> None:
-        self._observer = observer
-        self._start: Array | None = None
-
-    def add(self, times: Array, readings: Array) -> None:
-        """Add the readings of the next steps (steps, r)."""
-        middles = self._observer.middles(readings)
-        if self._start is None:
-            blocks = middles.shape[1]
-            self._start, self._when = middles[0], np.full(blocks, times[0])
-            self._square = np.zeros(blocks)
-        # squares are compared, since their order is that of the distances
-        squares = np.square(middles - self._start).sum(axis=-1)
-        farthest = squares.argmax(axis=0)
-        largest = squares[farthest, np.arange(len(farthest))]
-        self._when = np.where(largest > self._square, times[farthest], self._when)
-        self._square, self._last = np.maximum(largest, self._square), squares[-1]
-
-    def to_variables(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
-        """Return variables of a dataset over block."""
-        subject = "displacement of its middle"
-        columns = {
-            "largest_displacement": (np.sqrt(self._square), "m", f"largest {subject}"),
-            "largest_displacement_time": (self._when, "s", f"time of the largest {subject}"),
-            "residual_displacement": (np.sqrt(self._last), "m", f"{subject} at the end"),
-        }
-        return {
-            name: ("block", values, {"units": units, "long_name": text})
-            for name, (values, units, text) in columns.items()
-        }
-
-
 @dataclass(kw_only=True)
 class Recorder:
     """Record of a run from its start, with its validity checks."""
@@ -109,7 +75,6 @@ class Recorder:
         joints = len(self.model.structure.joints)
         self._observer = self.model.observer()
         self._faces = GrowingArray(records, (3, joints))
-        self._displacements = BlockDisplacements(self._observer)
         self._resultants = GrowingArray(records, (joints, 3))
         self._frames, self._fields = GrowingArray(frames), GrowingArray(frames, (self.model.size,))
 
@@ -118,7 +83,6 @@ class Recorder:
         self.state = batch.state(len(batch.times) - 1)
         readings = batch.read(self._observer)
         drift = self.monitor.add(batch, readings)
-        self._displacements.add(batch.times, readings)
         numbers = self._drift.count + np.arange(len(batch.times))
         due = numbers % self.every == 0
         due[-1] |= last
@@ -149,7 +113,7 @@ class Recorder:
             structure, resultants, times, self.criteria, faces=faces, moved=moved
         )
         attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
-        variables: dict[str, Any] = self._displacements.to_variables()
+        variables: dict[str, Any] = self._block_displacements()
         variables["ground"] = ("time", "axis"), motion.at(times), attributes
         for (name, attrs), values in zip(_EFFORT_ATTRIBUTES.items(), self._effort(), strict=True):
             variables[name] = "time", values, attrs
@@ -158,11 +122,45 @@ class Recorder:
         ).assign(variables)
         dataset = self._with_coordinates(dataset)
         dataset.attrs |= self._attributes(motion, ending, outcome)
-        return History(dataset, structure)
+        history = History(dataset, structure)
+        return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
+
+    def _block_displacements(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
+        """Return variables over block; fixed blocks do not move."""
+        displacements = self.monitor.displacements
+        subject = "displacement of its farthest corner"
+        columns = {
+            "largest_displacement": (displacements.largest, "m", f"largest {subject}"),
+            "largest_displacement_time": (
+                displacements.time,
+                "s",
+                f"time of the largest {subject}",
+            ),
+            "residual_displacement": (displacements.residual, "m", f"{subject} at the end"),
+        }
+        variables = {}
+        for name, (values, units, text) in columns.items():
+            of_all = np.zeros(len(self.model.structure.blocks))
+            of_all[displacements.blocks] = values
+            variables[name] = "block", of_all, {"units": units, "long_name": text}
+        return variables
+
+    def _doubt_mass_damping(self, dataset: xr.Dataset) -> list[Doubt]:
+        """Return a doubt where joints opened and damping drags loose blocks."""
+        share = self.monitor.mass_damping_share
+        opens = bool((dataset["open"] | (dataset["hinge"] != 0)).any())
+        if not share or not opens:
+            return []
+        cause = (
+            "damping has a part proportional to mass, which also drags loose blocks, and joints "
+            f"opened: that part took {share:.0%} of the energy lost"
+        )
+        return [Doubt(cause, "use effective_damping(model, ratio) or StiffnessDamping")]
 
     def _attributes(self, motion: Motion, ending: Ending, outcome: str) -> dict[str, Any]:
         """Return the scalar results and settings of the run."""
         structure, monitor, smallest = self.model.structure, self.monitor, self._smallest.values
+        stones = np.isin(monitor.displacements.blocks, list_stones(structure))
         attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
             "motion": motion.name,
@@ -173,9 +171,10 @@ class Recorder:
             "method": self.method,
             "last_time": self.state.time,
             "energy_drift": monitor.worst_drift,
-            "largest_displacement": monitor.largest_displacement,
+            "displacements": "large" if self.model.large_displacements else "small",
+            "displacement": float(monitor.displacements.largest[stones].max()),
+            "residual": float(monitor.displacements.residual[stones].max()),
             "largest_turn": monitor.largest_turn,
-            "doubts": "\n".join(monitor.warnings),
             # halved steps are dt/2 or shorter; 0.75 lies clear of round-off
             "halved_steps": int(np.sum(smallest < 0.75 * self.dt)) if self.dt else 0,
             "shortest_step": float(smallest[1:].min(initial=np.inf)),

@@ -43,7 +43,7 @@ from archfem.dynamics.solvers.selection import stepper_for
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.models.model import Model, check_model
+from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.newton import Newton
@@ -184,23 +184,38 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     history = recorder.build_history(motion, ending, outcome)
     if adaptive is not None:
         history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": adaptive.unmet_share}
+        history = history.with_doubts((*history.doubts, *_doubt_tolerance(history)))
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
-    return _follow_fall(history, model, recorder.state, motion)
+    return _follow_fall(history, model, start, recorder.state, motion)
 
 
-def _follow_fall(history: History, model: Model, state: State, motion: Motion) -> History:
+def _follow_fall(
+    history: History, model: Model, start: State, state: State, motion: Motion
+) -> History:
     """Add the fall of separated or overturning blocks, and the state of collapse, to a history."""
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
     if history.ending is not Ending.PARTED and not tilts:
-        return with_fall(history, standing_state(model, state))
+        return with_fall(history, standing_state(model, start, state))
     try:
-        frames, fall = simulate_fall(model, state, motion)
+        frames, fall = simulate_fall(model, start, state, motion)
     except DidNotConverge as error:
         error.history = history
         raise
     dataset = history.dataset.merge(frames).assign_attrs(history.dataset.attrs | frames.attrs)
     return with_fall(History(dataset, history.structure), fall)
+
+
+def _doubt_tolerance(history: History, admissible: float = 0.02) -> list[Doubt]:
+    """Return a doubt where the tolerance of the steps was missed in more than a share of them."""
+    attrs = history.dataset.attrs
+    if attrs["tolerance_unmet"] <= admissible:
+        return []
+    cause = (
+        f"the shortest steps erred by more than {attrs['tolerance']:g} in |e| in "
+        f"{attrs['tolerance_unmet']:.0%} of the run"
+    )
+    return [Doubt(cause, "compare with a constant dt of 0.1 ms or less, or with more damping")]
 
 
 def _resolve_steps(
@@ -253,7 +268,12 @@ def _make_recorder(
         every=record.every,
         fields_every=record.fields_every,
         criteria=criteria,
-        monitor=RunMonitor(model, first, damps=isinstance(stepper.equation.scheme, HHT)),
+        monitor=RunMonitor(
+            model,
+            first,
+            damps=isinstance(stepper.equation.scheme, HHT),
+            mass_damping=stepper.equation.drag,
+        ),
         state=start,
     )
 

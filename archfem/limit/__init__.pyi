@@ -10,6 +10,7 @@ from .mechanism_count import counted_mechanism as counted_mechanism
 from .mechanism_count import counted_mechanisms as counted_mechanisms
 from .mechanism_count import demirel_aldemir_mechanism as demirel_aldemir_mechanism
 from .mechanism_count import episode as episode
+from .mechanism_count import mechanism_over_record as mechanism_over_record
 from .mechanism_kinematics import VerifiedMechanism as VerifiedMechanism
 from .mechanism_kinematics import Verifier as Verifier
 from .mechanism_kinematics import first_verified_mechanism as first_verified_mechanism

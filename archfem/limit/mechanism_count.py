@@ -1,4 +1,4 @@
-"""Mechanisms by counting failed joints: classes, first instant, duration and opening.
+"""Mechanisms by counting failed joints, at once or over a record: classes, duration, opening.
 
 Most mechanisms by count close again before anything falls; `episode` follows one from its first
 instant. `mechanism_kinematics` checks whether the failed joints permit a motion.
@@ -27,6 +27,9 @@ from archfem.units import mm
 
 # Classes of mechanisms, from narrow to wide
 MECHANISM_KINDS = ("local", "semi-global", "global")
+
+# Definition by which a joint that has once failed counts from then on
+OVER_RECORD = "one part over the record"
 
 
 @dataclass(frozen=True)
@@ -133,8 +136,7 @@ def demirel_aldemir_mechanism(
     One ring must have four hinging or sliding joints of its own at once; then it has collapsed
     locally. Where joints of piers have failed too, the mechanism is semi-global or global. Joints
     of a pier thus change the class, and never help to make up the four, as they do in
-    `counted_mechanism`. So it begins at the very instant of "four in a ring" of
-    `counted_mechanisms`. Open points of the paper are read so: a joint counts once, though it
+    `counted_mechanism`. Open points of the paper are read so: a joint counts once, though it
     hinges and slides; one that has come apart, whose ratios are beyond any limit, counts as failed;
     with joints of one pier it is semi-global, with joints of more global. The number four is that
     of the criteria, and their hinge is at |e| = 0.46, 8 % short of the 0.5 of the paper's equation,
@@ -168,14 +170,45 @@ def demirel_aldemir_mechanism(
     return _mechanism(flags, instant, MECHANISM_KINDS[min(len(piers), 2)], group)
 
 
+def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) -> Mechanism | None:
+    """Find the instant at which enough joints of one ring or one pier have failed so far.
+
+    A joint that has once failed, for the duration of the criteria, counts from then on, whether or
+    not it has closed again. The joints need never have failed at once, so that this is a measure of
+    damage over a record, and the widest of all definitions.
+
+    Args:
+        joints: over joint, or over time and joint; those of rings and piers are counted.
+        criteria: by default those by which the joints were judged already.
+
+    Returns:
+        The mechanism, "local", with the joints that have failed until its time, or None.
+    """
+    joints = with_failure_flags(joints, criteria)
+    limits, flags = Criteria.of(joints), _flags_over_time(joints)
+    failed = np.logical_or.accumulate(_lasting_flags(flags, limits.duration), axis=0)
+    flags = flags.copy(data=failed)
+    counts = _count_by_part(flags, select_assessed_parts(part_roles(joints)))
+    instants = {
+        part: int(np.argmax(count >= limits.failures))
+        for part, count in counts.items()
+        if count[-1] >= limits.failures
+    }
+    if not instants:
+        return None
+    part = min(instants, key=lambda name: instants[name])
+    return _mechanism(flags, instants[part], "local", [part])
+
+
 def counted_mechanisms(
     joints: xr.Dataset, criteria: Criteria | None = None
 ) -> dict[str, Mechanism | None]:
     """Find the first mechanism by each of the definitions in use that count joints.
 
-    "Any four joints" are of rings and piers, anywhere; "four in a ring" of one ring, regardless of
-    further failures; "ring and pier" four of one ring and one pier together, at least one of each.
-    The number four is that of the criteria.
+    "Any joints at once" are of rings and piers, anywhere; "one part at once" of one ring or one
+    pier, regardless of further failures; "ring and pier at once" of one ring and one pier together,
+    at least one of each; "one part over the record" of one ring or one pier at any times, see
+    `mechanism_over_record`. How many joints make a mechanism is set by the criteria.
 
     Args:
         joints: over joint, or over time and joint.
@@ -185,11 +218,11 @@ def counted_mechanisms(
         The first mechanism by each definition, or None, by the definition's name.
     """
     joints = with_failure_flags(joints, criteria)
-    rings = joints["role"].values.astype(str) == "ring"
     return {
-        "any four joints": counted_mechanism(joints),
-        "four in a ring": counted_mechanism(joints.isel(joint=rings), kinds=("local",)),
-        "ring and pier": counted_mechanism(joints, kinds=("semi-global",)),
+        "any joints at once": counted_mechanism(joints),
+        "one part at once": counted_mechanism(joints, kinds=("local",)),
+        "ring and pier at once": counted_mechanism(joints, kinds=("semi-global",)),
+        OVER_RECORD: mechanism_over_record(joints),
     }
 
 
@@ -232,16 +265,15 @@ def matching_definitions(
     count: Mapping[str, int], roles: Mapping[str, str], failures: int
 ) -> frozenset[str]:
     """Return the definitions of `counted_mechanisms` that failed joints meet at an instant."""
-    rings = {name: number for name, number in count.items() if roles[name] == "ring"}
     definitions = {
-        "any four joints": (count, MECHANISM_KINDS),
-        "four in a ring": (rings, ("local",)),
-        "ring and pier": (count, ("semi-global",)),
+        "any joints at once": MECHANISM_KINDS,
+        "one part at once": ("local",),
+        "ring and pier at once": ("semi-global",),
     }
     return frozenset(
         name
-        for name, (counted, kinds) in definitions.items()
-        if _widest_group(counted, roles, failures, kinds) is not None
+        for name, kinds in definitions.items()
+        if _widest_group(count, roles, failures, kinds) is not None
     )
 
 
@@ -253,6 +285,18 @@ def _flags_over_time(joints: xr.Dataset) -> xr.DataArray:
     if "time" not in flags.dims:
         flags = flags.expand_dims("time")
     return flags if flags.dims == ("time", "joint") else flags.transpose("time", "joint")
+
+
+def _lasting_flags(flags: xr.DataArray, duration: float) -> NDArray[np.bool_]:
+    """Return whether each joint has by then failed for a duration [s] unbroken (steps, joints)."""
+    failed = flags.values
+    if len(failed) == 1:
+        return failed
+    elapsed = np.cumsum(failed * step_lengths(flags["time"].values)[:, None], axis=0)
+    # time failed until the last record at which the joint had not
+    unbroken = elapsed - np.maximum.accumulate(np.where(failed, 0.0, elapsed), axis=0)
+    # a sum of steps may fall short of the duration by round-off
+    return failed & (unbroken >= (1.0 - 1e-6) * duration)
 
 
 def _count_by_part(flags: xr.DataArray, parts: Iterable[str]) -> dict[str, NDArray[np.int64]]:

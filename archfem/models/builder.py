@@ -9,7 +9,7 @@ from archfem.masonry.stiffness_ratio import estimate_block_stiffness, find_soft_
 from archfem.masonry.structure import Structure
 from archfem.models.condensed import condense_blocks
 from archfem.models.discretisation import Discretisation
-from archfem.models.model import Model
+from archfem.models.model import Doubt, Model
 from archfem.models.rigid import build_rigid_model
 
 logger = logging.getLogger("archfem")
@@ -25,9 +25,9 @@ def build(structure: Structure, settings: Discretisation) -> Model:
 
         model = LargeDisplacementModel(model)
     fidelities = _block_fidelities(structure, settings.fidelity)
-    model.warnings = tuple(_soft_block_warnings(structure, fidelities))
-    for warning in model.warnings:
-        logger.warning("%s", warning)
+    model.doubts = tuple(_doubt_soft_blocks(structure, fidelities))
+    for doubt in model.doubts:
+        logger.warning("%s", doubt)
     return model
 
 
@@ -85,13 +85,14 @@ def _check_plain_joints(structure: Structure) -> None:
         )
 
 
-def _soft_block_warnings(structure: Structure, fidelities: Sequence[str]) -> Iterator[str]:
-    """Yield warnings for blocks too soft for their fidelity."""
+def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Iterator[Doubt]:
+    """Yield doubts about blocks too soft for their fidelity."""
     for number in find_soft_blocks(structure):
         if fidelities[number] in ("rigid", "faces", "condensed"):
             ratio = estimate_block_stiffness(structure, number)
-            yield (
+            yield Doubt(
                 f"block '{structure.blocks[number].name}' is soft: its own modes begin near "
                 f"{ratio.inner:.0f} Hz, in the seismic band, and it is {ratio.ratio:.2g} times as "
-                f"stiff as its joints; '{fidelities[number]}' is wrong for it, use 'full'"
+                f"stiff as its joints",
+                f"'{fidelities[number]}' is wrong for it, use 'full'",
             )

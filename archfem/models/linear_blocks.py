@@ -17,7 +17,7 @@ from archfem.joints.rigid_kinematics import block_motion_gaps
 from archfem.joints.sparsity import Pattern
 from archfem.joints.step_average import StepForces
 from archfem.masonry.structure import Structure
-from archfem.models.model import Cells, Model, ModelStep, Observer, Prediction
+from archfem.models.model import Cells, Doubt, Model, ModelStep, Observer, Prediction
 from archfem.models.observation import linear_observer
 
 
@@ -50,7 +50,7 @@ class LinearBlockModel(Model):
         self.support_motion = np.zeros((len(structure.blocks), 3))
         self.initial_gaps: Array | None = None
         self.prediction: Prediction | None = None
-        self.warnings: tuple[str, ...] = ()
+        self.doubts: tuple[Doubt, ...] = ()
         self._pattern = pattern
         self._joint_tangent = operator.tangent_map(pattern)
         # point stiffnesses and tangent of the last call

@@ -44,6 +44,20 @@ class Cells:
         """Number of the block of each polygon (n_polygons,)."""
         return self.block[[polygon[0] for polygon in self.polygons]]
 
+    def corners(self, structure: Structure) -> NDArray[np.intp]:
+        """Return the points nearest to the corners of the free blocks, block by block (c,).
+
+        Args:
+            structure: structure that the cells cover.
+        """
+        points = []
+        for number in structure.free:
+            own = np.flatnonzero(self.block == number)
+            corners = np.asarray(structure.blocks[number].points)
+            away = np.linalg.norm(self.places[own] - corners[:, None], axis=2)
+            points.append(own[away.argmin(axis=1)])
+        return np.concatenate(points)
+
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (m, 2) [m].
 
@@ -110,6 +124,23 @@ class Cells:
         nearest = int(np.argmin(distance))
         beside = point - start[nearest] - fraction[nearest] * step[nearest]
         return edges[nearest], float(fraction[nearest]), beside
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Reason why a result may be wrong.
+
+    Attributes:
+        cause: what was found, with values.
+        remedy: what to do about it.
+    """
+
+    cause: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Cause and remedy as one sentence."""
+        return f"{self.cause}; {self.remedy}" if self.remedy else self.cause
 
 
 @dataclass(frozen=True)
@@ -190,10 +221,15 @@ class Observer(Protocol):
     """Displacements of joint faces and blocks, read from coordinates at every step.
 
     One row of readings holds gaps at mid-depth, rotations and slips of all joints, then the
-    displacements of the blocks' middles.
+    displacements of the corners of the free blocks.
+
+    Attributes:
+        joint_count: number of joints.
+        corner_blocks: number of the block of each corner, block by block (c,).
     """
 
     joint_count: int
+    corner_blocks: NDArray[np.intp]
 
     def read(self, q: Array) -> Array:
         """Return all readings (r,)."""
@@ -212,8 +248,8 @@ class Observer(Protocol):
         of_joints = readings[..., : 3 * self.joint_count]
         return of_joints.reshape(*readings.shape[:-1], 3, self.joint_count)
 
-    def middles(self, readings: Array) -> Array:
-        """Return displacements of the blocks' middles (…, n_blocks, 2) [m]; 0 of fixed blocks."""
+    def corners(self, readings: Array) -> Array:
+        """Return displacements of the corners of the free blocks (…, c, 2) [m]."""
         return readings[..., 3 * self.joint_count :].reshape(*readings.shape[:-1], -1, 2)
 
 
@@ -242,7 +278,7 @@ class Model(Protocol):
         initial_gaps: opening and slip of the joint points at q = 0, due to construction in stages
             (2, p) [m]; None where all blocks were placed at once.
         prediction: predicted errors, if the model was chosen by them, or None.
-        warnings: reasons why this fidelity may be wrong for the structure, a sentence each.
+        doubts: reasons why this fidelity may be wrong for the structure.
     """
 
     structure: Structure
@@ -257,7 +293,7 @@ class Model(Protocol):
     support_motion: Array
     initial_gaps: Array | None
     prediction: Prediction | None
-    warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
 
     def force(self, q: Array) -> Array:
         """Return the internal forces of blocks and joints (n,).

@@ -1,7 +1,7 @@
 """Displacements of joint faces and blocks as linear functions of the coordinates.
 
-At each joint the gap at mid-depth, rotation and slip of its faces, and for each block the mean
-displacement of its points: D q + d.
+At each joint the gap at mid-depth, rotation and slip of its faces, and the displacements of the
+corners of all free blocks: D q + d.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
@@ -27,6 +28,7 @@ class LinearObserver(Observer):
     matrix: sparse.csr_matrix  # D, from coordinates to readings (r, n)
     offset: Array  # d, readings at q = 0, due to moved supports and construction (r,)
     joint_count: int
+    corner_blocks: NDArray[np.intp]
     structure: Structure
     cells: Cells
     support_motion: Array  # (n_blocks, 3) [m, m, rad]
@@ -81,15 +83,13 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     """Build an observer from the joint operator and the cells."""
     structure, cells = model.structure, model.cells
     of_faces, face_offset = face_matrix(operator)
-    # mean over the points of a block
-    blocks, weight = len(structure.blocks), 1.0 / np.bincount(cells.block)[cells.block]
-    entries = (weight, (cells.block, np.arange(len(weight))))
-    mean = sparse.csr_matrix(entries, (blocks, len(weight)))
-    of_blocks = sparse.kron(mean, sparse.identity(2)) @ cells.shape_functions
+    corners = cells.corners(structure)
+    of_corners = cells.shape_functions[np.add.outer(2 * corners, (0, 1)).ravel()]
     return LinearObserver(
-        sparse.vstack([of_faces, of_blocks], "csr"),
-        np.concatenate([face_offset, np.zeros(2 * blocks)]),
+        sparse.vstack([of_faces, of_corners], "csr"),
+        np.concatenate([face_offset, np.zeros(2 * len(corners))]),
         len(structure.joints),
+        cells.block[corners],
         structure,
         cells,
         model.support_motion,

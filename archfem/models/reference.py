@@ -32,7 +32,7 @@ from archfem.models.fem.forms import Fields, Forms
 from archfem.models.fem.joint_facets import PointReader
 from archfem.models.fem.space import BrokenSpace
 from archfem.models.full import build_full_model
-from archfem.models.model import Model, ModelStep, Observer, Prediction
+from archfem.models.model import Doubt, Model, ModelStep, Observer, Prediction
 from archfem.models.observation import linear_observer
 
 
@@ -136,7 +136,7 @@ class MonolithicModel(Model):
         self.cells = linear.cells
         self.support_motion = linear.support_motion
         self.prediction: Prediction | None = None
-        self.warnings: tuple[str, ...] = ()
+        self.doubts: tuple[Doubt, ...] = ()
         self.free = space.free
         self.steps = StepForms(Forms(space, rule))
         self._forms = self.steps.forms

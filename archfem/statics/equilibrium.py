@@ -30,7 +30,7 @@ from archfem.masonry.loads import BodyForce
 from archfem.masonry.structure import join_joint_names
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
-from archfem.models.model import Model, check_model
+from archfem.models.model import Doubt, Model, check_model
 from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
     LOAD_SEARCHES,
@@ -288,35 +288,47 @@ def _initial_guess(state: Equilibrium, model: Model) -> Array:
     return linear_predictor(state.model, state.q, motion) if motion.any() else state.q
 
 
-def dead_load_warnings(dead: Equilibrium, friction: float | None = None) -> tuple[str, ...]:
-    """Return reasons why a structure cannot rest as its dead load says, a sentence each."""
+def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[Doubt, ...]:
+    """Return reasons why a structure cannot rest as its dead load says."""
     structure, joints = dead.model.structure, assessed_joints(dead.joints)
     ratio, names = joints["friction"], joints["name"].values
     limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
-    warnings = []
+    doubts = []
     if (steep := (ratio > limit).values).any():
-        warnings.append(
-            f"under dead load |V| / N is {float(ratio.max()):.3g} in "
-            f"{join_joint_names(names[steep])}, and joints slide from {limit:g} on: they hold only "
-            "because they never slide"
+        doubts.append(
+            Doubt(
+                f"under dead load |V| / N is {float(ratio.max()):.3g} in "
+                f"{join_joint_names(names[steep])}, and joints slide from {limit:g} on: they hold "
+                "only because they never slide",
+                "give the contacts their friction",
+            )
         )
     slip = abs(joints["slip"])
     if (far := (slip > 1.0 * mm).values).any():
-        warnings.append(
-            f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
-            f"({join_joint_names(names[far])}): it does not stand as it was drawn"
+        doubts.append(
+            Doubt(
+                f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
+                f"({join_joint_names(names[far])}): it does not stand as it was drawn",
+                "check friction and the direction of these joints",
+            )
         )
     smallest = min(joint.contact.coefficient for joint in structure.joints)
     if smallest < 0.1:
-        warnings.append(
-            f"the least coefficient of friction is {smallest:g}: joints of stone have 0.6 to 0.75"
+        doubts.append(
+            Doubt(
+                f"the least coefficient of friction is {smallest:g}",
+                "joints of stone have 0.6 to 0.75: check it",
+            )
         )
     if not _stands_as_rigid_blocks(dead):
-        warnings.append(
-            "it was found at rest, but as rigid blocks nothing within friction holds it: "
-            "archfem.stands says that it falls"
+        doubts.append(
+            Doubt(
+                "it was found at rest, but as rigid blocks nothing within friction holds it: "
+                "archfem.stands says that it falls",
+                "compare with stiffer joints, or with large displacements",
+            )
         )
-    return tuple(warnings)
+    return tuple(doubts)
 
 
 def _stands_as_rigid_blocks(dead: Equilibrium) -> bool:

@@ -22,13 +22,12 @@ from archfem.cases.case import Case
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.fall import FALLEN_STATES
 from archfem.dynamics.history import (
-    MECHANISM_DEFINITIONS,
-    PUBLISHED_DEFINITION,
     Ending,
     History,
     first_mechanisms,
     partial_history,
 )
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import MECHANISM_KINDS

@@ -10,7 +10,8 @@ from typing import Any
 from archfem._files import atomic_write
 from archfem.cases.case import Case
 from archfem.cases.run import Run, run_case
-from archfem.dynamics.history import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION, Ending
+from archfem.dynamics.history import Ending
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.studies.comparison import Comparison, Finding, file_name, write
 from archfem.studies.evaluators import Evaluator, Findings

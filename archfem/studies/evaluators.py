@@ -15,8 +15,9 @@ import numpy as np
 
 from archfem.cases.case import Case
 from archfem.cases.run import DeadLoadResult, log_prefix, run_time_history
-from archfem.dynamics.history import MECHANISM_DEFINITIONS, Ending, History, first_mechanisms
+from archfem.dynamics.history import Ending, History, first_mechanisms
 from archfem.dynamics.motion_scaling import mechanism_scales
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.mechanism_count import Mechanism
@@ -92,7 +93,7 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         found[f"{definition}, class"] = "" if met is None else str(met.kind)
     found |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
     drift = float(run.dataset.attrs["energy_drift"])
-    return found | {"energy_drift": drift, "doubts": float(len(run.warnings))}
+    return found | {"energy_drift": drift, "doubts": float(len(run.doubts))}
 
 
 def _largest(run: History, name: str, undefined: float = -np.inf) -> float:

@@ -142,7 +142,7 @@ def _met(run: History, mechanisms: Mapping[str, Mechanism | None]) -> dict[str, 
     first = Mechanism("local", "", (), None) if bool(hinges.any()) else None
     return {
         "first hinge": first,
-        "four failures": mechanisms["any four joints"],
+        "four failures": mechanisms["any joints at once"],
         "verified": mechanisms["verified"],
     }
 
@@ -152,7 +152,7 @@ def _asked(rest: DeadLoadResult, limits: Sequence[str] | None) -> tuple[str, ...
     large = rest.case.discretisation.displacements == "large"
     counts = applicable_definitions(rest.case.structure, rest.case.criteria)
     possible = {"first hinge", "verified"}
-    possible |= {"four failures"} if "any four joints" in counts else set()
+    possible |= {"four failures"} if "any joints at once" in counts else set()
     possible |= {COLLAPSE_DEFINITION} if large else set()
     asked = tuple(limit for limit in LIMITS if limit in (limits or possible))
     if strange := [limit for limit in asked if limit not in possible]:

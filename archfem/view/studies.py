@@ -36,9 +36,9 @@ TICKS = (0.1, 0.2, 0.333, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 
 # What the definitions of a mechanism mean
 EXPLAINED = {
-    "any four joints": "any four joints fail",
-    "four in a ring": "four of one ring fail",
-    "ring and pier": "four of a ring and a pier fail",
+    "any joints at once": "any four joints fail",
+    "one part at once": "four of one ring fail",
+    "ring and pier at once": "four of a ring and a pier fail",
     "verified": "blocks can move (verified)",
 }
 

@@ -138,9 +138,9 @@ def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
     with_pier = state(structure, {0: -0.5, 3: -0.5, 6: -0.5, 9: -0.5})
     moving = state(structure, {3: -0.5, 8: 0.5, 13: -0.5, 19: 0.5})
     assert applicable_definitions(structure) == (
-        "any four joints",
-        "four in a ring",
-        "ring and pier",
+        "any joints at once",
+        "one part at once",
+        "ring and pier at once",
     )
     for resultants in (state(structure), in_ring, in_ring, with_pier):
         assert watch(resultants, STEP) is None

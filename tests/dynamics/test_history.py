@@ -199,4 +199,4 @@ def test_definitions_obey_the_criteria_of_the_run(run):
     loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     found = first_mechanisms(loose)
     assert found == first_mechanisms(run, loose.criteria)
-    assert found["any four joints"] == replace(loose.mechanism, blocks=())
+    assert found["any joints at once"] == replace(loose.mechanism, blocks=())

@@ -71,7 +71,7 @@ def test_bounds_are_those_of_whole_runs(on_piers):
             elif scale == found[name].upper:
                 assert met[name] == found[name].run.mechanisms[name]
     assert all(found[name].ratio <= 1.2 * ROUND_OFF for name in DEFINITIONS)
-    assert found["any four joints"].upper <= min(found[name].upper for name in DEFINITIONS[:3])
+    assert found["any joints at once"].upper <= min(found[name].upper for name in DEFINITIONS[:3])
 
 
 def pretended(fails, ended=lambda scale: Ending.FINISHED):
@@ -123,8 +123,8 @@ def test_what_fails_nowhere_or_everywhere_is_said():
     always, never = (lambda _: True), (lambda _: False)
     fails = dict(zip(DEFINITIONS, (always, never, never, beyond(2.0)), strict=True))
     found = searched(fails, between=(0.1, 3.0))
-    assert (found["any four joints"].lower, found["any four joints"].upper) == (0.0, 0.1)
-    assert (found["four in a ring"].lower, found["four in a ring"].upper) == (3.0, inf)
+    assert (found["any joints at once"].lower, found["any joints at once"].upper) == (0.0, 0.1)
+    assert (found["one part at once"].lower, found["one part at once"].upper) == (3.0, inf)
     assert found["verified"].upper == pytest.approx(2.0, rel=0.05)
 
 
@@ -145,7 +145,7 @@ def test_survivals_above_a_failure_are_noted():
     assert 0.45 <= bracket.upper <= 0.45 * 1.05
     assert 1.0 in bracket.above
     assert "survives also" in found.table()
-    assert not found["any four joints"].above
+    assert not found["any joints at once"].above
 
 
 def test_a_run_without_equilibrium_counts_as_failed():
@@ -170,7 +170,7 @@ def test_what_a_failed_run_met_is_kept(ring, monkeypatch):
     (run,) = found.runs
     assert run.has_failed
     assert run.outcome.startswith("failed at")
-    assert found["any four joints"].upper == 1.0
+    assert found["any joints at once"].upper == 1.0
 
 
 def test_ctrl_c_keeps_what_is_known(caplog):

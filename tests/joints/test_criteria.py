@@ -110,7 +110,7 @@ def test_definitions_of_a_counted_mechanism():
     states = [soil, three | set(soil), three | {10}, {0, 5, 6, 7}, {0, 5, 6, 9}, {1, 2, 3, 4, 5}]
     found = af.limit.counted_mechanisms(joints_of(states))
     anywhere, ring, mixed = found.values()
-    assert list(found) == ["any four joints", "four in a ring", "ring and pier"]
+    assert list(found) == ["any joints at once", "one part at once", "ring and pier at once"]
     assert (anywhere.time, anywhere.kind, anywhere.joints) == (2.0, "global", (0, 1, 9, 10))
     assert (mixed.time, mixed.part, mixed.joints) == (3.0, "arch 1 + pier 1", (0, 5, 6, 7))
     assert (ring.time, ring.kind, ring.joints) == (5.0, "local", (1, 2, 3, 4))
@@ -119,15 +119,15 @@ def test_definitions_of_a_counted_mechanism():
 
 def test_four_in_a_pier_are_no_four_in_a_ring():
     found = af.limit.counted_mechanisms(joints_of([{5, 6, 7, 8}]))
-    assert found["any four joints"].kind == "local"
-    assert found["four in a ring"] is None
-    assert found["ring and pier"] is None  # no joint of a ring
+    assert found["any joints at once"].kind == "local"
+    assert found["one part at once"] is None
+    assert found["ring and pier at once"] is None  # no joint of a ring
 
 
 def test_four_of_two_rings_and_a_pier_are_of_no_pair():
     found = af.limit.counted_mechanisms(joints_of([{0, 5, 9, 10}]))
-    assert found["any four joints"].kind == "global"
-    assert found["ring and pier"] is None
+    assert found["any joints at once"].kind == "global"
+    assert found["ring and pier at once"] is None
 
 
 def test_joints_of_rings_and_piers_are_judged_and_keep_their_numbers():

@@ -81,9 +81,9 @@ def test_the_verdict_does_not_hang_on_names(names, told):
     expected = verdicts(viaduct(*NAMES["arches"]))
     kinds = {name: (each.time, each.kind) for name, each in expected.items()}
     assert kinds == {
-        "any four joints": (2.0, "semi-global"),
-        "four in a ring": (5.0, "local"),
-        "ring and pier": (2.0, "semi-global"),
+        "any joints at once": (2.0, "semi-global"),
+        "one part at once": (5.0, "local"),
+        "ring and pier at once": (2.0, "semi-global"),
         "verified": (5.0, "local"),
         "Demirel and Aldemir": (5.0, "local"),
     }
@@ -321,7 +321,7 @@ def test_a_saved_history_keeps_roles(tmp_path):
     assert af.joints.assessed_joints(again.joints)["joint"].equals(
         af.joints.assessed_joints(dataset)["joint"]
     )
-    assert again.mechanism == af.limit.counted_mechanisms(dataset)["any four joints"]
+    assert again.mechanism == af.limit.counted_mechanisms(dataset)["any joints at once"]
 
 
 def test_a_file_without_roles_is_read_with_its_structure(tmp_path):

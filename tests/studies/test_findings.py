@@ -4,7 +4,7 @@ import json
 
 from archfem.studies.comparison import Finding, study_table, write
 
-DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
+DEFINITIONS = ("any joints at once", "one part at once", "ring and pier at once", "verified")
 
 
 def finding(**given):

@@ -9,6 +9,7 @@ import xarray as xr
 from archfem.cases.case import Case
 from archfem.cases.report.report_data import ReportData, build_player, missing_note
 from archfem.cases.result_text import (
+    RUN_COLUMNS,
     ResultTable,
     format_ratio,
     tabulate_joints,
@@ -374,7 +375,7 @@ def _shorten_joint_table(table: ResultTable) -> Grid:
 
 def _build_mechanism(run: History) -> list[Any]:
     """Build the verdict, and the fall of a run with large displacements."""
-    blocks: list[Any] = [TextBlock(_sentence(line)) for line in run.verdict.splitlines()]
+    blocks: list[Any] = [TextBlock(_sentence(line)) for line in str(run.verdict).splitlines()]
     if run.fall is None:
         what = "what happens after blocks come loose, for displacements were taken as small"
         blocks.append(missing_note(what, 'model.displacements = "large" follows them.'))
@@ -386,22 +387,22 @@ def _build_mechanism(run: History) -> list[Any]:
 
 def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the tables of all runs, and their envelopes."""
-    head, rows = tabulate_runs(data.runs)
+    (head, rows), columns = tabulate_runs(data.runs), len(RUN_COLUMNS)
     # The mechanisms have too many columns for a page: a line of text for each run instead.
     mechanisms = [
         (
             row[0],
             "; ".join(
                 f"{title}: {cell}"
-                for title, cell in zip(head[7:], row[7:], strict=True)
+                for title, cell in zip(head[columns:], row[columns:], strict=True)
                 if cell != "-"
             ),
         )
         for row in rows
     ]
-    caption = "PGA, and the critical joint of each run"
+    caption = "Outcome, PGA, and the critical joint of each run"
     blocks: list[Any] = [
-        Grid([head[0], *head[1:8]], [[row[0], *row[1:8]] for row in rows], caption),
+        Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
         Grid([], mechanisms, "Mechanism and end of each run"),
     ]
     pairs, per_figure = list(data.runs.items()), len(LINES)  # as many runs as line styles

@@ -159,15 +159,11 @@ class RotatingCells(Cells):
         elastic.eliminate_zeros()
         return arms, elastic
 
-    def middles(self, blocks: int) -> "RotatingCells":
-        """Return one point for each block, with the mean displacement of its points."""
-        weight = 1.0 / np.bincount(self.block)[self.block]
-        entries = (self.block, np.arange(len(weight)))
-        mean = sparse.csr_matrix((weight, entries), (blocks, len(weight)))
-        turns = np.full(blocks, -1)
-        turns[self.block] = self.turns
-        shapes = (sparse.kron(mean, sparse.identity(2)) @ self.shape_functions).tocsr()
-        return RotatingCells(mean @ self.places, np.arange(blocks), (), shapes, None, turns)
+    def select(self, points: Any) -> "RotatingCells":
+        """Return some of the points alone, without polygons."""
+        shapes = self.shape_functions[np.add.outer(2 * points, (0, 1)).ravel()]
+        places, block, turns = self.places[points], self.block[points], self.turns[points]
+        return RotatingCells(places, block, (), shapes, None, turns)
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""

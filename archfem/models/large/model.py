@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._typing import Array
@@ -43,7 +44,7 @@ from archfem.models.large.joints import (
     initial_segment_measures,
     joint_orientation,
 )
-from archfem.models.model import Cells, Model, ModelStep, Observer, Prediction
+from archfem.models.model import Doubt, Model, ModelStep, Observer, Prediction
 
 
 class LargeDisplacementModel(Model):
@@ -74,11 +75,11 @@ class LargeDisplacementModel(Model):
         self._pattern = pattern
         self._entries = pattern.find_entries(*self._slots.pairs)
         self.mass_influence = self.small.mass_influence
-        self.cells: Cells = RotatingCells.of(self.small.cells, blocks.blocks)
+        self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
         self.initial_gaps: Array | None = None
         self.prediction: Prediction | None = None
-        self.warnings: tuple[str, ...] = ()
+        self.doubts: tuple[Doubt, ...] = ()
         self._points: dict[PointLoad, RotatingPoint | FramelessPoint] = {}
         self._slip = np.zeros_like(allocate_step_forces(self.joints).irreversible_slip)
 
@@ -129,8 +130,14 @@ class LargeDisplacementModel(Model):
         return LargeDisplacementStep(self, start, damping_lag)
 
     def observer(self) -> Observer:
-        """Return the observer of joint faces and block displacements."""
-        return LargeObserver(len(self.structure.joints), self)
+        """Return the observer of joint faces and corners of blocks."""
+        corners = self._corners
+        return LargeObserver(len(self.structure.joints), corners.block, self, corners)
+
+    @cached_property
+    def _corners(self) -> RotatingCells:
+        """Corners of the free blocks."""
+        return self.cells.select(self.cells.corners(self.structure))
 
     def step_forces(self, start: Array, end: Array, damping_lag: float) -> JointStepForces:
         """Return the mean forces of the joints over a step."""
@@ -315,26 +322,21 @@ class LargeObserver(Observer):
     """Observer of a model of large displacements."""
 
     joint_count: int
+    corner_blocks: NDArray[np.intp]
     model: LargeDisplacementModel
+    corner_cells: RotatingCells
 
     def read(self, q: Array) -> Array:
         """Return all readings (r,)."""
         return self.read_many(q[None])[0]
 
-    @cached_property
-    def _middles(self) -> RotatingCells:
-        """One point for each block, with the mean displacement of its points."""
-        cells = self.model.cells
-        assert isinstance(cells, RotatingCells)
-        return cells.middles(len(self.model.structure.blocks))
-
     def read_many(self, states: Array) -> Array:
         """Return the readings of many states (steps, r)."""
         gap, slip, turn = np.moveaxis(self.model.measures(states), -1, 0)
-        middles = self._middles.displacement(states)
-        middles = middles.reshape(len(states), 2 * len(self._middles.turns))
+        corners = self.corner_cells.displacement(states)
+        corners = corners.reshape(len(states), 2 * len(self.corner_blocks))
         # the measure of rotation is 2 sin(θ/2)
-        return np.concatenate([gap, 2.0 * np.arcsin(0.5 * turn), slip, middles], axis=1)
+        return np.concatenate([gap, 2.0 * np.arcsin(0.5 * turn), slip, corners], axis=1)
 
     def joint_ends(self, q: Array) -> Array:
         """Return the displacements of both ends of each joint's overlap (n_joints, 2, 2) [m]."""

@@ -1,0 +1,248 @@
+"""Verdict of a run: outcome, doubts, displacements, and the first mechanism by each definition."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from archfem.dynamics.fall import CollapseState
+from archfem.joints.criteria import (
+    Criteria,
+    assessed_joints,
+    failed_joints,
+    longest_duration,
+    step_lengths,
+    with_failure_flags,
+)
+from archfem.limit.mechanism_count import (
+    OVER_RECORD,
+    Episode,
+    Mechanism,
+    counted_mechanisms,
+    demirel_aldemir_mechanism,
+    duration_text,
+    episode,
+    has_counted_mechanism,
+)
+from archfem.limit.mechanism_kinematics import first_verified_mechanism
+from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.models.model import Doubt
+from archfem.units import mm
+
+MECHANISM_DEFINITIONS = (
+    "any joints at once",
+    "one part at once",
+    "ring and pier at once",
+    OVER_RECORD,
+    "verified",
+)
+"""Definitions of a mechanism, in the order of tables."""
+
+# Criterion of `demirel_aldemir_mechanism`
+PUBLISHED_DEFINITION = "Demirel and Aldemir"
+
+
+@dataclass(frozen=True)
+class DetectedMechanism:
+    """First mechanism of a run by one definition.
+
+    Attributes:
+        mechanism: the mechanism with its class, part, joints and time.
+        duration: time for which all its joints stay failed; of "one part over the record", time
+            from the first failure of its joints to the last one needed [s].
+        opening: largest opening of any of its joints meanwhile; of "one part over the record", at
+            any time of the run [m]. None where openings are not recorded.
+        words: description of the duration.
+    """
+
+    mechanism: Mechanism
+    duration: float
+    opening: float | None
+    words: str
+
+    @property
+    def time(self) -> float:
+        """Time at which it begins [s]."""
+        assert self.mechanism.time is not None
+        return self.mechanism.time
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Numbers of its joints."""
+        return self.mechanism.joints
+
+    def __str__(self) -> str:
+        """Class, part, time, joints, duration and opening."""
+        mechanism = self.mechanism
+        return (
+            f"{mechanism.kind} mechanism of {mechanism.part} at {self.time:.3f} s by "
+            f"{join_joint_names(mechanism.names)}; {self.words}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Verdict:
+    """Assessment of a run, from which all summaries are written.
+
+    Attributes:
+        outcome: "stands", "dislocated", "partly fallen" or "fallen" with large displacements, see
+            `CollapseState`, and "unknown" where such a run was broken off; "mechanism" or "no
+            mechanism" with small ones, by any of the definitions.
+        doubts: reasons why the result may be wrong, each with its remedy.
+        displacement: largest displacement of any corner of a block relative to the ground, from its
+            place at the start of the run, under dead load [m]. Backfill does not count. NaN in
+            files of earlier versions.
+        residual: the same at the end of the run [m].
+        mechanisms: first mechanism, or None, by each definition of `MECHANISM_DEFINITIONS` that
+            applies, and by the criterion of Demirel and Aldemir; "verified" only where the
+            structure is known.
+        fall: state of collapse with large displacements, or None.
+        remarks: further sentences on the run: ending, places of the largest values, mechanisms too
+            short to count.
+    """
+
+    outcome: str
+    doubts: tuple[Doubt, ...]
+    displacement: float
+    residual: float
+    mechanisms: Mapping[str, DetectedMechanism | None]
+    fall: CollapseState | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """Outcome and number of doubts, in one line."""
+        count = len(self.doubts)
+        doubt = f"{count} doubt{'s' if count > 1 else ''}" if count else "no doubts"
+        return f"{self._outcome_text}; {doubt}"
+
+    @property
+    def _outcome_text(self) -> str:
+        """Outcome with the definitions by which there is a mechanism, or with what fell."""
+        if self.fall is not None:
+            return self.fall.text
+        if self.outcome != "mechanism":
+            return self.outcome
+        met = {name: found is not None for name, found in self.mechanisms.items()}
+        text = f"mechanism by {join_names([name for name in met if met[name]])}"
+        if all(met.values()):
+            return text
+        return f"{text}; none by {join_names([name for name in met if not met[name]])}"
+
+    def __str__(self) -> str:
+        """Verdict in words: outcome, doubts, displacements, and a line for each mechanism."""
+        lines = [self.headline, *(f"in doubt: {doubt}" for doubt in self.doubts)]
+        if not np.isnan(self.displacement):
+            lines.append(
+                f"largest displacement of a corner {self.displacement / mm:.3g} mm, residual "
+                f"{self.residual / mm:.3g} mm"
+            )
+        # definitions with the same mechanism share a line
+        groups: dict[str, list[str]] = {}
+        for name, found in self.mechanisms.items():
+            groups.setdefault("none" if found is None else str(found), []).append(name)
+        lines += self.remarks
+        lines += [f"{join_names(names)}: {words}" for words, names in groups.items()]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        """Headline."""
+        return f"Verdict({self.headline!r})"
+
+
+def detect_mechanisms(
+    joints: xr.Dataset, structure: Structure | None
+) -> dict[str, DetectedMechanism | None]:
+    """Find the first mechanism by each definition that applies.
+
+    "Verified" needs the structure, and "ring and pier at once" needs both.
+    """
+    first: dict[str, Mechanism | None] = dict(counted_mechanisms(joints))
+    if not {"ring", "pier"} <= set(joints["role"].values.astype(str)):
+        del first["ring and pier at once"]
+    if structure is not None:
+        verified = first_verified_mechanism(structure, joints)
+        first["verified"] = None if verified is None else verified.moved
+    first[PUBLISHED_DEFINITION] = demirel_aldemir_mechanism(joints)
+    blocks = [block.name for block in structure.blocks] if structure else []
+    return {
+        name: None if mechanism is None else _follow(name, mechanism, joints, blocks)
+        for name, mechanism in first.items()
+    }
+
+
+def _follow(
+    definition: str, mechanism: Mechanism, joints: xr.Dataset, blocks: Sequence[str]
+) -> DetectedMechanism:
+    """Return a mechanism with its duration and opening; `blocks` are the names of all blocks."""
+    if definition != OVER_RECORD:
+        lasting: Episode = episode(joints, mechanism)
+        words = str(lasting)
+        if mechanism.blocks:
+            words += f"; moving: {join_names([blocks[k] for k in mechanism.blocks], '; ')}"
+        return DetectedMechanism(mechanism, lasting.duration, lasting.opening, words)
+    own = joints.isel(joint=np.isin(joints["joint"].values, mechanism.joints))
+    begin = float(joints["time"][failed_joints(own).any("joint").values.argmax()])
+    assert mechanism.time is not None
+    duration = mechanism.time - begin
+    opening = float(own["opening"].max()) if "opening" in own else None
+    words = f"they failed one after the other within {duration_text(duration)}"
+    words += "" if opening is None else f", and open by up to {opening / mm:.3g} mm"
+    return DetectedMechanism(mechanism, duration, opening, words)
+
+
+def brief_mechanism_remarks(
+    joints: xr.Dataset,
+    structure: Structure | None,
+    detected: Mapping[str, DetectedMechanism | None],
+) -> list[str]:
+    """Return remarks on earlier mechanisms that are shorter than the criteria require."""
+    criteria = Criteria.of(joints)
+    if step_lengths(joints["time"].values).min() >= criteria.duration:
+        return []
+    loose = with_failure_flags(joints, replace(criteria, duration=0.0))
+    begins: dict[float, list[str]] = {}
+    for name, brief in detect_mechanisms(loose, structure).items():
+        counted = detected[name]
+        if brief is not None and (counted is None or brief.time < counted.time):
+            begins.setdefault(brief.time, []).append(name)
+    return [
+        f"{join_names(names)}: what begins at {time:.4f} s lasts less than "
+        f"{duration_text(criteria.duration)}, and does not count"
+        for time, names in begins.items()
+    ]
+
+
+def total_duration_remark(joints: xr.Dataset) -> str:
+    """Return a sentence on the total and the longest time with enough failed joints."""
+    flags = has_counted_mechanism(joints).expand_dims(joint=[0])
+    steps = step_lengths(flags["time"].values)
+    total = float(steps[flags.transpose("joint", "time").values[0]].sum())
+    longest = float(longest_duration(flags)[0])
+    return (
+        f"{Criteria.of(joints).failures} joints and more fail at once for {duration_text(total)} "
+        f"in all, {duration_text(longest)} at the longest"
+    )
+
+
+def extremes_remark(dataset: xr.Dataset) -> list[str]:
+    """Return a sentence on the largest hinge rotation and slip."""
+    if "rotation" not in dataset:
+        return []
+    # rotations of joints while they hinge, slips of all joints, both of rings and piers
+    joints = assessed_joints(dataset)
+    rotations = abs(joints["rotation"]).where(joints["hinge"] != 0, 0.0)
+    if float(rotations.max()) > 0.0:
+        rotation = f"largest hinge rotation {_peak_text(rotations, 1e-3, 'mrad')}"
+    else:
+        rotation = "no joint hinges"
+    return [f"{rotation}, largest slip {_peak_text(abs(joints['slip']), mm, 'mm')}"]
+
+
+def _peak_text(values: xr.DataArray, unit: float, name: str) -> str:
+    """Return the largest of values over time and joint, with the joint and the time."""
+    values = values.transpose("time", "joint")
+    instant, joint = np.unravel_index(int(values.values.argmax()), values.shape)
+    largest, time = float(values.values[instant, joint]), float(values["time"][instant])
+    return f"{largest / unit:.3g} {name} ({values['name'].values[joint]}, {time:.3f} s)"
