@@ -22,7 +22,7 @@ from scipy import sparse
 from scipy.integrate import trapezoid
 
 from archfem._typing import Array
-from archfem.dynamics.state import Batch
+from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge
 from archfem.models.model import Doubt, Model, Observer
 
@@ -106,19 +106,17 @@ class EnergyBalance:
 class CornerDisplacements:
     """Largest and present displacement of each free block's corners, from the start of a run."""
 
-    def __init__(self, observer: Observer) -> None:
+    def __init__(self, observer: Observer, start: State) -> None:
         self._observer = observer
+        self._start = observer.corners(observer.read(start.q))
         self.blocks, self._first = np.unique(observer.corner_blocks, return_index=True)
-        self._start: Array | None = None
+        self.time = np.full(len(self.blocks), start.time)  # of the largest displacement [s]
+        self._square = self._last = np.zeros(len(self.blocks))
 
     def add(self, times: Array, readings: Array) -> None:
         """Add the readings of the next steps (steps, r)."""
-        corners = self._observer.corners(readings)
-        if self._start is None:
-            self._start, self.time = corners[0], np.full(len(self.blocks), times[0])
-            self._square = np.zeros(len(self.blocks))
         # squares are compared, since their order is that of the distances
-        squares = np.square(corners - self._start).sum(axis=-1)
+        squares = np.square(self._observer.corners(readings) - self._start).sum(axis=-1)
         squares = np.maximum.reduceat(squares, self._first, axis=1)
         farthest = squares.argmax(axis=0)
         largest = squares[farthest, np.arange(len(farthest))]
@@ -145,7 +143,7 @@ class RunMonitor:
         self.model = model
         # largest drift at any step, relative to the largest exchange until then [-]
         self.worst_drift, self._worst_time = 0.0, 0.0
-        self.displacements = CornerDisplacements(model.observer())
+        self.displacements = CornerDisplacements(model.observer(), start.state(0))
         self.largest_turn = 0.0  # of any joint at any step [rad]
         self._balance = EnergyBalance(*start.energy[0, :2])
         self._damps = damps  # whether the scheme has numerical damping, so that losses are expected

@@ -29,7 +29,6 @@ def test_the_verdict_comes_first(run, ring):
     assert text.startswith(f"{run.verdict}\n\n{found}\n\njoint ")
     assert f"outcome: reached the end of the motion; {len(run.time) - 1} steps" in found
     assert "of the largest exchanged at most" in found
-    assert f"warnings: {len(run.warnings)}" in found
 
 
 def test_pair_table_tells_all_three(run, tmp_path):
@@ -51,7 +50,7 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
     loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     assert tabulate_joints(loose.joints) != tabulate_joints(run.joints)
     calm = loose.with_criteria(af.Criteria(failures=18))
-    assert "by count: no mechanism, never 18 failed joints at once" in calm.verdict
+    assert calm.verdict.outcome == "no mechanism"
 
 
 def test_limit_analysis_in_words(ring):

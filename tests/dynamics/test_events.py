@@ -141,6 +141,7 @@ def test_every_mechanism_waits_for_the_last_and_remembers_the_others():
         "any joints at once",
         "one part at once",
         "ring and pier at once",
+        "one part over the record",
     )
     for resultants in (state(structure), in_ring, in_ring, with_pier):
         assert watch(resultants, STEP) is None

@@ -84,7 +84,7 @@ def test_where_none_is_good_enough_the_best_is_taken(choose):
     model = choose(Known([0.002], [0.03, 0.012, 0.05, 0.02, 0.04, 0.013]))
     assert model.prediction.error == pytest.approx(0.014)
     assert len(model.prediction.candidates) == 1 + 6
-    assert "no finer mesh is tried" in model.warnings[-1]
+    assert "no finer mesh is tried" in str(model.doubts[-1])
 
 
 def test_steps_are_shortened_until_they_err_by_half_of_the_tolerance(choose):
@@ -110,7 +110,7 @@ def test_no_error_is_predicted_below_what_is_chance(choose):
     assert told.error == pytest.approx(0.004)
     assert told.chaotic_spread == 0.003
     model = choose(Known([0.001], [0.002], chance=0.0091))
-    assert "impacts decide" in model.warnings[-1]
+    assert "impacts decide" in str(model.doubts[-1])
 
 
 def test_a_step_that_is_asked_for_is_judged_alone(choose):
@@ -118,7 +118,7 @@ def test_a_step_that_is_asked_for_is_judged_alone(choose):
     model = choose(known, dt=0.01)
     assert known.paces == [None]
     assert (model.prediction.dt, model.prediction.step_tolerance) == (0.01, None)
-    assert "leave dt out" in model.warnings[-1]
+    assert "leave dt out" in str(model.doubts[-1])
 
 
 def test_damping_is_found_of_a_model_where_it_is_asked_for():

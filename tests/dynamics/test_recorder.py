@@ -1,13 +1,11 @@
 """What is recorded of a run, and how often."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.dynamics.monitor import RunMonitor
-from archfem.dynamics.recorder import BlockDisplacements, GrowingArray, Recorder
+from archfem.dynamics.recorder import GrowingArray, Recorder
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -99,17 +97,3 @@ def test_rows_are_those_filled_so_far():
         rows.add(filled)
     assert rows.values.tolist() == [[1.0, 1.0], [3.0, 3.0], [3.0, 3.0]]
     assert np.shares_memory(rows.values, rows.values)
-
-
-def test_how_far_blocks_have_gone_and_when():
-    """From where the first step has them, over batches; the first of equal ones counts."""
-    reach = BlockDisplacements(SimpleNamespace(middles=lambda readings: readings))
-    start = np.array([[[1.0, 1.0], [2.0, 2.0]]])
-    reach.add(np.array([0.5]), start)
-    moves = np.array([[[0.3, 0.4], [0.0, 0.0]], [[0.0, 0.1], [0.0, -0.2]]])
-    reach.add(np.array([0.6, 0.7]), start + moves)
-    reach.add(np.array([0.8, 0.9]), start + moves[::-1] * np.array([1.0, 0.5])[:, None, None])
-    found = {name: values for name, (_, values, _) in reach.to_variables().items()}
-    assert found["largest_displacement"] == pytest.approx([0.5, 0.2])
-    assert found["largest_displacement_time"] == pytest.approx([0.6, 0.7])
-    assert found["residual_displacement"] == pytest.approx([0.25, 0.0])

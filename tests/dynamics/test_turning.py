@@ -135,7 +135,7 @@ def test_a_ring_stands_or_falls_and_says_so(tmp_path):
     """Under a pulse of 0.2 g and of 0.7 g; the file tells it too."""
     stands = af.time_history(model(), PULSE.scaled(0.3), dt=0.005, damping=DAMPED)
     assert (stands.fall.kind, stands.fall.time, stands.fall.blocks) == ("stands", None, ())
-    assert stands.verdict.startswith("the structure stands")
+    assert stands.verdict.outcome == "stands"
     falls = af.time_history(model(), PULSE, dt=0.005, damping=DAMPED)
     assert falls.ending == "parted"
     assert falls.fall.kind == "fallen"

@@ -8,6 +8,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases.result_text import tabulate_joints
+from archfem.dynamics import MECHANISM_DEFINITIONS
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
@@ -109,18 +110,22 @@ def test_definitions_of_a_counted_mechanism():
     soil, three = range(14, 20), {0, 1, 9}
     states = [soil, three | set(soil), three | {10}, {0, 5, 6, 7}, {0, 5, 6, 9}, {1, 2, 3, 4, 5}]
     found = af.limit.counted_mechanisms(joints_of(states))
-    anywhere, ring, mixed = found.values()
-    assert list(found) == ["any joints at once", "one part at once", "ring and pier at once"]
+    anywhere, ring, mixed, over_record = found.values()
+    assert list(found) == [name for name in MECHANISM_DEFINITIONS if name != "verified"]
     assert (anywhere.time, anywhere.kind, anywhere.joints) == (2.0, "global", (0, 1, 9, 10))
     assert (mixed.time, mixed.part, mixed.joints) == (3.0, "arch 1 + pier 1", (0, 5, 6, 7))
     assert (ring.time, ring.kind, ring.joints) == (5.0, "local", (1, 2, 3, 4))
     assert (ring.part, mixed.kind) == ("arch 1", "semi-global")
+    # by then joints 0 and 1 had failed in the first arch, and 5, 6 and 7 in the pier
+    assert (over_record.time, over_record.part) == (5.0, "arch 1")
+    assert over_record.joints == (0, 1, 2, 3, 4)
 
 
-def test_four_in_a_pier_are_no_four_in_a_ring():
+def test_four_in_a_pier_are_a_mechanism_of_one_part():
     found = af.limit.counted_mechanisms(joints_of([{5, 6, 7, 8}]))
     assert found["any joints at once"].kind == "local"
-    assert found["one part at once"] is None
+    assert found["one part at once"].part == "pier 1"
+    assert af.limit.demirel_aldemir_mechanism(joints_of([{5, 6, 7, 8}])) is None
     assert found["ring and pier at once"] is None  # no joint of a ring
 
 

@@ -84,6 +84,7 @@ def test_the_verdict_does_not_hang_on_names(names, told):
         "any joints at once": (2.0, "semi-global"),
         "one part at once": (5.0, "local"),
         "ring and pier at once": (2.0, "semi-global"),
+        "one part over the record": (5.0, "local"),
         "verified": (5.0, "local"),
         "Demirel and Aldemir": (5.0, "local"),
     }

@@ -12,7 +12,7 @@ from archfem.statics.equilibrium import (
     Equilibrium,
     _increment_load,
     dead_load,
-    dead_load_warnings,
+    dead_load_doubts,
     self_weight,
 )
 from archfem.statics.newton import Solution
@@ -132,27 +132,27 @@ def resting(**given):
 
 
 def test_an_ordinary_ring_is_not_in_doubt():
-    assert dead_load_warnings(resting()) == ()
-    assert dead_load_warnings(resting(friction=None)) == ()
+    assert dead_load_doubts(resting()) == ()
+    assert dead_load_doubts(resting(friction=None)) == ()
 
 
 def test_joints_that_never_slide_must_not_bear_what_no_stone_bears():
     """Plane blocks one beside the other between walls: what holds them is shear alone."""
     dead = resting(embrace=7.0, friction=None)
     assert float(dead.joints["friction"].max()) > 3.5
-    (words,) = dead_load_warnings(dead)
-    assert "joints slide from 1 on: they hold only because they never slide" in words
+    (doubt,) = dead_load_doubts(dead)
+    assert "joints slide from 1 on: they hold only because they never slide" in doubt.cause
 
 
 def test_criteria_say_from_where_joints_slide():
-    assert "slide from 0.2 on" in dead_load_warnings(resting(friction=None), 0.2)[0]
+    assert "slide from 0.2 on" in dead_load_doubts(resting(friction=None), 0.2)[0].cause
 
 
 def test_slips_and_coefficients_that_nobody_means():
     """A wedge that friction does not hold comes to rest millimetres below where it was drawn."""
-    slid, smooth = dead_load_warnings(resting(embrace=7.0, voussoirs=3, friction=1e-3))
-    assert "joints slide by up to 1.18 mm" in slid
-    assert "the least coefficient of friction is 0.001" in smooth
+    slid, smooth = dead_load_doubts(resting(embrace=7.0, voussoirs=3, friction=1e-3))
+    assert "joints slide by up to 1.18 mm" in slid.cause
+    assert "the least coefficient of friction is 0.001" in smooth.cause
 
 
 @pytest.mark.parametrize(
@@ -164,23 +164,24 @@ def test_doubts_begin_where_they_are_said_to(read, least, factor):
     for share, doubted in ((0.98, False), (1.02, True)):
         found = dead.joints.copy(deep=True)
         found[read].values[3] = share * least
-        said = dead_load_warnings(SimpleNamespace(model=dead.model, joints=found))
+        said = dead_load_doubts(SimpleNamespace(model=dead.model, joints=found))
         assert len(said) == doubted
-        assert all(f"{share * abs(least) * factor:.3g} " in words for words in said)
+        assert all(f"{share * abs(least) * factor:.3g} " in doubt.cause for doubt in said)
 
 
 def test_joints_of_stone_are_not_smooth():
-    assert dead_load_warnings(SimpleNamespace(**smooth(0.102))) == ()
-    (words,) = dead_load_warnings(SimpleNamespace(**smooth(0.098)))
-    assert words == "the least coefficient of friction is 0.098: joints of stone have 0.6 to 0.75"
+    assert dead_load_doubts(SimpleNamespace(**smooth(0.102))) == ()
+    (doubt,) = dead_load_doubts(SimpleNamespace(**smooth(0.098)))
+    assert doubt.cause == "the least coefficient of friction is 0.098"
+    assert doubt.remedy == "joints of stone have 0.6 to 0.75: check it"
 
 
 def test_one_smooth_joint_among_rough_ones_is_told(stack):
     rough, other = stack.joints
     slippery = replace(other, contact=replace(other.contact, friction=0.02))
     mixed = replace(stack, joints=(rough, slippery))
-    (words,) = dead_load_warnings(af.dead_load(af.build(mixed, fidelity="rigid")))
-    assert words.startswith("the least coefficient of friction is 0.02")
+    (doubt,) = dead_load_doubts(af.dead_load(af.build(mixed, fidelity="rigid")))
+    assert doubt.cause.startswith("the least coefficient of friction is 0.02")
 
 
 def smooth(friction):
@@ -205,7 +206,8 @@ def test_what_limit_analysis_does_not_let_stand():
     )
     assert not af.stands(weaker.structure)
     assert (
-        "archfem.stands says that it falls" in dead_load_warnings(replace(dead, model=weaker))[-1]
+        "archfem.stands says that it falls"
+        in dead_load_doubts(replace(dead, model=weaker))[-1].cause
     )
 
 

@@ -19,7 +19,7 @@ QUICK = [
     "suite.pairs.pair-1.synthetic.pga=3.0",
 ]
 CASE = f'[cases."a b"]\ncase = "{MESHES}/ring_suite.toml"'
-DEFINITIONS = ("any joints at once", "one part at once", "ring and pier at once", "verified")
+DEFINITIONS = af.dynamics.MECHANISM_DEFINITIONS
 
 
 @pytest.fixture

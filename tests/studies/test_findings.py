@@ -2,9 +2,10 @@
 
 import json
 
+import archfem as af
 from archfem.studies.comparison import Finding, study_table, write
 
-DEFINITIONS = ("any joints at once", "one part at once", "ring and pier at once", "verified")
+DEFINITIONS = af.dynamics.MECHANISM_DEFINITIONS
 
 
 def finding(**given):

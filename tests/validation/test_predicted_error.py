@@ -98,7 +98,7 @@ def test_prediction_is_of_the_order_of_the_error(scene, tolerance):
     assert actual <= tolerance or not predicted.is_met
     assert predicted.error > actual / 2.0
     assert predicted.error < 3.0 * max(of_steps + of_model, predicted.chaotic_spread)
-    said = any("impacts decide" in words for words in model.warnings)
+    said = any("impacts decide" in doubt.remedy for doubt in model.doubts)
     assert said or predicted.chaotic_spread <= max(
         tolerance - predicted.time_step_error, tolerance / 2.0
     )

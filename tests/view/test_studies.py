@@ -37,7 +37,12 @@ def test_the_level_of_the_reduced_motions_is_named_where_it_is_another():
 
 def test_definitions_by_which_nothing_fails_have_no_sign():
     """That of a ring and a pier, where there are no piers; what the others mean is told."""
-    many = {"ring": {"any joints at once": np.array([0.5, 2.0]), "ring and pier at once": np.full(2, np.inf)}}
+    many = {
+        "ring": {
+            "any joints at once": np.array([0.5, 2.0]),
+            "ring and pier at once": np.full(2, np.inf),
+        }
+    }
     page = draw_study(many, title="a $ study")
     told = [text.get_text() for text in page.legends[0].get_texts()]
     assert told == ["any four joints fail", "median, and range of the pairs"]

@@ -1,0 +1,263 @@
+"""The verdict of a run: outcome, doubts, displacements and mechanisms."""
+
+import numpy as np
+import pytest
+from glued import glued
+
+import archfem as af
+from archfem.dynamics.verdict import MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION
+from archfem.limit import mechanism_over_record
+from archfem.limit.mechanism_count import episode
+
+
+def failed_joints(run):
+    return ((run.joints["hinge"] != 0) | run.joints["slide"] | run.joints["open"]).values
+
+
+def test_the_words_are_written_from_the_fields(run):
+    verdict = run.verdict
+    first, *lines = str(verdict).splitlines()
+    assert first == verdict.headline
+    assert first.startswith("mechanism by any joints at once, ")
+    assert first.endswith(f"; {len(verdict.doubts)} doubts")
+    assert lines[: len(verdict.doubts)] == [f"in doubt: {doubt}" for doubt in verdict.doubts]
+    assert (
+        f"largest displacement of a corner {1e3 * verdict.displacement:.3g} mm, residual "
+        f"{1e3 * verdict.residual:.3g} mm"
+    ) in lines
+    for name, found in verdict.mechanisms.items():
+        (line,) = [text for text in lines if name in text.split(":")[0]]
+        assert line.endswith(str(found) if found else "none")
+    assert repr(verdict) == f"Verdict({first!r})"
+    assert verdict.headline in repr(run)
+
+
+def test_largest_rotation_and_slip_are_those_of_the_record(run):
+    """Looked up in the dataset by hand."""
+    joints, words = run.joints, str(run.verdict)
+    turned = abs(joints["rotation"]).where(joints["hinge"] != 0).fillna(0.0).values
+    instant, joint = np.unravel_index(turned.argmax(), turned.shape)
+    assert f"{1e3 * turned.max():.3g} mrad (joint {joint}, {run.time[instant]:.3f} s)" in words
+    slip = abs(joints["slip"]).values
+    assert f"slip {1e3 * slip.max():.3g} mm (joint {slip.max(axis=0).argmax()}, " in words
+
+
+def test_mechanisms_have_time_joints_duration_and_opening(run):
+    mechanisms = run.verdict.mechanisms
+    assert list(mechanisms) == [
+        *(name for name in MECHANISM_DEFINITIONS if name != "ring and pier at once"),
+        PUBLISHED_DEFINITION,
+    ]
+    for name, expected in (
+        ("any joints at once", run.mechanism),
+        (PUBLISHED_DEFINITION, run.demirel_aldemir),
+        ("verified", run.verified.moved),
+    ):
+        found, lasting = mechanisms[name], episode(run.joints, expected)
+        assert (found.time, found.joints) == (expected.time, expected.joints)
+        assert (found.duration, found.opening) == (lasting.duration, lasting.opening)
+
+
+def test_a_joint_that_has_failed_counts_over_the_record(run):
+    """By a loop over the record; the opening is the largest at any time."""
+    seen, first = set(), None
+    for time, failed in zip(run.time, failed_joints(run), strict=True):
+        before, seen = seen, seen | set(np.flatnonzero(failed).tolist())
+        if seen and not before:
+            first = time
+        if len(seen) >= 4:
+            break
+    found = run.verdict.mechanisms["one part over the record"]
+    assert (found.time, found.joints) == (time, tuple(sorted(seen)))
+    assert found.duration == pytest.approx(time - first)
+    assert found.opening == run.joints["opening"].values[:, sorted(seen)].max()
+    assert found.time <= run.mechanism.time
+
+
+def test_failures_at_different_times_count_over_the_record_alone():
+    """Four joints of a ring that hinge one after the other; pier and ring do not add up."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
+    resultants = np.zeros((6, len(ring.joints), 3))
+    resultants[..., 0] = 1e4
+    for instant, joint in enumerate((0, 2, 5, 7)):
+        resultants[instant + 1, joint, 2] = 0.5e4 * 0.55
+    joints = af.joints.joint_dataset(ring, resultants, 0.01 * np.arange(6))
+    assert af.limit.counted_mechanism(joints) is None
+    found = mechanism_over_record(joints)
+    assert (found.time, found.joints, found.kind) == (0.04, (0, 2, 5, 7), "local")
+    # each failure lasts for one record of 10 ms
+    assert mechanism_over_record(joints, af.Criteria(duration=0.01)) == found
+    assert mechanism_over_record(joints, af.Criteria(duration=0.011)) is None
+    assert mechanism_over_record(joints, af.Criteria(failures=5)) is None
+    assert mechanism_over_record(joints.isel(time=4)) is None
+    parts = np.where(np.arange(len(ring.joints)) < 3, "ring", "pier")
+    apart = joints.assign_coords(part=("joint", parts), role=("joint", parts))
+    assert mechanism_over_record(apart) is None
+
+
+@pytest.mark.parametrize("dt", [0.005, None])
+def test_an_event_over_the_record_ends_a_run_where_the_record_says(model, motion, dt):
+    given = {"dt": dt, "damping": af.StiffnessDamping(0.05, 8.0)}
+    event = af.dynamics.CountedMechanism(over="record")
+    ended = af.time_history(model, motion, until=event, **given)
+    whole = af.time_history(model, motion, **given)
+    found = whole.verdict.mechanisms["one part over the record"]
+    assert ended.time[-1] == found.time
+    assert "a mechanism of arch over the record, by joints " in ended.outcome
+    assert f"the run {ended.outcome}" in str(ended.verdict)
+
+
+def test_counting_over_the_record_refuses_other_classes():
+    with pytest.raises(af.InvalidInput, match="'instant' or 'record'"):
+        af.dynamics.CountedMechanism(over="motion")
+    with pytest.raises(af.InvalidInput, match="leave kinds out"):
+        af.dynamics.CountedMechanism(over="record", kinds=("global",))
+
+
+def test_the_total_time_with_enough_failures_is_stated(run):
+    """By a loop over the record."""
+    lengths, count = [], 0
+    for up in [*(failed_joints(run).sum(axis=1) >= 4), False]:
+        count = count + 1 if up else (lengths.append(count) if count else None) or 0
+    words = f"4 joints and more fail at once for {5 * sum(lengths):.3g} ms in all, "
+    assert f"{words}{5 * max(lengths):.3g} ms at the longest" in str(run.verdict)
+
+
+def test_a_calm_run_says_so(model, motion):
+    damping = af.Rayleigh(0.05, (8.0, 16.0))
+    calm = af.time_history(model, motion.scaled(0.1), dt=0.005, damping=damping).verdict
+    assert (calm.outcome, calm.headline) == ("no mechanism", "no mechanism; no doubts")
+    assert not any(calm.mechanisms.values())
+    assert "no joint hinges, largest slip " in str(calm)
+    assert str(calm).splitlines()[-1].endswith(", verified, Demirel and Aldemir: none")
+
+
+def test_files_have_the_verdict_of_the_run(run, tmp_path):
+    """Without the structure, motions of the blocks are unknown; earlier versions lack more."""
+    path = run.save(tmp_path / "run.nc")
+    assert str(af.History.read(path, run.structure).verdict) == str(run.verdict)
+    alone = af.History.read(path).verdict
+    assert (alone.outcome, alone.doubts) == (run.verdict.outcome, run.verdict.doubts)
+    assert "verified" not in alone.mechanisms
+    old = af.History(run.dataset.drop_vars(["opening", "rotation", "slip"]))
+    del old.dataset.attrs["displacement"], old.dataset.attrs["residual"]
+    read = af.History.read(old.save(tmp_path / "old.nc"), run.structure).verdict
+    assert np.isnan(read.displacement)
+    assert "displacement" not in str(read)
+    assert read.mechanisms["verified"].time == run.verified.moved.time
+
+
+def test_displacement_is_that_of_the_farthest_corner_from_dead_load(model, motion):
+    """By the coordinates of rigid blocks: corners turn about centroids."""
+    damping, record = af.StiffnessDamping(0.05, 8.0), af.Record(fields_every=1)
+    run = af.time_history(model, motion.cut(1.2, 1.8), dt=0.005, damping=damping, record=record)
+    far = []
+    for k, number in enumerate(model.structure.free):
+        block, q = model.structure.blocks[number], run.dataset["q"].values[:, 3 * k : 3 * k + 3]
+        for x, y in np.asarray(block.points) - block.centroid:
+            u = q[:, :2] + q[:, 2:] * np.array([-y, x])
+            far.append(np.linalg.norm(u - u[0], axis=1))
+    assert run.verdict.displacement == pytest.approx(np.max(far), rel=1e-9)
+    assert run.verdict.residual == pytest.approx(np.max(far, axis=0)[-1], rel=1e-9)
+    of_blocks = run.dataset["largest_displacement"]
+    assert float(of_blocks.max()) == pytest.approx(run.verdict.displacement, rel=1e-12)
+    fixed = [block.fixed for block in model.structure.blocks]
+    assert (of_blocks.values[fixed] == 0.0).all()
+
+
+def test_damping_by_mass_is_doubted_where_joints_open(model, motion):
+    """Its share of the losses by the kinetic energy of the recorded states."""
+    damping, record = af.Rayleigh(0.05, (8.0, 16.0)), af.Record(fields_every=1)
+    run = af.time_history(model, motion, dt=0.005, damping=damping)
+    (doubt,) = [doubt for doubt in run.doubts if "proportional to mass" in doubt.cause]
+    assert "effective_damping(model, ratio)" in doubt.remedy
+    plain = af.time_history(model, motion, dt=0.005, damping=af.StiffnessDamping(0.05, 8.0))
+    assert not [doubt for doubt in plain.doubts if "proportional to mass" in doubt.cause]
+    calm = af.time_history(model, motion.scaled(0.1), dt=0.005, damping=damping, record=record)
+    assert not calm.doubts
+
+
+def test_the_share_of_damping_by_mass_is_that_of_the_energy_lost():
+    """A rigid block on soft joints swings freely: all losses of mass damping alone are its own."""
+    model = af.build(glued(af.column(breadth=1.0, heights=[0.5])), fidelity="rigid")
+    damping = af.Rayleigh(0.05, (8.0, 16.0), joints="none")
+    time = 0.005 * np.arange(101)
+    motion = af.Motion(0.5 * np.sin(60.0 * time), 0.005)
+    monitors = []
+    with pytest.MonkeyPatch.context() as patch:
+        from archfem.dynamics import time_history as module
+
+        class Kept(module.RunMonitor):
+            def __init__(self, *given, **options):
+                super().__init__(*given, **options)
+                monitors.append(self)
+
+        patch.setattr(module, "RunMonitor", Kept)
+        af.time_history(model, motion, dt=0.0005, damping=damping)
+    # power by the kinetic energy at both ends of a step against the work of the forces
+    assert monitors[0].mass_damping_share == pytest.approx(1.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
+def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelity, scheme):
+    """Of every method those of SNES, and at each frame those that the coordinates give."""
+    slides = scheme == af.dynamics.Conserving()
+    model = af.build(ring if slides else glued(ring), fidelity=fidelity)
+    given = {"damping": af.Rayleigh(0.05, (8.0, 16.0)), "scheme": scheme, "dt": 0.005}
+    record, short = af.Record(every=3, fields_every=15), motion.cut(1.2, 1.5)
+    gauges = model.observer()
+    runs = {
+        method: af.time_history(model, short, record=record, method=method, **given)
+        for method in ("snes", "newton", "compliance")
+    }
+    for run in runs.values():
+        for name in ("opening", "rotation", "slip"):
+            expected = runs["snes"].joints[name].values
+            off = np.abs(run.joints[name].values - expected).max()
+            assert off < 1e-6 * np.abs(expected).max()  # SNES ends at 1e-8 of the forces
+        faces = gauges.faces(np.array([gauges.read(q) for q in run.dataset["q"].values]))
+        assert run.joints["rotation"].values[::5] == pytest.approx(faces[:, 1], abs=1e-13)
+        assert run.joints["slip"].values[::5] == pytest.approx(faces[:, 2], abs=1e-13)
+
+
+@pytest.fixture(scope="module")
+def paced(model, motion):
+    """A run whose steps choose their lengths, from 0.1 ms on."""
+    return af.time_history(model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)))
+
+
+@pytest.mark.slow
+def test_mechanisms_too_short_to_count_are_told(paced):
+    """By a loop over the record: what counts lasts long enough, and what came before is named."""
+    step = np.diff(paced.time, prepend=0.0)
+    failed = (paced.joints["hinge"].values != 0) | paced.joints["slide"] | paced.joints["open"]
+    runs, begin = [], None
+    for k, up in enumerate([*(failed.sum("joint").values >= 4), False]):
+        begin = k if up and begin is None else begin
+        if not up and begin is not None:
+            runs.append((paced.time[begin], step[begin:k].sum()))
+            begin = None
+    first, longest = runs[0], max(length for _, length in runs)
+    assert first[1] < longest
+    assert paced.with_criteria(af.Criteria(duration=0.0)).mechanism.time == first[0]
+    of_any = paced.with_criteria(af.Criteria(duration=0.0))
+    assert "what begins at" not in str(of_any.verdict)
+    for least in (1.01 * first[1], 1.01 * longest):
+        strict = paced.with_criteria(af.Criteria(duration=least))
+        counts = [time for time, length in runs if length >= least]
+        assert (strict.mechanism and strict.mechanism.time) == (counts[0] if counts else None)
+        words = f"begins at {first[0]:.4f} s lasts less than {1e3 * least:.3g} ms, and"
+        assert words in str(strict.verdict)
+
+
+def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, motion):
+    halted = af.time_history(
+        model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)), until=af.CountedMechanism()
+    )
+    found = halted.mechanism
+    assert found.time == paced.mechanism.time
+    held = halted.time[halted.time >= found.time]
+    before = halted.time[len(halted.time) - len(held) - 1]
+    assert held[-1] - before >= 1e-3 * (1.0 - 1e-6)
+    assert len(held) == 1 or held[-2] - before < 1e-3
