@@ -13,6 +13,7 @@ from . import units as units
 from . import view as view
 from .cases.case import Case as Case
 from .dynamics.accuracy import accuracy as accuracy
+from .dynamics.damping import effective_damping as effective_damping
 from .dynamics.events import CountedMechanism as CountedMechanism
 from .dynamics.history import History as History
 from .dynamics.history import first_mechanisms as first_mechanisms
@@ -58,6 +59,7 @@ from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
+from .studies.verdict_range import verdict_range as verdict_range
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida
 from .studies.joint_stiffness import joint_stiffness as joint_stiffness
