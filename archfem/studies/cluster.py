@@ -18,7 +18,7 @@ from archfem.cases.provenance import describe_version
 from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
-from archfem.studies.process_pool import Row, answers, row
+from archfem.studies.process_pool import Row, evaluate_batch, make_row
 
 # How long a scheduler may take to answer [s]
 PATIENCE = 10.0
@@ -32,7 +32,7 @@ LARGEST = 200
 LOST = (CommClosedError, OSError, TimeoutError, CancelledError)
 
 
-def on_cluster(
+def evaluate_on_cluster(
     points: Sequence[tuple[int, Point]], asked: Evaluator, client: Any
 ) -> Iterator[tuple[int, Row]]:
     """Answer points on the workers of a scheduler."""
@@ -52,12 +52,12 @@ def _connected(address: str) -> Client:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError as error:
         raise InvalidInput(
-            f"no scheduler with a worker answers at {address}: start 'dask scheduler' and 'dask "
+            f"no scheduler with a worker evaluate_batch at {address}: start 'dask scheduler' and 'dask "
             "worker', and give the address that the scheduler prints"
         ) from error
     except (OSError, ValueError) as error:
         raise InvalidInput(
-            f"no scheduler answers at {address!r} ({error}): start 'dask scheduler' and give the "
+            f"no scheduler evaluate_batch at {address!r} ({error}): start 'dask scheduler' and give the "
             "address that it prints, such as tcp://host:8786"
         ) from error
     return client
@@ -72,7 +72,7 @@ def _answered(
         size = _batch(len(points), sum(client.nthreads().values()))
         batches = [points[first : first + size] for first in range(0, len(points), size)]
         futures = {
-            client.submit(answers, batch, asked, version, pure=False): batch for batch in batches
+            client.submit(evaluate_batch, batch, asked, version, pure=False): batch for batch in batches
         }
         for future in as_completed(futures):
             batch = futures.pop(future)
@@ -91,7 +91,7 @@ def _rows(
     try:
         own, rows = future.result()
     except KilledWorker as error:
-        yield from ((number, row({}, f"WorkerDied: {error}", ours=False)) for number, _ in batch)
+        yield from ((number, make_row({}, f"WorkerDied: {error}", ours=False)) for number, _ in batch)
         return
     except (ImportError, AttributeError) as error:
         raise InvalidInput(

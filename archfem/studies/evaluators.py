@@ -195,7 +195,7 @@ class Evaluator:
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"
 
-    def of_case(self, case: Case) -> dict[str, Value]:
+    def evaluate(self, case: Case) -> dict[str, Value]:
         """Return what is found of a case."""
         found = self.find(case, **self.options)
         if not isinstance(found, Mapping):

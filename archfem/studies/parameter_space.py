@@ -228,17 +228,17 @@ class Point:
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def model_of(point: Point) -> str:
+def model_key(point: Point) -> str:
     """Return what points of one study have in common where they are of one model, as a rule."""
     told = [change for change in point.changes if change[0].partition(".")[0] in MODEL]
     return f"{id(point.base)} {told!r}"
 
 
-def by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
+def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
     """Return points in their order, but those of one model together: who has built it goes on."""
     groups: dict[str, list[tuple[int, Point]]] = {}
     for number, point in points:
-        groups.setdefault(model_of(point), []).append((number, point))
+        groups.setdefault(model_key(point), []).append((number, point))
     return list(chain.from_iterable(groups.values()))
 
 

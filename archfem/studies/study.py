@@ -21,12 +21,12 @@ from archfem.studies.evaluators import Evaluator, refuse_code
 from archfem.studies.parameter_space import (
     Axis,
     Point,
-    by_model,
+    group_by_model,
     changes_along,
     check_points,
     parameter_axes,
 )
-from archfem.studies.process_pool import Row, on_processes, serially
+from archfem.studies.process_pool import Row, evaluate_on_processes, evaluate_serially
 from archfem.studies.result_store import Progress, Store, load_tables, status, table, write_table
 
 logger = logging.getLogger("archfem")
@@ -192,7 +192,7 @@ class Study:
             self._tell(store, digests, rows)
         wanted = dict(zip(reversed(digests), reversed(range(len(digests))), strict=True))
         left = [number for digest, number in wanted.items() if digest not in rows]
-        missing = by_model([(number, self.points[number]) for number in reversed(left)])
+        missing = group_by_model([(number, self.points[number]) for number in reversed(left)])
         failed = sum(bool(row["error"]) for row in rows.values())
         folder = None if store is None else store.folder
         progress = Progress(len(wanted), len(rows), failed, folder)
@@ -229,10 +229,10 @@ class Study:
         )
         if count > 1 and len(points) > 1:
             log = None if folder is None else folder / LOG
-            yield from on_processes(points, self.asked, count, log, load_tables)
+            yield from evaluate_on_processes(points, self.asked, count, log, load_tables)
             return
         with threadpool_limits(limits=1):
-            yield from serially(points, self.asked)
+            yield from evaluate_serially(points, self.asked)
 
     def _digests(self) -> list[str]:
         """What tells each point from all others."""
@@ -266,9 +266,9 @@ def _on_cluster(
 ) -> Iterator[tuple[int, Row]]:
     """Answer points on a cluster, which few have installed what it takes for."""
     try:
-        from archfem.studies.cluster import on_cluster
+        from archfem.studies.cluster import evaluate_on_cluster
     except ModuleNotFoundError as error:
         raise InvalidInput(
             f"a scheduler needs {error.name}: pip install 'archfem[cluster]'"
         ) from error
-    yield from on_cluster(points, asked, client)
+    yield from evaluate_on_cluster(points, asked, client)

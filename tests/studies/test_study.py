@@ -14,7 +14,7 @@ from scipy import stats
 import archfem as af
 from archfem.cases import provenance
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.parameter_space import by_model, parameter_axes
+from archfem.studies.parameter_space import group_by_model, parameter_axes
 from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
 
@@ -85,7 +85,7 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
         asked.extend(number for number, _ in points)
         return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
 
-    monkeypatch.setattr("archfem.studies.study.serially", counted)
+    monkeypatch.setattr("archfem.studies.study.evaluate_serially", counted)
     # what failed for no reason of the case's own is tried again: numbers 4 and 5
     study.run(folder, workers=1)
     assert asked == [4, 5]
@@ -340,7 +340,7 @@ def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
 def test_points_of_one_model_are_taken_together(small_ring):
     over = {"motion.scale": [0.1, 0.2], "structure.thickness": [0.5, 0.6]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
-    sorted_points = by_model(points)
+    sorted_points = group_by_model(points)
     thick = [dict(point.changes)["structure.thickness"] for _, point in sorted_points]
     assert thick == [0.5, 0.5, 0.6, 0.6]
     assert [number for number, _ in sorted_points] == [0, 2, 1, 3]
@@ -351,15 +351,15 @@ def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
     tasks = TaskQueue(points, Evaluator.of("dead load"))
-    first = tasks.next(None, set())
-    other = tasks.next(None, {first.model})
+    first = tasks.pop(None, set())
+    other = tasks.pop(None, {first.model})
     assert other.model != first.model
-    told = [first, *(tasks.next(first.model, {other.model}) for _ in range(2))]
+    told = [first, *(tasks.pop(first.model, {other.model}) for _ in range(2))]
     assert {task.model for task in told} == {first.model}
-    third = tasks.next(first.model, {other.model})
+    third = tasks.pop(first.model, {other.model})
     assert third.model not in (first.model, other.model)
-    tasks.again(third)
-    rest = [tasks.next(other.model, {third.model}) for _ in range(5)]
+    tasks.put_back(third)
+    rest = [tasks.pop(other.model, {third.model}) for _ in range(5)]
     assert [task.model for task in rest] == 2 * [other.model] + 3 * [third.model]
     assert sorted(task.number for task in (*told, other, *rest)) == list(range(9))
     assert not tasks
