@@ -1,7 +1,7 @@
 """Parameter studies: sampling, parallel evaluation, stored results, fragility.
 
     cache            models, motions and solvers reused between points
-    cluster          Dask and SLURM
+    cluster          evaluation on a Dask cluster
     comparison       cases side by side: definition and tables
     comparison_run   running them; pairs of a suite
     convergence      order, limit and error bar; accuracy of a case

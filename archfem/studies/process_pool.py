@@ -6,7 +6,6 @@ these a model that no other worker has, so that each model is built once. A work
 replaced.
 """
 
-import ctypes
 import logging
 import os
 import pickle
@@ -16,7 +15,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from multiprocessing import Pipe, forkserver, get_context
+from multiprocessing import Pipe, forkserver, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -167,6 +166,7 @@ class Worker:
         self._process.kill()
         self._process.join()
         code = self._process.exitcode or 0
+        self._process.close()  # at which a worker ends even if its fork server was killed
         return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
@@ -258,9 +258,7 @@ def _isolated() -> Iterator[None]:
 
 def _serve(pipe: Connection, log: str) -> None:
     """Evaluate points that come through a pipe until it is closed: the main function of a worker."""
-    if sys.platform == "linux":
-        pr_set_pdeathsig = 1  # the kernel ends the worker when the fork server ends
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL, 0, 0, 0)
+    threading.Thread(target=_end_with_driver, daemon=True).start()
     with open(log, "a") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
@@ -275,6 +273,14 @@ def _serve(pipe: Connection, log: str) -> None:
                 pipe.send(make_row({}, f"{type(error).__name__}: {error}", ours=False))
             else:
                 pipe.send(evaluate_point(point, evaluator))
+
+
+def _end_with_driver() -> None:
+    """End this worker when its driver has ended, in the midst of a point if need be."""
+    driver = parent_process()
+    assert driver is not None
+    driver.join()
+    os._exit(1)
 
 
 def _pickle_task(point: Point, evaluator: Evaluator) -> bytes:

@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     begun = time.perf_counter()
     motions = tuple(records(nested if nested.is_dir() else chosen.folder))
     suite = af.Suite("TBEC-2018, class ZD", motions, reduction=3.0).matched(TARGET)
-    print(tabulate_matches(suite.matches).text())
+    print(tabulate_matches(suite.matches).text)
     print(f"matched in {time.perf_counter() - begun:.1f} s; before the reduction R = 3")
     for component in ("horizontal", "vertical"):
         rms, least, most = mean_difference(suite, component)

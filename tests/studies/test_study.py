@@ -3,7 +3,9 @@
 import errno
 import json
 import os
+import subprocess
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -304,14 +306,12 @@ def test_findings_that_cannot_be_kept(small_ring):
         study.run(workers=0)
 
 
-def test_a_job_for_slurm_names_study_folder_and_workers(study_file, tmp_path):
-    path = af.studies.slurm_job(study_file, tmp_path / "my out", tmp_path / "job.sh", workers=99)
-    text = path.read_text()
-    assert "--ntasks=100" in text
-    assert f"archfem study {study_file} --out '{tmp_path}/my out' --scheduler" in text
-    assert os.system(f"bash -n {path}") == 0
-    with pytest.raises(af.InvalidInput, match="there is no study"):
-        af.studies.slurm_job("none.toml", tmp_path, path, workers=1)
+def test_the_job_for_slurm_in_the_documentation_is_a_script(tmp_path):
+    page = (Path(__file__).parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
+    job = tmp_path / "job.sh"
+    job.write_text(page.partition("```bash\n")[2].partition("```")[0])
+    subprocess.run(["bash", "-n", str(job)], check=True)
+    assert "dask scheduler" in job.read_text()
 
 
 def test_a_file_runs_no_code_unless_one_says_so(study_file, tmp_path, capsys):
