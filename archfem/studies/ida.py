@@ -39,7 +39,7 @@ from archfem.motion.response_spectra import response_spectrum
 from archfem.studies.cache import dead_load_of, first_mode, ground_motion
 from archfem.studies.evaluators import Evaluator, Findings, of_history, run_motion
 from archfem.studies.fragility import Fragility, fragility
-from archfem.studies.parameter_space import PAIR, Axis, Point
+from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
 from archfem.studies.study import Study
 
 # By name what each is, its unit, and the power of a scale on the motion with which it grows
@@ -347,7 +347,7 @@ def _points(
         names = list((case.suite or {}).get("pairs", ()))
         if not names:
             raise InvalidInput("no motions were given, and the case has no [suite] of them")
-        changes: list[tuple[tuple[str, Any], ...]] = [((PAIR, name),) for name in names]
+        changes: list[tuple[tuple[str, Any], ...]] = [((PAIR_KEY, name),) for name in names]
         return names, tuple(Point(case.settings, case.folder, each) for each in changes)
     named = motions if isinstance(motions, Mapping) else _named(motions)
     if not named or len(named) < len(motions):

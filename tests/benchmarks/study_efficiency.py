@@ -32,7 +32,7 @@ from archfem.studies import process_pool
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
 from archfem.studies.process_pool import Row
-from archfem.studies.result_store import load_tables
+from archfem.studies.result_store import load_table_libraries
 
 MESHES = Path(__file__).parents[2] / "meshes"
 RING, BRIDGE = MESHES / "ring.toml", MESHES / "prusias_sensitivity.toml"
@@ -63,7 +63,7 @@ def bridge() -> af.Study:
 
 def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tuple[int, Row]]:
     """Answer points on one process that is not this one."""
-    return process_pool.evaluate_on_processes(points, asked, 1, meanwhile=load_tables)
+    return process_pool.evaluate_on_processes(points, asked, 1, meanwhile=load_table_libraries)
 
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:

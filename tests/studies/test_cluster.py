@@ -112,18 +112,18 @@ def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
     study, folder = af.Study.of(small_ring, over, find), tmp_path / "out"
     with cluster(tmp_path) as (address, processes):
-        original = Store.keep
+        original = Store.write_row
 
-        def keep(self, digest, row):
+        def write_row(self, digest, row):
             original(self, digest, row)
             if processes[0].poll() is None and len(self.digests()) >= 3:
                 processes[0].kill()
 
-        monkeypatch.setattr(Store, "keep", keep)
+        monkeypatch.setattr(Store, "write_row", write_row)
         with pytest.raises(af.errors.StudyStopped, match="scheduler was lost"):
             study.run(folder, client=address)
     assert 3 <= len(Store(folder).digests()) < 12
-    monkeypatch.setattr(Store, "keep", original)
+    monkeypatch.setattr(Store, "write_row", original)
     assert study.run(folder, workers=1).identical(study.run(workers=1))
 
 

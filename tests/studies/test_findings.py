@@ -2,7 +2,7 @@
 
 import json
 
-from archfem.studies.comparison import Finding, study_table, write
+from archfem.studies.comparison import Finding, study_table, write_finding
 
 DEFINITIONS = ("any four joints", "four in a ring", "ring and pier", "verified")
 
@@ -39,7 +39,7 @@ def test_a_study_tells_rings_from_piers_by_their_roles():
 
 def test_findings_are_written_as_they_are(tmp_path):
     path = tmp_path / "case.json"
-    write(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
+    write_finding(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
     kept = json.loads(path.read_text())
     assert set(kept["scales"]) == {"a", "b"}
     assert kept["runs"]["a"]["friction"]["arch"] == float("inf")

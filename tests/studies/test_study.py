@@ -137,7 +137,7 @@ def test_a_changed_case_is_told_apart(
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
         assert not set(digests[0]) & set(digests[1])
-    assert len(Store(folder).finished(digests[1])) == 0
+    assert len(Store(folder).load_rows(digests[1])) == 0
     with caplog.at_level("WARNING", logger="archfem"):
         after.run(folder, workers=1)
     assert "6 points of other cases" in caplog.text
@@ -146,7 +146,7 @@ def test_a_changed_case_is_told_apart(
 def test_a_second_driver_is_refused(study_file, tmp_path):
     folder = tmp_path / "out"
     with (
-        Store(folder).locked(),
+        Store(folder).lock(),
         pytest.raises(af.InvalidInput, match=rf"another driver .*process {os.getpid()}"),
     ):
         af.Study.read(study_file, own_code=True).run(folder, workers=1)
