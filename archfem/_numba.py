@@ -125,7 +125,7 @@ def _cache_folder() -> Path | None:
     if chosen is None and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
         return None
     # one folder for each state of the sources, for the reason given in `delete_stale_cache`
-    name = f"archfem-{_source_digest()}"
+    name = f"archfem-{source_digest()}"
     places = [Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / name]
     if chosen is not None:
         base = Path(chosen)  # or the choice of the parent process, which has such a name already
@@ -160,7 +160,7 @@ def _source_files() -> list[Path]:
     return sorted(path for source in SOURCE_FOLDERS for path in source.glob("*.py"))
 
 
-def _source_digest() -> str:
+def source_digest() -> str:
     """Compute a digest of the names and contents of these modules."""
     digest = hashlib.sha256()
     for path in _source_files():

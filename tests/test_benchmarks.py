@@ -12,7 +12,7 @@ import pytest
 SCRIPTS = Path(__file__).parent / "benchmarks"
 
 # Scripts that still use names of an earlier layout.
-OUTDATED = {"drift_and_equality", "suite_of_records", "study_kills"}
+OUTDATED = {"drift_and_equality"}
 
 NAMES = sorted(
     path.stem

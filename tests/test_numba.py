@@ -40,7 +40,7 @@ def test_where_it_is_asked_for_apart_for_each_state_of_the_sources(closed, monke
         _numba.CACHE_VARIABLE, str(chosen)
     )  # as a process has it that was started here
     assert _numba._cache_folder() == chosen
-    monkeypatch.setattr(_numba, "_source_digest", lambda: "changed")
+    monkeypatch.setattr(_numba, "source_digest", lambda: "changed")
     assert _numba._cache_folder() == chosen.with_name("archfem-changed")
 
 

@@ -16,11 +16,11 @@ def study(options: argparse.Namespace) -> None:
         return
     if options.case is None or options.out is None:
         raise InvalidInput("a study needs a file and a folder: archfem study STUDY.toml --out DIR")
-    from archfem.studies.comparison import study_tables
+    from archfem.studies.comparison import read_study_tables
 
     if options.own_code:  # compute = "module:function" beside the file
         sys.path.insert(0, str(Path(options.case).resolve().parent))
-    if "cases" in study_tables(Path(options.case)):
+    if "cases" in read_study_tables(Path(options.case)):
         _compare(options, create_result_folder(options.out))
     else:
         _run_study(options, create_result_folder(options.out))
@@ -29,12 +29,12 @@ def study(options: argparse.Namespace) -> None:
 def _compare(options: argparse.Namespace, folder: Path) -> None:
     """Compare cases: tables, and a figure of the motion scales at first mechanisms."""
     from archfem.studies.comparison import Comparison, study_table
-    from archfem.studies.comparison_run import compared, write_comparison
+    from archfem.studies.comparison_run import run_comparison, write_comparison
 
     definition = Comparison.read(options.case, options.changes)
     print(definition.title)
     findings = {}
-    for name, finding in compared(
+    for name, finding in run_comparison(
         definition, folder, workers=options.workers, client=options.scheduler
     ):
         findings[name] = finding
@@ -47,7 +47,7 @@ def _compare(options: argparse.Namespace, folder: Path) -> None:
 
 def _run_study(options: argparse.Namespace, folder: Path) -> None:
     """Run variations of one case: table of results, and errors of failed points."""
-    from archfem.studies.result_store import CSV, NETCDF
+    from archfem.studies.result_store import CSV_FILE, NETCDF_FILE
     from archfem.studies.study import Study
 
     definition = Study.read(options.case, options.changes, own_code=options.own_code)
@@ -57,5 +57,5 @@ def _run_study(options: argparse.Namespace, folder: Path) -> None:
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
         print(f"{errors.count(error)} ended in {error}")
-    for name in (NETCDF, CSV):
+    for name in (NETCDF_FILE, CSV_FILE):
         print(f"wrote {folder / name}")

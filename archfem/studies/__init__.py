@@ -1,11 +1,12 @@
 """Parameter studies: sampling, parallel evaluation, stored results, fragility.
 
     cache            models, motions and solvers reused between points
-    cluster          Dask and SLURM
+    cluster          evaluation on a Dask cluster
     comparison       cases side by side: definition and tables
     comparison_run   running them; pairs of a suite
     convergence      order, limit and error bar; accuracy of a case
-    evaluators       what is computed for one case
+    evaluators       functions from a case to a flat table
+    fork_server      loads what workers share
     fragility        fragility functions
     ida              incremental dynamic analysis
     joint_stiffness  k_n and k_s from block and joint data

@@ -1,6 +1,5 @@
 from .cache import dead_load_of as dead_load_of
 from .cache import ground_motion as ground_motion
-from .cluster import slurm_job as slurm_job
 from .comparison import Comparison as Comparison
 from .comparison import Finding as Finding
 from .comparison import study_table as study_table

@@ -1,14 +1,8 @@
-"""What a process remembers between points: models under dead load, damping, steppers, motions.
+"""Cache of a process between points: models under dead load, damping, modes, steppers, motions.
 
-Points of a study often differ in little. What a later point shares with an earlier one, by all that
-the case and its files say of it, is taken from here.
-
-Steppers that runs under many motions share: their matrices are ordered and factorised once.
-
-What a run leaves in its matrices, such as which rows of a compliance it has found, is its own: each
-run is given a copy of them as they were made, so that it does not depend on those before it.
-
-Compiled code, loaded once a process, and compiled once a machine, not once a worker.
+The points of a study often differ in few keys. Everything that a later point shares with an earlier
+one, by the contents of its case and files, is taken from here, and has the same bits as if it were
+computed anew.
 """
 
 import fcntl
@@ -17,13 +11,13 @@ import json
 import os
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+from archfem._numba import source_digest
 from archfem._typing import Array
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_file, list_input_files
@@ -40,195 +34,159 @@ from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes, modes
-from archfem.studies.parameter_space import MODEL
+from archfem.studies.parameter_space import MODEL_SECTIONS
 
-# How many lengths of steps there are kept matrices of: as many as a run of its own pace has
-KEPT = 8
+Value = TypeVar("Value")
+
+_cache: dict[str, OrderedDict[str, Any]] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class Ready:
-    """A way to step a model with some damping and scheme, ready for any motion."""
+class StepperFactory:
+    """Makes steppers of one model, damping and scheme, which share their matrices."""
 
     equation: Equation  # of motion, under any motion
-    solver: StepSolver | None  # takes the steps; None where SNES takes them all
-    _systems: dict[float, Any] = field(default_factory=dict)
+    solver: StepSolver | None  # of a step; None for SNES
+    _systems: dict[float, Any] = field(default_factory=dict)  # matrices by time step
 
     @classmethod
-    def of(cls, equation: Equation) -> "Ready":
+    def of(cls, equation: Equation) -> "StepperFactory":
         """Select the solver of an equation of motion."""
         return cls(equation, select_solver(equation))
 
-    def under(self, motion: Motion) -> Stepper:
-        """Return a fresh stepper for a run."""
-        return Shared(replace(self.equation, motion=motion), self.solver, self._systems)
+    def stepper(self, motion: Motion) -> Stepper:
+        """Return a new stepper for a run under a motion."""
+        return SharedStepper(replace(self.equation, motion=motion), self.solver, self._systems)
 
 
-class Shared(Stepper):
-    """A stepper whose matrices are copies of those that others have made."""
+class SharedStepper(Stepper):
+    """Stepper whose matrices are copies of shared ones.
+
+    A run changes its matrices, for instance by the compliance rows that it computes. Copies of the
+    matrices as they were assembled make each run independent of earlier runs.
+    """
 
     def __init__(
         self, equation: Equation, solver: StepSolver | None, systems: dict[float, Any]
     ) -> None:
         super().__init__(equation, solver)
-        self._made = systems
+        self._shared_systems = systems
 
     def allocate_batch(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
-        """Return what `base.advance` takes, as `Stepper.allocate_batch` does."""
+        """Return the arguments of `base.advance`, as `Stepper.allocate_batch` does."""
+        shared = self._shared_systems
         if dt not in self._systems:
             assert self.solver is not None
-            if dt not in self._made:
-                self._made[dt] = self.solver.system(dt)
-                while len(self._made) > KEPT:
-                    del self._made[next(iter(self._made))]
-            self._systems[dt] = self.solver.copy_system(self._made[dt])
+            if dt not in shared:
+                shared[dt] = self.solver.system(dt)
+                while len(shared) > 8:  # as many time steps as an adaptive run uses
+                    del shared[next(iter(shared))]
+            self._systems[dt] = self.solver.copy_system(shared[dt])
         return super().allocate_batch(state, dt, times)
-
-
-# What most cases step by, of the kinds that are compiled apart from each other
-USUAL = "compliance, Conserving"
 
 
 @cache
 def preload() -> None:
-    """Step a small arch once; where code is to be compiled for it, one process goes first."""
-    with _alone():
-        compile_variant(USUAL)
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    """Let one process go first, unless one has before since the sources were last changed."""
-    done = Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{_sources()}.warm"
-    if done.exists():
-        yield
-        return
-    with done.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-        done.touch()
-
-
-def _sources() -> str:
-    """What tells this state of the modules that are compiled from any other."""
-    rooms = Path(__file__).parents[1]
-    times = [
-        f"{path} {path.stat().st_mtime_ns}"
-        for room in ("dynamics", "joints")
-        for path in sorted((rooms / room).rglob("*.py"))
-    ]
-    return hashlib.sha256("\n".join(times).encode()).hexdigest()[:16]
-
-
-Made = TypeVar("Made")
-
-# How many models are kept, which may be large, and how many of anything else
-MODELS, OTHERS = 4, 64
-
-GROUND = ("motion", "suite")
-ANALYSIS = ("analysis", "criteria")
-
-# What a case says of a motion, or a suite, that is read and matched without it all the same
-FACTORS = ("scale", "reduction", "reversed")
-
-_kept: dict[str, OrderedDict[str, Any]] = {}
+    """Load the compiled code of a usual run; on each machine one process compiles it first."""
+    digest = source_digest()
+    with open(Path(tempfile.gettempdir()) / f"archfem-{os.getuid()}-{digest}.warm", "a") as file:
+        compiled = file.tell() > 0
+        if not compiled:  # many workers of a cluster would compile the same for a minute
+            fcntl.flock(file, fcntl.LOCK_EX)
+        compile_variant("compliance, Conserving")
+        if not compiled:
+            file.write("compiled\n")
 
 
 def dead_load_of(case: Case) -> DeadLoadResult:
-    """Return a case under its dead load, damping found, on a model made before if there is one.
+    """Return the dead-load result of a case, with its damping; the model is reused if cached.
 
     Args:
-        case: what is asked.
+        case: case of the structure.
 
     Raises:
         DidNotConverge: the structure does not stand.
     """
     preload()
     key = _model_key(case)
-    dead: Equilibrium = _remembered("models", key, lambda: dead_load_of_case(case), MODELS)
-    rest = DeadLoadResult(case, dead)
-    damped = f"{key} {case.analysis.get('damping')!r}"
-    found = _remembered("damping", damped, lambda: damping_of(case, dead))
-    rest.__dict__["damping"] = found  # where the cached property would put it
-    return rest
+    dead: Equilibrium = _cached_model("equilibria", key, lambda: dead_load_of_case(case))
+    result = DeadLoadResult(case, dead)
+    damping_key = f"{key} {case.analysis.get('damping')!r}"
+    # stored as the cached property `damping` of the result would store it
+    result.__dict__["damping"] = _cached("damping", damping_key, lambda: damping_of(case, dead))
+    return result
 
 
-def first_mode(rest: DeadLoadResult) -> Modes:
-    """Return the first mode about a dead load."""
-    dead = rest.dead
-    key = _model_key(rest.case)
-    return _remembered("modes", key, lambda: modes(dead.model, 1, about=dead), MODELS)
+def first_mode(result: DeadLoadResult) -> Modes:
+    """Compute the first mode about the dead load."""
+    dead = result.dead
+    return _cached_model("modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead))
 
 
 def ground_motion(case: Case) -> Motion:
-    """Return the motion of a case, or that of the only pair of its suite, matched if it is to be.
+    """Return the motion of a case, or that of the only pair of its suite.
 
     Args:
-        case: what is asked.
+        case: case with a motion or a suite of one pair.
 
     Raises:
-        InvalidInput: there is none, more than one, or it cannot be read or matched.
-        DidNotConverge: it cannot be matched.
+        InvalidInput: there is no motion or more than one, or it cannot be read or matched.
+        DidNotConverge: the matching did not converge.
     """
     if case.suite is not None and len(pairs := list(case.suite["pairs"])) > 1:
         raise InvalidInput(
-            f"the suite has {len(pairs)} pairs and a point of a study is about one: go over "
+            f"the suite has {len(pairs)} pairs, but a point of a study has one motion: vary "
             f'"suite.pair" = {pairs}'
         )
     if case.suite is not None:
         return ground_suite(case).motions[0]
     if case.motion is None:
-        return case.ground_motion()  # which says that there is none
-    plain = replace(case, motion=_without(case.motion, ("scale",)))
-    whole = _remembered("motions", _ground_key(case), plain.ground_motion)
-    return whole.scaled(case.motion.get("scale", 1.0))
+        return case.ground_motion()  # raises the error for a case without motion
+    # The scale is applied last, so that scaled motions share one file and one matching.
+    unscaled = replace(case, motion=_without(case.motion, ("scale",)))
+    key = _key(case, ("motion",), ("scale",))
+    return _cached("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
 
 def ground_suite(case: Case) -> Suite:
-    """Return the suite of a case, read and matched before if it was, at whatever scale."""
-    if (told := case.suite) is None:
-        return case.ground_suite()  # likewise
-    plain = replace(case, suite=_without(told, FACTORS))
-    found = _remembered("suites", _ground_key(case), plain.ground_suite)
-    factors = {name: told.get(name, 1.0) for name in ("scale", "reduction")}
-    scaled = replace(found, **factors)
-    return scaled.reversed() if told.get("reversed", False) else scaled
+    """Return the suite of a case; suites that differ in their factors share files and matching."""
+    if (settings := case.suite) is None:
+        return case.ground_suite()  # raises the error for a case without suite
+    keys = ("scale", "reduction", "reversed")
+    plain = replace(case, suite=_without(settings, keys))
+    suite = _cached("suites", _key(case, ("suite",), keys), plain.ground_suite)
+    suite = replace(
+        suite, scale=settings.get("scale", 1.0), reduction=settings.get("reduction", 1.0)
+    )
+    return suite.reversed() if settings.get("reversed", False) else suite
 
 
-def stepper_of(rest: DeadLoadResult, motion: Motion) -> Stepper:
-    """Return a fresh stepper for a run, the way it steps chosen whatever else the machine does."""
-    dead, damping, scheme = rest.dead, rest.damping[0], rest.case.scheme or Conserving()
+def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
+    """Return a new stepper for a run from the dead load."""
+    dead, damping, scheme = result.dead, result.damping[0], result.case.scheme or Conserving()
 
-    def ready() -> Ready:
+    def make() -> StepperFactory:
         equation = Equation(dead.transfer_memory(dead.model), motion, damping, scheme)
-        return Ready.of(equation)
+        return StepperFactory.of(equation)
 
-    key = f"{_model_key(rest.case)} {damping!r} {scheme!r}"
-    return _remembered("steppers", key, ready, MODELS).under(motion)
+    key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
+    return _cached_model("steppers", key, make).stepper(motion)
 
 
 def _model_key(case: Case) -> str:
-    """Everything that makes the model of a case; the motion too, where it is chosen for that."""
-    return _key(case, (*MODEL, *GROUND, *ANALYSIS) if case.selects_model else MODEL)
+    """Key of the model of a case; it includes the motion if that selects the model."""
+    selection = ("motion", "suite", "analysis", "criteria") if case.selects_model else ()
+    return _key(case, (*MODEL_SECTIONS, *selection))
 
 
-def _ground_key(case: Case) -> str:
-    """Everything that a case says of the ground, but for factors."""
-    left_out = {"motion": ("scale",), "suite": FACTORS}
-    return _key(case, GROUND, left_out)
-
-
-def _key(
-    case: Case, sections: Sequence[str], left_out: Mapping[str, Collection[str]] | None = None
-) -> str:
-    """What tells everything that some sections of a case say, files included."""
-    told = {
-        name: _without(case.settings[name], (left_out or {}).get(name, ()))
-        for name in sections
-        if name in case.settings
+def _key(case: Case, sections: Sequence[str], left_out: Collection[str] = ()) -> str:
+    """Digest of some sections of a case and of the files that they name."""
+    settings = {
+        name: _without(case.settings[name], left_out) for name in sections if name in case.settings
     }
-    files = [(str(p), hash_file(p)) for p in list_input_files(told, case.folder)]
-    text = json.dumps([told, files], default=str)  # arches and piers stand in their order
+    files = [(str(p), hash_file(p)) for p in list_input_files(settings, case.folder)]
+    # keys are not sorted: the order of arches and piers is that in the bridge
+    text = json.dumps([settings, files], default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -237,12 +195,17 @@ def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key not in keys}
 
 
-def _remembered(kind: str, key: str, make: Callable[[], Made], most: int = OTHERS) -> Made:
-    """What was made before under a key, or what is made now; of many the oldest is forgotten."""
-    kept = _kept.setdefault(kind, OrderedDict())
-    if key not in kept:
-        kept[key] = make()
-        while len(kept) > most:
-            kept.popitem(last=False)
-    kept.move_to_end(key)
-    return kept[key]
+def _cached_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
+    """As `_cached`, for objects as large as a model."""
+    return _cached(kind, key, make, limit=4)
+
+
+def _cached(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
+    """Return a cached object of a kind, or make it; the least recently used one is dropped."""
+    objects = _cache.setdefault(kind, OrderedDict())
+    if key not in objects:
+        objects[key] = make()
+        while len(objects) > limit:
+            objects.popitem(last=False)
+    objects.move_to_end(key)
+    return objects[key]

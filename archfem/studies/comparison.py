@@ -1,9 +1,4 @@
-"""Several cases side by side: what a measure buys, what an assumption decides.
-
-What a study finds of its cases: kept in files, set side by side in tables.
-
-A study's file as tables.
-"""
+"""Comparison of several cases under the motions of their suites: definition, findings and tables."""
 
 import json
 import re
@@ -32,31 +27,31 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, part_roles
 from archfem.limit.mechanism_count import MECHANISM_KINDS
 from archfem.studies.cache import dead_load_of, first_mode, ground_motion, ground_suite
-from archfem.studies.evaluators import Evaluator, Findings, of_scales, run_motion
-from archfem.studies.parameter_space import PAIR, Axis, Point
+from archfem.studies.evaluators import Evaluator, Findings, run_motion, scales_of
+from archfem.studies.parameter_space import PAIR_KEY, Axis, Point
 
 
-def study_tables(path: Path) -> dict[str, Any]:
-    """Return the tables of a study's file."""
+def read_study_tables(path: Path) -> dict[str, Any]:
+    """Read the TOML tables of a study file."""
     return read_tables(path, "study")
 
 
 @dataclass
 class Finding:
-    """What was found of one case.
+    """Findings of one case of a comparison.
 
     Attributes:
-        case: the case as text.
-        frequency: of the first mode about the dead load [Hz].
-        mass: its share of the mass along x [-].
-        roles: of the rings and piers, by part.
-        dead: largest |e| of each of them under dead load [-].
-        runs: by pair, the largest `eccentricity` and `friction` of each part [-], the first of the
-            `mechanisms` by each definition, its kind and time [s], how the run `ended`, the same in
-            words, `outcome`, and what it left, `fall`, where displacements may be large.
-        scales: by pair and definition, the least factor found to fail and the largest below it
-            found not to; infinite where none failed.
-        search: options with which they were searched for; None where that was not kept.
+        case: case as TOML text.
+        frequency: frequency of the first mode about the dead load [Hz].
+        mass: mass ratio of this mode along x [-].
+        roles: roles, "ring" or "pier", by part.
+        dead: largest |e| under dead load by part [-].
+        runs: by pair the largest `eccentricity` and `friction` of each part [-], the kind and time
+            [s] of the first of the `mechanisms` by definition, how the run `ended`, this as a
+            sentence, `outcome`, and the state after a collapse, `fall`, for large displacements.
+        scales: by pair and definition the smallest failing scale and the largest scale below it
+            that survives [-]; infinite if none fails.
+        search: options of the search for scales; None without a search.
     """
 
     case: str
@@ -69,105 +64,95 @@ class Finding:
     search: dict[str, Any] | None = None
 
     def of_pairs(self, pairs: Sequence[str]) -> "Finding":
-        """Return what was found under some of the pairs.
+        """Return the findings under some of the pairs.
 
         Args:
-            pairs: their names; those of which nothing is known are left out.
+            pairs: names of pairs; pairs without findings are left out.
         """
-        runs, scales = ({p: of[p] for p in pairs if p in of} for of in (self.runs, self.scales))
+        runs = {pair: self.runs[pair] for pair in pairs if pair in self.runs}
+        scales = {pair: self.scales[pair] for pair in pairs if pair in self.scales}
         return replace(self, runs=runs, scales=scales)
 
     def least(self, definition: str) -> Array:
-        """Return the least factor that fails by a definition, of each pair (pairs,) [-].
+        """Return the smallest failing scale of each pair (pairs,) [-].
 
         Args:
-            definition: one of `MECHANISM_DEFINITIONS`.
+            definition: definition of a mechanism, one of `MECHANISM_DEFINITIONS`.
         """
-        return np.array([found[definition][0] for found in self.scales.values()])
+        return np.array([scales[definition][0] for scales in self.scales.values()])
 
     @property
     def factors(self) -> dict[str, Array]:
-        """`least` of each definition."""
+        """Smallest failing scales by definition, as `least`."""
         return {definition: self.least(definition) for definition in MECHANISM_DEFINITIONS}
 
 
-def by_part(values: xr.DataArray) -> dict[str, float]:
-    """Return the largest value of each part's joints."""
+def largest_by_part(values: xr.DataArray) -> dict[str, float]:
+    """Return the largest value over the joints of each part."""
     largest = values.groupby("part").max()
     return dict(zip(largest["part"].values.tolist(), largest.values.tolist(), strict=True))
 
 
-def write(finding: Finding, path: Path) -> None:
-    """Write findings in one stroke."""
+def write_finding(finding: Finding, path: Path) -> None:
+    """Write the findings of a case as JSON."""
     with atomic_write(path) as draft:
         draft.write_text(json.dumps(asdict(finding), indent=1), encoding="utf-8")
 
 
 def study_table(findings: Mapping[str, Finding]) -> str:
-    """Return two tables, a line for each case.
+    """Return two tables with a line for each case.
 
-    The first tells of the motions as each case applies them: the first mode, the gravest joint of
-    rings and piers (its median over the pairs), in how many pairs each definition of a mechanism
-    is met, in how many a mechanism of which class by the words of Demirel and Aldemir, and, where
-    displacements may be large, in how many blocks fall; a run
-    that broke off tells only of the time before, and is counted below. The second, where they were
-    looked for, tells by what factor on the whole motions they begin: the median over the pairs, and
-    their range.
+    The first table is for the motions as the cases apply them. It has the first mode, the largest
+    |e| of rings and piers (median over the pairs), and the number of pairs with a mechanism, by
+    definition and by the classes of Demirel and Aldemir. For large displacements it has the number
+    of pairs in which blocks fall. Incomplete runs count with their part before the failure and are
+    listed below. The second table, if scales were searched, has the median and range over the pairs
+    of the scale of the whole motion at the first mechanism.
 
     Args:
-        findings: by name of the case.
+        findings: findings by name of the case.
     """
-    head = [
-        "case",
-        "mode 1",
-        "mass x",
-        "|e| dead",
-        "|e| rings",
-        "|e| piers",
-        *MECHANISM_DEFINITIONS,
-    ]
-    head.append(PUBLISHED_DEFINITION)
-    falling = any(_falls(found) for found in findings.values())
-    head += ["blocks fall"] if falling else []
+    head = ["case", "mode 1", "mass x", "|e| dead", "|e| rings", "|e| piers"]
+    head += [*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION]
+    falls = [_falls_text(finding) for finding in findings.values()]
     rows = []
-    for name, found in findings.items():
-        cells = [name, f"{found.frequency:.2f} Hz", f"{found.mass:.0%}"]
-        cells.append(f"{max(found.dead.values()):.3f}")
-        cells += [_largest(found, role) for role in ("ring", "pier")]
+    for name, finding in findings.items():
+        cells = [name, f"{finding.frequency:.2f} Hz", f"{finding.mass:.0%}"]
+        cells.append(f"{max(finding.dead.values()):.3f}")
+        cells += [_median_eccentricity(finding, role) for role in ("ring", "pier")]
         for definition in MECHANISM_DEFINITIONS:
-            met = [run["mechanisms"][definition] is not None for run in found.runs.values()]
-            cells.append(f"{sum(met)} of {len(met)}")
-        rows.append([*cells, _classes(found), *([_falls(found) or "-"] if falling else [])])
-    tables = [align_columns(head, rows), *_broken(findings)]
-    if any(found.scales for found in findings.values()):
+            occurs = [run["mechanisms"][definition] is not None for run in finding.runs.values()]
+            cells.append(f"{sum(occurs)} of {len(occurs)}")
+        rows.append([*cells, _classes_text(finding)])
+    if any(falls):
+        head.append("blocks fall")
+        rows = [[*row, text or "-"] for row, text in zip(rows, falls, strict=True)]
+    tables = [align_columns(head, rows), *_incomplete_runs(findings)]
+    if any(finding.scales for finding in findings.values()):
         rows = [
-            [name, *(_range(found.least(definition)) for definition in MECHANISM_DEFINITIONS)]
-            for name, found in findings.items()
+            [name, *(_range_text(finding.least(kind)) for kind in MECHANISM_DEFINITIONS)]
+            for name, finding in findings.items()
         ]
         tables.append(align_columns(["factor at first mechanism", *MECHANISM_DEFINITIONS], rows))
     return "\n\n".join(tables)
 
 
-def _classes(finding: Finding) -> str:
-    """In how many pairs a mechanism of each class is met, by the words of Demirel and Aldemir."""
-    met = [
-        found["kind"]
-        for run in finding.runs.values()
-        if (found := run["mechanisms"][PUBLISHED_DEFINITION])
-    ]
-    return (
-        ", ".join(f"{met.count(kind)} {kind}" for kind in MECHANISM_KINDS if kind in met) or "none"
-    )
+def _classes_text(finding: Finding) -> str:
+    """Number of pairs with a mechanism of each class of Demirel and Aldemir."""
+    mechanisms = [run["mechanisms"][PUBLISHED_DEFINITION] for run in finding.runs.values()]
+    kinds = [mechanism["kind"] for mechanism in mechanisms if mechanism]
+    counts = [f"{kinds.count(kind)} {kind}" for kind in MECHANISM_KINDS if kind in kinds]
+    return ", ".join(counts) or "none"
 
 
-def _falls(finding: Finding) -> str:
-    """In how many pairs blocks fall; empty where displacements were taken as small."""
-    known = [kind for run in finding.runs.values() if (kind := run.get("fall")) is not None]
-    return f"{sum(kind in FALLEN_STATES for kind in known)} of {len(known)}" if known else ""
+def _falls_text(finding: Finding) -> str:
+    """Number of pairs in which blocks fall; empty for small displacements."""
+    states = [state for run in finding.runs.values() if (state := run.get("fall")) is not None]
+    return f"{sum(state in FALLEN_STATES for state in states)} of {len(states)}" if states else ""
 
 
-def _broken(findings: Mapping[str, Finding]) -> list[str]:
-    """A line for each case with runs that broke off, as one text or none."""
+def _incomplete_runs(findings: Mapping[str, Finding]) -> list[str]:
+    """A text with a line for each case with incomplete runs; no text if there are none."""
     lines = []
     for name, finding in findings.items():
         failed = [run["ended"] == Ending.FAILED for run in finding.runs.values()]
@@ -176,34 +161,24 @@ def _broken(findings: Mapping[str, Finding]) -> list[str]:
     return ["\n".join(lines)] if lines else []
 
 
-def _largest(finding: Finding, role: str) -> str:
-    """Median over the pairs of the largest |e| in all rings, or in all piers."""
-    each = [
-        max(
-            (e for part, e in run["eccentricity"].items() if finding.roles[part] == role),
-            default=None,
-        )
+def _median_eccentricity(finding: Finding, role: str) -> str:
+    """Median over the pairs of the largest |e| of all rings, or of all piers."""
+    parts = [part for part, each in finding.roles.items() if each == role]
+    by_pair = [
+        [run["eccentricity"][part] for part in parts if part in run["eccentricity"]]
         for run in finding.runs.values()
     ]
-    known = [e for e in each if e is not None]
-    return f"{np.median(known):.3f}" if known else "-"
+    largest = [max(values) for values in by_pair if values]
+    return f"{np.median(largest):.3f}" if largest else "-"
 
 
-def _range(factors: Array) -> str:
-    """Median and range of factors; a dash where there is none up to the largest that was tried."""
-    if not len(factors) or np.isinf(factors).all():
+def _range_text(scales: Array) -> str:
+    """Median and range of scales; a dash if none failed up to the largest that was tried."""
+    if not len(scales) or np.isinf(scales).all():
         return "-"
-    low, middle, high = np.quantile(factors, [0.0, 0.5, 1.0], method="nearest")
-    return f"{_factor(middle)} ({_factor(low)} to {_factor(high)})"
-
-
-def _factor(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "-"
-
-
-CASE = {"case": str, "set": [str]}
-SCALES = {"precision": "1", "range": ["1"]}
-STUDY = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
+    quantiles = np.quantile(scales, [0.5, 0.0, 1.0], method="nearest")
+    middle, low, high = (f"{q:.2f}" if np.isfinite(q) else "-" for q in quantiles)
+    return f"{middle} ({low} to {high})"
 
 
 @dataclass(frozen=True)
@@ -211,11 +186,11 @@ class Comparison:
     """Cases to compare, each under the motions of its suite.
 
     Attributes:
-        title: in words.
-        cases: by the name of each.
+        title: title.
+        cases: cases by name.
         pairs: pairs of the suites that are run; None for all.
-        scales: options of `mechanism_scales`, which finds the factors on the whole motions at
-            which mechanisms begin; None finds none.
+        scales: options of `mechanism_scales`, which searches the scales of the whole motions at the
+            first mechanisms; None for no search.
     """
 
     title: str
@@ -230,36 +205,36 @@ class Comparison:
         return float(suite.get("reduction", 1.0) / suite.get("scale", 1.0))
 
     @property
-    def asked(self) -> Evaluator:
-        """What is asked of each case under each pair."""
+    def evaluator(self) -> Evaluator:
+        """The function that is evaluated for each case under each pair."""
         return Evaluator(evaluate_comparison, {"scales": self.scales})
 
     @cached_property
     def axis(self) -> Axis:
-        """Names of cases and pairs, point by point.
+        """Names of case and pair of each point.
 
         Raises:
-            InvalidInput: a case has none of the pairs asked for.
+            InvalidInput: a case has none of the pairs.
         """
-        rows = [(name, pair) for name in self.cases for pair in self.wanted(name)]
+        rows = [(name, pair) for name in self.cases for pair in self.pairs_of(name)]
         return Axis("point", ("case", "pair"), tuple(rows))
 
     @property
     def points(self) -> tuple[Point, ...]:
         """Each case under each of its pairs."""
         return tuple(
-            Point(self.cases[name].settings, self.cases[name].folder, ((PAIR, pair),))
+            Point(self.cases[name].settings, self.cases[name].folder, ((PAIR_KEY, pair),))
             for name, pair in self.axis.rows
         )
 
-    def wanted(self, name: str) -> list[str]:
-        """Return the pairs of a case that are asked for.
+    def pairs_of(self, name: str) -> list[str]:
+        """Return the pairs under which a case is run.
 
         Args:
-            name: of the case.
+            name: name of the case.
 
         Raises:
-            InvalidInput: it has none of them.
+            InvalidInput: the case has none of the pairs.
         """
         suite = self.cases[name].suite or {}
         pairs = [pair for pair in suite["pairs"] if self.pairs is None or pair in self.pairs]
@@ -271,91 +246,95 @@ class Comparison:
 
     @classmethod
     def read(cls, path: str | Path, changes: Sequence[str] = ()) -> "Comparison":
-        """Read a comparison: a TOML file that names case files and changes to them.
+        """Read a comparison from a TOML file that names case files and changes to them.
 
         Args:
-            path: with a table [cases."name"] for each, of `case`, a file, and `set`, a list of
-                "section.key=value"; `set` above the tables changes all cases, before their own.
-            changes: made to every case.
+            path: path of a file with tables [cases."name"] of `case`, a file, and `set`, a list of
+                "section.key=value". `set` above the tables changes all cases, before their own.
+            changes: changes to every case, "section.key=value".
 
         Returns:
             The comparison.
 
         Raises:
-            InvalidInput: the file or one of its cases cannot be meant.
+            InvalidInput: the file or one of its cases is invalid.
         """
         path = Path(path)
-        given = study_tables(path)
-        refuse_unknown(given, STUDY)
-        given, cases = check_table(given, STUDY, "study"), {}
-        for name, table in given.get("cases", {}).items():
-            own = check_table(table, CASE, f"cases.{name}")
-            if "case" not in own:
+        settings = read_study_tables(path)
+        kinds = {"title": str, "scales": (bool, dict), "pairs": [str], "set": [str], "cases": dict}
+        refuse_unknown(settings, kinds)
+        settings, cases = check_table(settings, kinds, "study"), {}
+        for name, table in settings.get("cases", {}).items():
+            case = check_table(table, {"case": str, "set": [str]}, f"cases.{name}")
+            if "case" not in case:
                 raise InvalidInput(f"{path}: cases.{name} names no case file")
-            both = [*given.get("set", []), *own.get("set", []), *changes]
-            cases[name] = Case.read(path.parent / own["case"], both)
+            all_changes = [*settings.get("set", []), *case.get("set", []), *changes]
+            cases[name] = Case.read(path.parent / case["case"], all_changes)
             if cases[name].suite is None:
                 raise InvalidInput(f"{path}: the case of '{name}' has no [suite] to compare under")
         if not cases:
             raise InvalidInput(f'{path} has no cases: write [cases."name"] with case = "file.toml"')
-        pairs = given.get("pairs")
+        pairs = settings.get("pairs")
         _check_names(path, cases, pairs or ())
         return cls(
-            given.get("title", path.stem),
+            settings.get("title", path.stem),
             cases,
             None if pairs is None else tuple(pairs),
-            _search(given.get("scales", False)),
+            _parse_search(settings.get("scales", False)),
         )
 
 
 def evaluate_comparison(case: Case, scales: Mapping[str, Any] | None = None) -> Findings:
-    """Return what is set side by side of a case under the one pair of its suite."""
-    rest, motion = dead_load_of(case), ground_motion(case)
-    joints, first = assessed_joints(rest.dead.joints), first_mode(rest)
-    found: Findings = {
+    """Return the findings of a case under the one pair of its suite."""
+    result, motion = dead_load_of(case), ground_motion(case)
+    joints, first = assessed_joints(result.dead.joints), first_mode(result)
+    findings: Findings = {
         "frequency": float(first.frequencies[0]),
         "mass": float(first.mass_ratios[0, 0]),
-        **_each("role", part_roles(joints)),
-        **_each("dead", by_part(abs(joints["eccentricity"]).fillna(0.5))),
+        **_prefix("role", part_roles(joints)),
+        **_prefix("dead", largest_by_part(abs(joints["eccentricity"]).fillna(0.5))),
     }
     try:
-        run = run_motion(rest, motion)
+        run = run_motion(result, motion)
     except DidNotConverge as error:
         run = partial_history(error)
-    found |= of_run(run)
+    findings |= findings_of_run(run)
     if scales is not None:
         suite = ground_suite(case)
-        factors = of_scales(rest, suite.pairs[0].scaled(suite.scale), **scales)
-        for name, factor in factors.items():
+        # the whole motion: the reduction R of the suite is not applied
+        bounds = scales_of(result, suite.pairs[0].scaled(suite.scale), **scales)
+        for name, scale in bounds.items():
             definition, survives, _ = name.partition(", survives")
-            found[f"{'survives' if survives else 'scale'}: {definition}"] = factor
-    return found
+            findings[f"{'survives' if survives else 'scale'}: {definition}"] = scale
+    return findings
 
 
-def of_run(run: History) -> Findings:
-    """Return what is kept of a run, which may have broken off."""
-    joints, met = assessed_joints(run.joints), first_mechanisms(run)
+def findings_of_run(run: History) -> Findings:
+    """Return the findings of a run, which may be incomplete."""
+    joints, mechanisms = assessed_joints(run.joints), first_mechanisms(run)
+    eccentricity = abs(joints["eccentricity"]).max("time").fillna(0.5)
+    friction = joints["friction"].max("time").fillna(np.inf)
     return {
-        **_each("eccentricity", by_part(abs(joints["eccentricity"]).max("time").fillna(0.5))),
-        **_each("friction", by_part(joints["friction"].max("time").fillna(np.inf))),
-        **_each("mechanism", {name: str(m.kind) if m else "" for name, m in met.items()}),
-        **_each("time", {name: m.time if m else np.inf for name, m in met.items()}),
+        **_prefix("eccentricity", largest_by_part(eccentricity)),
+        **_prefix("friction", largest_by_part(friction)),
+        **_prefix("mechanism", {name: str(m.kind) if m else "" for name, m in mechanisms.items()}),
+        **_prefix("time", {name: m.time if m else np.inf for name, m in mechanisms.items()}),
         "fall": "" if run.fall is None else run.fall.kind,
         "ended": str(run.ending),
         "outcome": run.outcome,
     }
 
 
-def _each(word: str, values: Mapping[str, Any]) -> Findings:
-    """Values under their names, a word before each."""
-    return {f"{word}: {name}": value for name, value in values.items()}
+def _prefix(prefix: str, values: Mapping[str, Any]) -> Findings:
+    """Prepend a prefix to all names; a flat table has no tables in it."""
+    return {f"{prefix}: {name}": value for name, value in values.items()}
 
 
-def _search(given: Any) -> dict[str, Any] | None:
-    """What a study says of the search for factors: a table of options, true or false."""
-    if isinstance(given, bool):
-        return {} if given else None
-    options = check_table(given, SCALES, "scales")
+def _parse_search(setting: Any) -> dict[str, Any] | None:
+    """Options of the search for scales; None for no search."""
+    if isinstance(setting, bool):
+        return {} if setting else None
+    options = check_table(setting, {"precision": "1", "range": ["1"]}, "scales")
     if "range" in options:
         if len(options["range"]) != 2:
             raise InvalidInput(f"scales.range = {options['range']}: give the least and the largest")
@@ -364,7 +343,7 @@ def _search(given: Any) -> dict[str, Any] | None:
 
 
 def file_name(name: str) -> str:
-    """Return a name as that of a file."""
+    """Return a file name for the name of a case."""
     return re.sub(r"[^\w+-]+", "_", name).strip("_")
 
 
@@ -377,6 +356,6 @@ def _check_names(path: Path, cases: Mapping[str, Case], pairs: Sequence[str]) ->
                 f"{path}: '{name}' names a file of results too, and '{file}.json' is not its own: "
                 "let names differ in letters and digits"
             )
-    known = {pair for case in cases.values() for pair in (case.suite or {})["pairs"]}
-    if strange := [pair for pair in pairs if pair not in known]:
-        raise InvalidInput(f"{path}: no case has the pairs {strange}, but {sorted(known)}")
+    available = {pair for case in cases.values() for pair in (case.suite or {})["pairs"]}
+    if unknown := [pair for pair in pairs if pair not in available]:
+        raise InvalidInput(f"{path}: no case has the pairs {unknown}, but {sorted(available)}")

@@ -1,7 +1,4 @@
-"""What a study asks of each case: one function, by name or given, and its options.
-
-What can be found of a case, by name: each a function from a case to a flat table.
-"""
+"""Evaluators: functions from a case to a flat table of findings, by name or given by the user."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -25,14 +22,14 @@ from archfem.masonry.structure import suggest_name
 from archfem.motion.motion import Motion
 from archfem.studies.cache import dead_load_of, first_mode, ground_motion, stepper_of
 
+# A flat table: numbers, texts and rows of numbers by name
 Findings = dict[str, Any]
 
 
-def at_rest(case: Case) -> Findings:
-    """Return what there is to say of a case before the ground moves."""
-    rest = dead_load_of(case)
-    dead = rest.dead
-    joints, first = assessed_joints(dead.joints), first_mode(rest)
+def evaluate_dead_load(case: Case) -> Findings:
+    """Return the largest joint ratios under dead load, and the first mode about it."""
+    result = dead_load_of(case)
+    joints, first = assessed_joints(result.dead.joints), first_mode(result)
     return {
         "eccentricity": float(abs(joints["eccentricity"]).fillna(0.5).max()),
         "friction": float(joints["friction"].max()),
@@ -42,18 +39,17 @@ def at_rest(case: Case) -> Findings:
     }
 
 
-def history(case: Case) -> Findings:
-    """Return what a run of a case came to."""
-    rest, motion = dead_load_of(case), ground_motion(case)
-    return of_history(run_motion(rest, motion))
+def evaluate_history(case: Case) -> Findings:
+    """Return the findings of the time history of a case."""
+    return of_history(run_motion(dead_load_of(case), ground_motion(case)))
 
 
 def run_motion(rest: DeadLoadResult, motion: Motion) -> History:
-    """Return a whole time history of a case, stepped in the same way each time.
+    """Return the time history of a case under a motion, independent of earlier runs.
 
     Args:
-        rest: the case under its dead load.
-        motion: of the ground.
+        rest: dead-load result of the case.
+        motion: ground motion.
 
     Raises:
         DidNotConverge: a step failed.
@@ -70,51 +66,53 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     """Return the findings of a run.
 
     Args:
-        run: what happened.
-        mechanisms: its first ones, as by `first_mechanisms`, which finds them if they are not told.
+        run: time history.
+        mechanisms: its first mechanisms by definition; by default those of `first_mechanisms`.
 
     Returns:
-        The largest of rings and piers: `eccentricity`, |e| [-], 0.5 where a joint is open;
-        `friction`, |V| / N [-]; `rotation` [rad], `opening` [m] and `slip` [m] of a joint; the
-        largest and the residual `integrate_displacement` [m] of a block; by each definition of a mechanism
-        the time of the first [s], infinite where there is none, and its class; how the run
-        `ended`; what is left, `fall`, where displacements may be large; the largest drift of its
-        energy at any step, of what was exchanged, `energy_drift` [-], and how many `doubts` it has.
+        The largest values over time and the joints of rings and piers: `eccentricity`, |e| [-], 0.5
+        for an open joint; `friction`, |V| / N [-]; `rotation` [rad], `opening` [m], `slip` [m].
+        The `largest_displacement` and `residual_displacement` of a block [m]. By definition of a
+        mechanism the time of the first one [s], infinite if there is none, and its class. How the
+        run `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`,
+        the largest energy error at any step over the exchanged energy [-]. `doubts`, the number of
+        warnings.
     """
-    found: Findings = {
+    findings: Findings = {
         "eccentricity": _largest(run, "eccentricity", 0.5),
         "friction": _largest(run, "friction", np.inf),
         **{name: _largest(run, name) for name in ("rotation", "opening", "slip")},
     }
-    for name in ("largest_displacement", "residual_displacement"):
-        found[name] = float(run.dataset[name].max())
-    for definition, met in (mechanisms or first_mechanisms(run)).items():
-        found[definition] = np.inf if met is None or met.time is None else met.time
-        found[f"{definition}, class"] = "" if met is None else str(met.kind)
-    found |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
+    verdict = run.verdict
+    findings |= {"outcome": verdict.outcome, "largest_displacement": verdict.displacement}
+    findings["residual_displacement"] = verdict.residual
+    for definition, first in (mechanisms or first_mechanisms(run)).items():
+        findings[definition] = np.inf if first is None or first.time is None else first.time
+        findings[f"{definition}, class"] = "" if first is None else str(first.kind)
+    findings |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
     drift = float(run.dataset.attrs["energy_drift"])
-    return found | {"energy_drift": drift, "doubts": float(len(run.doubts))}
+    return findings | {"energy_drift": drift, "doubts": float(len(verdict.doubts))}
 
 
 def _largest(run: History, name: str, undefined: float = -np.inf) -> float:
-    """Largest size of something of the joints of rings and piers; what stands for it where NaN."""
+    """Largest magnitude over time and the joints of rings and piers; `undefined` replaces NaN."""
     sizes = np.abs(run.dataset[name].values[..., run.dataset["judged"].values])
     return float(np.where(np.isnan(sizes), undefined, sizes).max())
 
 
-def scales(
+def evaluate_scales(
     case: Case, precision: float = 0.05, between: tuple[float, float] = (0.05, 5.0)
 ) -> Findings:
-    """Return by what factor on the motion of a case each definition of a mechanism is first met."""
-    rest, motion = dead_load_of(case), ground_motion(case)
-    return of_scales(rest, motion, precision=precision, between=between)
+    """Return the scale of the motion at the first mechanism of each definition."""
+    motion = ground_motion(case)
+    return scales_of(dead_load_of(case), motion, precision=precision, between=between)
 
 
-def of_scales(rest: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
-    """Return the factors on a motion at which mechanisms begin, as `scales` does."""
+def scales_of(rest: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
+    """Return the scales of a motion at first mechanisms, as `evaluate_scales` does."""
     options["between"] = tuple(options.get("between", (0.05, 5.0)))
     with log_prefix(rest.case.title, motion.name):
-        found = mechanism_scales(
+        scales = mechanism_scales(
             rest.dead.model,
             motion,
             start=rest.dead,
@@ -124,89 +122,87 @@ def of_scales(rest: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
             method=partial(stepper_of, rest),
             **options,
         )
-    if found.interrupted:
+    if scales.interrupted:
         raise KeyboardInterrupt
-    brackets = {definition: found[definition] for definition in MECHANISM_DEFINITIONS}
-    return {name: each.upper for name, each in brackets.items()} | {
-        f"{name}, survives": each.lower for name, each in brackets.items()
+    return {name: scales[name].upper for name in MECHANISM_DEFINITIONS} | {
+        f"{name}, survives": scales[name].lower for name in MECHANISM_DEFINITIONS
     }
 
 
-def limit(case: Case) -> Findings:
-    """Return what limit analysis finds of a case."""
+def evaluate_limit(case: Case) -> Findings:
+    """Return the collapse factor of a case by limit analysis, and the size of its mechanism."""
     if case.limit is None:
         raise InvalidInput("the case has no [limit]: give horizontal = 1.0, or a point load")
-    found = case.limit.solve(case.structure)
+    collapse = case.limit.solve(case.structure)
     return {
-        "factor": float(found.factor),
-        "outcome": str(found.outcome.name).lower(),
-        "hinges": len(found.hinges),
-        "slides": len(found.sliding),
+        "factor": float(collapse.factor),
+        "outcome": str(collapse.outcome.name).lower(),
+        "hinges": len(collapse.hinges),
+        "slides": len(collapse.sliding),
     }
 
 
-# What a study may ask for by name
-FINDERS: Mapping[str, Callable[..., Findings]] = {
-    "history": history,
-    "scales": scales,
-    "dead load": at_rest,
-    "limit": limit,
+# Functions that a study file may name
+NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
+    "history": evaluate_history,
+    "scales": evaluate_scales,
+    "dead load": evaluate_dead_load,
+    "limit": evaluate_limit,
 }
-
-
-# One finding: a number, words, or a row of numbers
-Value = float | int | str | list[float]
-
-# Finds something of a case: a flat table of numbers, words and rows of numbers
-Find = Callable[..., Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
 class Evaluator:
     """A function from a case to findings, with its options."""
 
-    find: Find  # the function; it takes a case and the options as keywords
+    find: Callable[..., Mapping[str, Any]]  # takes a case, and the options as keywords
     options: Mapping[str, Any] = field(default_factory=dict)  # of the function, by name
 
     @classmethod
-    def of(cls, given: Any) -> "Evaluator":
-        """Return what is asked for."""
+    def of(cls, setting: Any) -> "Evaluator":
+        """Return the evaluator of a function, a name, or a table of `name` and options."""
         options: dict[str, Any] = {}
-        if isinstance(given, Mapping):
-            options = dict(given)
-            given = options.pop("name", None)
-        find = _by_name(given) if isinstance(given, str) else given
+        if isinstance(setting, Mapping):
+            options = dict(setting)
+            setting = options.pop("name", None)
+        find = _find_function(setting) if isinstance(setting, str) else setting
         if not callable(find):
             raise InvalidInput(
-                f"cannot compute {given!r}: name one of {sorted(FINDERS)}, or 'module:function'"
+                f"cannot compute {setting!r}: name one of {sorted(NAMED_EVALUATORS)}, or "
+                "'module:function'"
             )
         try:
             inspect.signature(find).bind(None, **options)
         except TypeError as error:
-            raise InvalidInput(f"{given!r} does not take {options}: {error}") from error
+            raise InvalidInput(f"{setting!r} does not take {options}: {error}") from error
         return cls(find, options)
 
     @property
     def text(self) -> str:
-        """What tells this from anything else that is asked: the function's module, and options."""
+        """Text that identifies function and options: the name, and the source of its module."""
         name = f"{self.find.__module__}:{getattr(self.find, '__qualname__', repr(self.find))}"
         try:
-            source = _source(self.find)
+            file = inspect.getsourcefile(self.find)
+            # The whole module, since the function may call others of it.
+            in_file = file is not None and Path(file).is_file()
+            source = Path(str(file)).read_text("utf-8") if in_file else inspect.getsource(self.find)
         except (OSError, TypeError):
             source = ""
         return f"{name} {sorted(self.options.items())!r}\n{source}"
 
-    def of_case(self, case: Case) -> dict[str, Value]:
-        """Return what is found of a case."""
-        found = self.find(case, **self.options)
-        if not isinstance(found, Mapping):
-            raise InvalidInput(f"find gave a {type(found).__name__}: it is to give a flat table")
-        return {str(key): _value(key, value) for key, value in found.items()}
+    def evaluate(self, case: Case) -> Findings:
+        """Return the findings of a case."""
+        findings = self.find(case, **self.options)
+        if not isinstance(findings, Mapping):
+            raise InvalidInput(
+                f"compute returned a {type(findings).__name__}: it must return a flat table"
+            )
+        return {str(key): _to_json(key, value) for key, value in findings.items()}
 
 
-def refuse_code(given: Any) -> None:
-    """Refuse what a file says is to be found if that is code of its own."""
-    name = given.get("name") if isinstance(given, Mapping) else given
+def refuse_code(setting: Any) -> None:
+    """Refuse a function of the user in a study file, since importing it would run its code."""
+    name = setting.get("name") if isinstance(setting, Mapping) else setting
     if isinstance(name, str) and ":" in name:
         raise InvalidInput(
             f"compute = '{name}' is code, which no file runs by itself: if you trust it, say so, "
@@ -214,43 +210,32 @@ def refuse_code(given: Any) -> None:
         )
 
 
-def _source(find: Find) -> str:
-    """Source of the module that a function is of; of the function alone where it has no file."""
-    file = inspect.getsourcefile(find)
-    if file is None or not Path(file).is_file():
-        return inspect.getsource(find)
-    return Path(file).read_text(encoding="utf-8")
-
-
-def _by_name(name: str) -> Find:
-    """A function of ours by its name, or one of the user's by that of its module."""
-    if name in FINDERS:
-        return FINDERS[name]
+def _find_function(name: str) -> Callable[..., Mapping[str, Any]]:
+    """Return a named evaluator, or a function of the user by "module:function"."""
+    if name in NAMED_EVALUATORS:
+        return NAMED_EVALUATORS[name]
     module, colon, function = name.partition(":")
     if not colon:
-        hint = suggest_name(name, FINDERS) or f"use one of {sorted(FINDERS)}"
+        hint = suggest_name(name, NAMED_EVALUATORS) or f"use one of {sorted(NAMED_EVALUATORS)}"
         raise InvalidInput(f"cannot compute '{name}': {hint}, or 'package.module:function'")
     try:
-        found: Find = getattr(import_module(module), function)
+        return getattr(import_module(module), function)  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:
         raise InvalidInput(f"cannot compute '{name}': {error}") from error
-    return found
 
 
-def _value(key: str, value: Any) -> Value:
-    """One finding as JSON can hold it."""
+def _to_json(key: str, value: Any) -> float | int | str | list[float]:
+    """Convert a finding to a type of JSON."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, bool):
         return int(value)
     if value is None:
         return float("nan")
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, int | float):
+    if isinstance(value, int | float | str):
         return value
     if isinstance(value, list | tuple) and all(isinstance(each, int | float) for each in value):
         return [float(each) for each in value]
     raise InvalidInput(
-        f"finding '{key}' is a {type(value).__name__}: give a number, words, or a row of numbers"
+        f"finding '{key}' is a {type(value).__name__}: give a number, a text, or a row of numbers"
     )

@@ -1,8 +1,8 @@
-"""Fragility: the probability of a limit state over the intensity of the ground, as a lognormal.
+"""Fragility: lognormal probability of a limit state over the intensity of the ground motion.
 
-Capacities of incremental dynamic analysis are known between two intensities, or only to lie above
-one; counts of multiple stripes say how many motions of one intensity fail. Both are fitted by
-maximum likelihood, with bands by the bootstrap and a figure of the goodness of fit.
+Capacities of incremental dynamic analysis lie in brackets of two intensities, or above one
+(censored). Multiple stripes give the number of failing motions at each intensity. Both are fitted
+by maximum likelihood, with confidence bands by the bootstrap and the goodness of fit.
 
 References:
     Baker, Earthq. Spectra 31 (2015) 579-599. Porter, Kennedy and Bachman, Earthq. Spectra 23 (2007)
@@ -22,17 +22,8 @@ from archfem._typing import Array
 from archfem._validation import check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 
-# Samples of the bootstrap
-RESAMPLES = 500
-
-# Motions or stripes that two parameters take at least
-LEAST = 3
-
-# Relative change at which an iteration has settled, and its largest number of rounds
-SETTLED, MOST = 1e-9, 2000
-
-# Dispersions between which one is looked for [-]
-NARROWEST, WIDEST = 0.005, 5.0
+# Smallest and largest dispersion of a fit [-]
+DISPERSION_RANGE = (0.005, 5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +31,12 @@ class Fragility:
     """A lognormal fragility curve, P = Φ(ln(x / median) / dispersion).
 
     Attributes:
-        median: intensity at which half of all motions fail, in the unit that was given.
-        dispersion: standard deviation of its logarithm [-].
-        goodness: probability that data of this curve fit no better than these; below 0.05 they are
-            hardly lognormal.
-        misfit: largest distance of the data's own curve from this one [-].
-        resampled: medians and dispersions of the bootstrap (samples, 2).
+        median: intensity at which half of all motions fail, in the unit of the data.
+        dispersion: standard deviation of the logarithm of the intensity [-].
+        goodness: p-value, probability that samples of this curve fit no better than the data; below
+            0.05 a lognormal is doubtful.
+        misfit: largest distance between the empirical curve and this one [-].
+        resampled: medians and dispersions of the bootstrap samples (samples, 2).
     """
 
     median: float
@@ -58,16 +49,16 @@ class Fragility:
         """Return the probability of the limit state at intensities.
 
         Args:
-            intensity: values above 0, of any shape.
+            intensity: intensities above 0, of any shape.
         """
         return _curve(np.asarray(intensity, dtype=float), self.median, self.dispersion)
 
     def band(self, intensity: Any, share: float = 0.9) -> tuple[Array, Array]:
-        """Return between what the probability lies, as far as so few motions tell.
+        """Return the confidence band of the probability.
 
         Args:
-            intensity: values above 0 (n,).
-            share: of the samples of the bootstrap that lie in the band [-].
+            intensity: intensities above 0 (n,).
+            share: share of the bootstrap samples within the band [-].
 
         Returns:
             The lower and the upper end (n,) [-].
@@ -78,19 +69,19 @@ class Fragility:
         return low, high
 
     def interval(self, share: float = 0.9) -> tuple[float, float]:
-        """Return between what the median lies, as far as so few motions tell.
+        """Return the confidence interval of the median.
 
         Args:
-            share: of the samples of the bootstrap that lie in the interval [-].
+            share: share of the bootstrap samples within the interval [-].
         """
         low, high = np.quantile(self.resampled[:, 0], [0.5 - 0.5 * share, 0.5 + 0.5 * share])
         return float(low), float(high)
 
     def widened(self, dispersion: float) -> "Fragility":
-        """Return the curve with the spread of what is not known of the structure beside its own.
+        """Return the curve with an epistemic dispersion added to its own.
 
         Args:
-            dispersion: of the median, by stiffness, friction and damping that are not known [-].
+            dispersion: dispersion of the median by uncertain stiffness, friction and damping [-].
         """
         more = check_number(dispersion, "dispersion", minimum=0.0)
         resampled = np.column_stack([self.resampled[:, 0], np.hypot(self.resampled[:, 1], more)])
@@ -99,11 +90,11 @@ class Fragility:
 
 @dataclass(frozen=True)
 class Spread:
-    """What makes capacities differ: one motion from another, and what is not known of a structure.
+    """Dispersion of capacities from record to record and by uncertain properties of the structure.
 
     Attributes:
         median: geometric mean of the medians of the variants, in their unit.
-        record: dispersion from record to record, root mean square over the variants [-].
+        record: record-to-record dispersion, root mean square over the variants [-].
         epistemic: standard deviation of the logarithms of the medians [-].
     """
 
@@ -113,139 +104,137 @@ class Spread:
 
     @property
     def total(self) -> float:
-        """Dispersion of both, which are independent [-]."""
+        """Dispersion by both causes, which are independent [-]."""
         return hypot(self.record, self.epistemic)
 
 
 def spread(curves: Iterable[Fragility]) -> Spread:
-    """Return how far variants of a structure differ beside the motions: stiffness, friction, ….
+    """Return the record-to-record and the epistemic dispersion of variants of a structure.
 
     Args:
-        curves: of one limit state, of each variant under the same motions; variants are samples of
-            what is not known, each as likely as another.
+        curves: curves of one limit state, one for each variant under the same motions. The variants
+            are equally likely samples of uncertain stiffness, friction and the like.
 
     Returns:
-        Both dispersions; `Fragility.widened` by the epistemic one gives the curve of both.
+        Both dispersions; `Fragility.widened` by the epistemic one gives the curve with both.
 
     Raises:
         InvalidInput: there are fewer than two variants.
     """
-    each = list(curves)
-    if len(each) < 2:
-        raise InvalidInput(f"{len(each)} curve: the spread of variants needs two or more")
-    medians = np.log([curve.median for curve in each])
-    record = np.sqrt(np.mean([curve.dispersion**2 for curve in each]))
+    curves = list(curves)
+    if len(curves) < 2:
+        raise InvalidInput(f"{len(curves)} curve: the spread of variants needs two or more")
+    medians = np.log([curve.median for curve in curves])
+    record = np.sqrt(np.mean([curve.dispersion**2 for curve in curves]))
     return Spread(float(np.exp(medians.mean())), float(record), float(medians.std(ddof=1)))
 
 
-def fragility(
-    upper: Any, lower: Any = None, *, resamples: int = RESAMPLES, seed: int = 0
-) -> Fragility:
-    """Fit a fragility curve to capacities of motions, as incremental dynamic analysis finds them."""
+def fragility(upper: Any, lower: Any = None, *, resamples: int = 500, seed: int = 0) -> Fragility:
+    """Fit a fragility curve to capacities of motions, each in a bracket from lower to upper."""
     high = np.array([float(value) for value in upper])
     low = high.copy() if lower is None else np.array(check_numbers(lower, "lower", len(high)))
-    if len(high) < LEAST or not (high >= low).all() or not (low >= 0.0).all() or (high <= 0).any():
+    if len(high) < 3 or not (high >= low).all() or not (low >= 0.0).all() or (high <= 0).any():
         raise InvalidInput(
-            f"capacities from {low.tolist()} to {high.tolist()}: give {LEAST} or more, above 0, "
+            f"capacities from {low.tolist()} to {high.tolist()}: give 3 or more, above 0, "
             "none larger below than above"
         )
     if np.isinf(high).mean() > 0.5 or np.ptp(high[np.isfinite(high)]) == 0.0:
         raise InvalidInput(
             f"capacities up to {high.tolist()}: more than half were not reached, or all are alike, "
-            "and no curve can be told; go on to larger intensities, or use other motions"
+            "and determine no curve; go on to larger intensities, or use other motions"
         )
     with np.errstate(divide="ignore"):
         ends = np.log(np.array([low, high]))
-    mean, deviation = _censored(ends[:, None, :])
-    chance = np.random.default_rng(check_integer(seed, "seed", minimum=0))
-    drawn = chance.integers(len(high), size=(check_integer(resamples, "resamples"), len(high)))
-    means, deviations = _censored(ends[:, drawn])
+    mean, deviation = _fit_normal(ends[:, None, :])
     median, dispersion = float(np.exp(mean[0])), float(deviation[0])
     misfit = float(_distance(ends[:, None, :], mean, deviation)[0])
-    made = _bracketed(chance.normal(mean[0], deviation[0], size=drawn.shape), ends)
-    middle = made.mean(axis=0)
-    refit = middle.mean(axis=1), np.maximum(middle.std(axis=1), NARROWEST)
-    goodness = float((_distance(made, *refit) >= misfit).mean())
+    random = np.random.default_rng(check_integer(seed, "seed", minimum=0))
+    drawn = random.integers(len(high), size=(check_integer(resamples, "resamples"), len(high)))
+    means, deviations = _fit_normal(ends[:, drawn])
+    # Goodness of fit by simulation (Lilliefors): samples of the fitted curve are fitted in turn.
+    samples = _bracket(random.normal(mean[0], deviation[0], size=drawn.shape), ends)
+    middle = samples.mean(axis=0)
+    refit = middle.mean(axis=1), np.maximum(middle.std(axis=1), DISPERSION_RANGE[0])
+    goodness = float((_distance(samples, *refit) >= misfit).mean())
     resampled = np.column_stack([np.exp(means), deviations])
     return Fragility(median, dispersion, goodness, misfit, resampled)
 
 
 def stripe_fragility(
-    levels: Any, failures: Any, motions: Any, *, resamples: int = RESAMPLES, seed: int = 0
+    levels: Any, failures: Any, motions: Any, *, resamples: int = 500, seed: int = 0
 ) -> Fragility:
-    """Fit a fragility curve to multiple stripes: how many motions of each intensity fail.
+    """Fit a fragility curve to multiple stripes: numbers of failing motions at intensity levels.
 
     Args:
         levels: intensities above 0 (n,).
-        failures: motions that fail at each (n,).
-        motions: that were tried at each (n,), or one number for all.
-        resamples: how many samples the bootstrap draws.
-        seed: of these.
+        failures: number of motions that fail at each level (n,).
+        motions: number of motions at each level (n,), or one number for all.
+        resamples: number of bootstrap samples.
+        seed: seed of the bootstrap.
 
     Returns:
-        The curve of greatest likelihood, as binomial counts have it.
+        The curve of maximum likelihood for binomial counts.
 
     Raises:
-        InvalidInput: there are fewer than three levels, counts that cannot be meant, or none that
-            tells of the spread: nothing fails up to one level, and everything from the next.
+        InvalidInput: there are fewer than three levels, counts are out of range, or they do not
+            determine the dispersion: no motion fails up to one level, and all from the next.
     """
     x = np.array(check_numbers(levels, "levels"))
     count = np.broadcast_to(np.asarray(motions, dtype=float), x.shape)
     failed = np.array(check_numbers(failures, "failures", len(x)))
-    if len(x) < LEAST or (x <= 0.0).any() or (failed > count).any() or (failed < 0.0).any():
+    if len(x) < 3 or (x <= 0.0).any() or (failed > count).any() or (failed < 0.0).any():
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail at levels {x.tolist()}: give "
-            f"{LEAST} levels or more above 0, and at each no more failures than motions"
+            f"3 levels or more above 0, and at each no more failures than motions"
         )
     if not ((failed > 0.0) & (failed < count)).any():
         raise InvalidInput(
             f"{failed.tolist()} of {count.tolist()} motions fail: at no level some do and some do "
-            "not, and the spread cannot be told; try levels between"
+            "not, and the dispersion is undetermined; try levels between"
         )
     median, dispersion = (float(each[0]) for each in _probit(x, failed[None], count))
     share = _curve(x, median, dispersion)
-    chance = np.random.default_rng(check_integer(seed, "seed", minimum=0))
-    drawn = chance.binomial(
-        count.astype(int), share, size=(check_integer(resamples, "resamples"), len(x))
-    )
+    random = np.random.default_rng(check_integer(seed, "seed", minimum=0))
+    size = check_integer(resamples, "resamples"), len(x)
+    drawn = random.binomial(count.astype(int), share, size=size)
     resampled = np.column_stack(_probit(x, drawn.astype(float), count))
-    deviance = 2.0 * float(
-        np.sum(_entropy(failed, count * share) + _entropy(count - failed, count * (1.0 - share)))
-    )
+    survived = count - failed
+    terms = _deviance(failed, count * share) + _deviance(survived, count * (1.0 - share))
+    deviance = 2.0 * float(np.sum(terms))
     goodness = float(stats.chi2.sf(deviance, max(len(x) - 2, 1)))
     misfit = float(np.abs(failed / count - share).max())
     return Fragility(median, dispersion, goodness, misfit, resampled)
 
 
 def _curve(intensity: Array, median: Any, dispersion: Any) -> Array:
-    """Lognormal probability; 0 at no intensity."""
+    """Lognormal probability; 0 at intensity 0."""
     with np.errstate(divide="ignore"):
-        found: Array = ndtr((np.log(intensity) - np.log(median)) / dispersion)
-    return found
+        return np.asarray(ndtr((np.log(intensity) - np.log(median)) / dispersion))
 
 
-def _censored(ends: Array) -> tuple[Array, Array]:
-    """Mean and deviation of normal samples known between two ends (2, samples, n), by EM."""
+def _fit_normal(ends: Array) -> tuple[Array, Array]:
+    """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by the EM method."""
     low, high = ends
-    known = np.where(np.isfinite(high) & np.isfinite(low), 0.5 * (low + high), np.nan)
-    known = np.where(np.isfinite(known), known, np.where(np.isfinite(high), high, low))
-    mean, deviation = known.mean(axis=1), np.maximum(known.std(axis=1), NARROWEST)
-    for _ in range(MOST):
+    # initial guess: the middle of a bracket, or the end of an unbounded one
+    bounded = np.where(np.isfinite(high), high, low)
+    start = np.where(np.isfinite(high) & np.isfinite(low), 0.5 * (low + high), bounded)
+    mean, deviation = start.mean(axis=1), np.maximum(start.std(axis=1), DISPERSION_RANGE[0])
+    for _ in range(2000):
         first, second = _moments(low, high, mean[:, None], deviation[:, None])
-        mean_now = first.mean(axis=1)
-        square = second.mean(axis=1) - mean_now**2
-        now = np.clip(np.sqrt(np.maximum(square, 0.0)), NARROWEST, WIDEST)
-        change = max(np.abs(mean_now - mean).max(), np.abs(now - deviation).max())
-        mean, deviation = mean_now, now
-        if change < SETTLED:
+        new_mean = first.mean(axis=1)
+        variance = second.mean(axis=1) - new_mean**2
+        new_deviation = np.clip(np.sqrt(np.maximum(variance, 0.0)), *DISPERSION_RANGE)
+        change = max(np.abs(new_mean - mean).max(), np.abs(new_deviation - deviation).max())
+        mean, deviation = new_mean, new_deviation
+        if change < 1e-9:
             break
     return mean, deviation
 
 
 def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Array, Array]:
-    """Expected value and square of normal samples that lie between two ends."""
+    """First and second moment of normal variables truncated to brackets."""
     a, b = (low - mean) / deviation, (high - mean) / deviation
-    exact = high - low < 1e-9
+    exact = high - low < 1e-9  # the formulas of a truncated normal would divide 0 by 0
     share = np.where(exact, 1.0, np.maximum(_between(a, b), 1e-300))
     dense_a, dense_b = (np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) for z in (a, b))
     shift = (dense_a - dense_b) / share
@@ -258,10 +247,10 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
     return first, np.where(exact, np.where(exact, low, 0.0) ** 2, second)
 
 
-def _bracketed(samples: Array, ends: Array) -> Array:
-    """Ends of brackets about samples, as wide as those that are known."""
-    known = np.isfinite(ends).all(axis=0)
-    width = float(np.median((ends[1] - ends[0])[known])) if known.any() else 0.0
+def _bracket(samples: Array, ends: Array) -> Array:
+    """Brackets of samples, of the median width of the data's brackets."""
+    finite = np.isfinite(ends).all(axis=0)
+    width = float(np.median((ends[1] - ends[0])[finite])) if finite.any() else 0.0
     if width < 1e-9:
         return np.array([samples, samples])
     low = np.floor(samples / width) * width
@@ -269,48 +258,55 @@ def _bracketed(samples: Array, ends: Array) -> Array:
 
 
 def _between(a: Array, b: Array) -> Array:
-    """Normal probability between two ends, in the tail that keeps its digits."""
-    flip = a > 0.0
+    """Normal probability between two ends."""
+    flip = a > 0.0  # in the lower tail the difference loses no digits
     left, right = np.where(flip, -b, a), np.where(flip, -a, b)
     return ndtr(right) - ndtr(left)
 
 
 def _distance(ends: Array, mean: Array, deviation: Array) -> Array:
-    """Largest distance of the samples' own curves (2, samples, n) from normal ones [-]."""
+    """Distance (Kolmogorov) of the empirical curves (2, samples, n) from normal ones [-]."""
     low, high = ends
     middle = np.where(np.isfinite(high) & np.isfinite(low), 0.5 * (low + high), high)
-    place = np.sort(middle, axis=1)
-    count = place.shape[1]
-    fitted = ndtr((place - mean[:, None]) / deviation[:, None])
+    ordered = np.sort(middle, axis=1)
+    count = ordered.shape[1]
+    fitted = ndtr((ordered - mean[:, None]) / deviation[:, None])
     steps = np.arange(count + 1) / count
-    apart = np.maximum(np.abs(fitted - steps[:-1]), np.abs(fitted - steps[1:]))
-    return np.where(np.isfinite(place), apart, 0.0).max(axis=1)
+    # the empirical curve has a step at each value: both of its ends count
+    distance = np.maximum(np.abs(fitted - steps[:-1]), np.abs(fitted - steps[1:]))
+    return np.where(np.isfinite(ordered), distance, 0.0).max(axis=1)
 
 
 def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
-    """Medians and dispersions (samples,) by scoring, of counts (samples, n) at levels (n,)."""
+    """Medians and dispersions (samples,) of failures (samples, n) at levels (n,), by Fisher scoring.
+
+    The probability of failure is Φ(intercept + slope · s), with s the standardised logarithm of x.
+    """
     t = np.log(x)
     centre, width = float(np.mean(t)), max(float(np.std(t)), 1e-6)
-    place = (t - centre) / width
-    start, slope = np.zeros(len(failed)), np.ones(len(failed))
+    s = (t - centre) / width
+    intercept, slope = np.zeros(len(failed)), np.ones(len(failed))
+    smallest, largest = (width / dispersion for dispersion in reversed(DISPERSION_RANGE))
     for _ in range(200):
-        z = np.clip(start[:, None] + slope[:, None] * place, -8.0, 8.0)
+        z = np.clip(intercept[:, None] + slope[:, None] * s, -8.0, 8.0)
         share = np.clip(ndtr(z), 1e-12, 1.0 - 1e-12)
-        dense = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
-        weight = count * dense**2 / (share * (1.0 - share))
-        score = (failed - count * share) * dense / (share * (1.0 - share))
-        a, b, c = weight.sum(1), (weight * place).sum(1), (weight * place**2).sum(1)
-        one, two = score.sum(1), (score * place).sum(1)
-        size = np.maximum(a * c - b**2, 1e-12)
-        step = np.clip((c * one - b * two) / size, -1.0, 1.0)
-        rise = np.clip((a * two - b * one) / size, -1.0, 1.0)
-        start, slope = start + step, np.clip(slope + rise, width / WIDEST, width / NARROWEST)
-        if max(np.abs(step).max(), np.abs(rise).max()) < SETTLED:
+        density = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
+        # Fisher information (a, b; b, c) and score (u, v) of intercept and slope
+        weight = count * density**2 / (share * (1.0 - share))
+        score = (failed - count * share) * density / (share * (1.0 - share))
+        a, b, c = weight.sum(1), (weight * s).sum(1), (weight * s**2).sum(1)
+        u, v = score.sum(1), (score * s).sum(1)
+        determinant = np.maximum(a * c - b**2, 1e-12)
+        # steps are limited, since the likelihood is flat far from the optimum
+        step = np.clip((c * u - b * v) / determinant, -1.0, 1.0)
+        rise = np.clip((a * v - b * u) / determinant, -1.0, 1.0)
+        intercept, slope = intercept + step, np.clip(slope + rise, smallest, largest)
+        if max(np.abs(step).max(), np.abs(rise).max()) < 1e-9:
             break
-    return np.exp(centre - width * start / slope), width / slope
+    return np.exp(centre - width * intercept / slope), width / slope
 
 
-def _entropy(seen: Array, expected: Array) -> Array:
-    """Terms of the deviance; none where nothing was seen."""
-    ratio = np.where(seen > 0.0, seen / np.maximum(expected, 1e-300), 1.0)
-    return seen * np.log(ratio)
+def _deviance(observed: Array, expected: Array) -> Array:
+    """Terms of half the deviance; 0 for no observation."""
+    ratio = np.where(observed > 0.0, observed / np.maximum(expected, 1e-300), 1.0)
+    return observed * np.log(ratio)

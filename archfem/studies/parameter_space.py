@@ -1,6 +1,6 @@
-"""What a study goes over: full products, listed points, samples from distributions.
+"""Parameter space of a study: products of values, listed points, samples of distributions.
 
-One point of a study: a case file and what differs from it.
+A point is one case of the study: a case and the keys in which it differs.
 """
 
 import hashlib
@@ -22,17 +22,20 @@ from archfem.cases.provenance import hash_inputs
 from archfem.cases.toml_file import check_choice, check_table, refuse_unknown, set_value
 from archfem.errors import InvalidInput
 
-SAMPLES = {"count": int, "method": str, "seed": int}
-METHODS = ("latin", "sobol")
+# Sections of a case that define its model
+MODEL_SECTIONS = ("structure", "materials", "contacts", "model", "dead_load")
+
+# Key that selects the one pair of the suite under which a point is evaluated
+PAIR_KEY = "suite.pair"
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One direction of a study, along which one key of the case changes, or several together."""
+    """One dimension of a study, along which one key of the case varies, or several together."""
 
     name: str  # of the dimension
     keys: tuple[str, ...]  # of the case, "section.key" each
-    # values of the keys at each place; None leaves a key as it is
+    # values of the keys at each coordinate; None leaves a key unchanged
     rows: tuple[tuple[Any, ...], ...]
 
 
@@ -41,38 +44,38 @@ def parameter_axes(over: Any, samples: Mapping[str, Any] | None = None) -> tuple
 
     Args:
         over: a table whose keys are "section.key" of the case, each with a list of values, or a
-            distribution: one of SciPy, frozen, or as a table, { distribution = "lognorm", s = 0.3,
+            distribution: a frozen one of SciPy, or a table, { distribution = "lognorm", s = 0.3,
             scale = 1.5e9 }; or a list of tables, one for each point.
-        samples: how distributions are sampled: `count`, `method`, "latin" (Latin hypercube) or
-            "sobol", and `seed`.
+        samples: settings of the sampling: `count`, `method`, "latin" (Latin hypercube) or "sobol",
+            and `seed`.
 
     Returns:
-        One for each list; one, "sample", for all distributions together; one, "point", for points
-        that are listed.
+        One axis for each list; one axis, "sample", for all distributions; or one axis, "point", for
+        listed points.
 
     Raises:
-        InvalidInput: a list is empty, a distribution is not known or gives no numbers, or samples
-            cannot be meant.
+        InvalidInput: a list is empty, a distribution is unknown or has invalid parameters, or the
+            settings of the sampling are invalid.
     """
     if isinstance(over, Sequence) and not isinstance(over, str):
-        return (_listed(over),)
+        return (_point_axis(over),)
     if not isinstance(over, Mapping) or not over:
         raise InvalidInput(
             f"{over!r} varies nothing: give a table of keys of the case with lists of values or "
             "distributions, or a list of such tables, one for each point"
         )
-    told = _flat(over)
-    random = {key: value for key, value in told.items() if not _is_list(value)}
-    axes = [Axis(key, (key,), _rows(key, told[key])) for key in told if key not in random]
+    values = _flatten(over)
+    random = {key: value for key, value in values.items() if not _is_list(value)}
+    axes = [_value_axis(key, values[key]) for key in values if key not in random]
     if random:
-        axes.append(_sampled(random, samples))
+        axes.append(_sample_axis(random, samples))
     elif samples is not None:
-        raise InvalidInput("samples are of distributions, and there are none: take samples out")
+        raise InvalidInput("samples needs distributions, and there are none: take samples out")
     return tuple(axes)
 
 
 def changes_along(axes: Sequence[Axis]) -> list[tuple[tuple[str, Any], ...]]:
-    """Return the changes of each point of the product of axes, the last axis fastest."""
+    """Return the changed keys and values of each point; the last axis varies fastest."""
     return [
         tuple(
             (key, value)
@@ -85,96 +88,96 @@ def changes_along(axes: Sequence[Axis]) -> list[tuple[tuple[str, Any], ...]]:
 
 
 def check_points(axes: Sequence[Axis]) -> list[int]:
-    """Return the numbers of points that show whether all can be meant."""
-    wanted, stride = {0}, 1
+    """Return the numbers of points to be checked: extreme values of numbers, all other values."""
+    points, stride = {0}, 1
     for axis in reversed(axes):
         for column in zip(*axis.rows, strict=True):
-            numbers = [value for value in column if isinstance(value, int | float)]
-            telling = [min(numbers), max(numbers)] if len(numbers) == len(column) else column
-            wanted |= {stride * column.index(value) for value in telling}
+            numeric = all(isinstance(value, int | float) for value in column)
+            values = (min(column), max(column)) if numeric else column
+            points |= {stride * column.index(value) for value in values}
         stride *= len(axis.rows)
-    return sorted(wanted)
+    return sorted(points)
 
 
 def _is_list(value: Any) -> bool:
     return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
 
 
-def _flat(over: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Keys with dots between tables and keys, whether they were quoted or not."""
-    found: dict[str, Any] = {}
+def _flatten(over: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Join the names of nested tables and keys by dots."""
+    flat: dict[str, Any] = {}
     for key, value in over.items():
         if isinstance(value, Mapping) and "distribution" not in value:
-            found |= _flat(value, f"{above}{key}.")
+            flat |= _flatten(value, f"{prefix}{key}.")
         elif _is_list(value) or hasattr(value, "ppf") or isinstance(value, Mapping):
-            found[above + key] = value
+            flat[prefix + key] = value
         else:
             raise InvalidInput(
-                f"{above}{key} = {value!r}: give a list of values, or a distribution; what "
-                "stays the same belongs to set"
+                f"{prefix}{key} = {value!r}: give a list of values, or a distribution; a value "
+                "that stays the same belongs to set"
             )
-    return found
+    return flat
 
 
-def _rows(key: str, values: Any) -> tuple[tuple[Any, ...], ...]:
+def _value_axis(key: str, values: Any) -> Axis:
+    """The axis of a list of values."""
     if not len(values):
         raise InvalidInput(f"{key} is empty: a product over it has no points; give values")
-    return tuple((_plain(value),) for value in values)
+    return Axis(key, (key,), tuple((_to_python(value),) for value in values))
 
 
-def _plain(value: Any) -> Any:
-    """A value as TOML would give it."""
+def _to_python(value: Any) -> Any:
+    """Convert a NumPy scalar to a type of TOML."""
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _listed(points: Sequence[Any]) -> Axis:
-    """Points that are listed, one table each."""
+def _point_axis(points: Sequence[Any]) -> Axis:
+    """The axis of listed points, one table each."""
     if not points or not all(isinstance(point, Mapping) and point for point in points):
         raise InvalidInput("the list of points is empty: give a table of keys of the case for each")
     keys = tuple(dict.fromkeys(key for point in points for key in point))
-    rows = tuple(tuple(_plain(point.get(key)) for key in keys) for point in points)
+    rows = tuple(tuple(_to_python(point.get(key)) for key in keys) for point in points)
     return Axis("point", keys, rows)
 
 
-def _sampled(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -> Axis:
-    """Samples of all distributions together, which are independent of each other."""
+def _sample_axis(random: Mapping[str, Any], samples: Mapping[str, Any] | None) -> Axis:
+    """The axis of independent samples of all distributions."""
     if samples is None:
         raise InvalidInput(
             "distributions are to be sampled: say how they are sampled, "
             'samples = { count = 64, method = "sobol", seed = 1 }'
         )
-    told = check_table(samples, SAMPLES, "samples")
-    count = check_integer(told.get("count"), "samples.count")
-    method = check_choice(told.get("method", "latin"), METHODS, "samples.method")
+    samplers = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol}
+    settings = check_table(samples, {"count": int, "method": str, "seed": int}, "samples")
+    count = check_integer(settings.get("count"), "samples.count")
+    method = check_choice(settings.get("method", "latin"), samplers, "samples.method")
     if method == "sobol" and log2(count) % 1.0:
         raise InvalidInput(
             f"samples.count = {count}: a Sobol sequence is balanced for powers of 2 alone; give "
             f"{2 ** round(log2(count))}"
         )
-    make = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol}[method]
-    unit = make(
-        len(random), seed=check_integer(told.get("seed", 0), "samples.seed", minimum=0)
-    ).random(count)
-    columns = [_column(key, given, unit[:, k]) for k, (key, given) in enumerate(random.items())]
+    seed = check_integer(settings.get("seed", 0), "samples.seed", minimum=0)
+    shares = samplers[method](len(random), seed=seed).random(count)  # between 0 and 1
+    columns = [_quantiles(key, random[key], share) for key, share in zip(random, shares.T, strict=True)]
     return Axis("sample", tuple(random), tuple(zip(*columns, strict=True)))
 
 
-def _column(key: str, given: Any, unit: Any) -> list[float]:
-    """Values of one key at places (count,) between 0 and 1 of its distribution."""
-    frozen = _frozen(key, given) if isinstance(given, Mapping) else given
-    values = [float(value) for value in frozen.ppf(unit)]
+def _quantiles(key: str, setting: Any, shares: Any) -> list[float]:
+    """Quantiles (count,) of the distribution of a key at cumulative probabilities (count,)."""
+    distribution = _freeze(key, setting) if isinstance(setting, Mapping) else setting
+    values = [float(value) for value in distribution.ppf(shares)]
     if not all(isfinite(value) for value in values):
         raise InvalidInput(
-            f"{key} = {given!r} gives values that are no numbers: its parameters are outside "
+            f"{key} = {setting!r} gives values that are no numbers: its parameters are outside "
             "their range"
         )
     return values
 
 
-def _frozen(key: str, given: Mapping[str, Any]) -> Any:
-    """A distribution of SciPy by its name and parameters."""
-    told = dict(given)
-    name = str(told.pop("distribution"))
+def _freeze(key: str, setting: Mapping[str, Any]) -> Any:
+    """Return the distribution of SciPy with a name and parameters."""
+    parameters = dict(setting)
+    name = str(parameters.pop("distribution"))
     kind = getattr(stats, name, None)
     if not isinstance(kind, stats.rv_continuous | stats.rv_discrete):
         raise InvalidInput(
@@ -182,70 +185,62 @@ def _frozen(key: str, given: Mapping[str, Any]) -> Any:
             "'uniform' or 'triang'"
         )
     try:
-        return kind(**told)
+        return kind(**parameters)
     except TypeError as error:
         raise InvalidInput(
-            f"{key}: the distribution {name!r} does not take {sorted(told)}: {error}"
+            f"{key}: the distribution {name!r} does not take {sorted(parameters)}: {error}"
         ) from error
-
-
-# Sections of a case that make its model
-MODEL = ("structure", "materials", "contacts", "model", "dead_load")
-
-# Key whose value is the one pair of the suite that a point is about
-PAIR = "suite.pair"
 
 
 @dataclass(frozen=True)
 class Point:
-    """One case of a study, told by what differs from a case that many points share."""
+    """One case of a study: a case that many points share, and changes to it."""
 
-    base: Mapping[str, Any] = field(repr=False)  # tables of the case that is changed
-    folder: Path  # where relative file names start
-    # keys, "section.key" each, and their values; "suite.pair" names the one pair of the suite that
-    # is meant
+    base: Mapping[str, Any] = field(repr=False)  # sections of the shared case
+    folder: Path  # of relative file names
+    # keys, "section.key" each, and their values; "suite.pair" selects one pair of the suite
     changes: tuple[tuple[str, Any], ...] = ()
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Tables of the case, changes made."""
-        made = deepcopy(dict(self.base))
+        """Sections of the changed case."""
+        settings = deepcopy(dict(self.base))
         for key, value in self.changes:
-            if key == PAIR:
-                _leave_one(made, value)
+            if key == PAIR_KEY:
+                _select_pair(settings, value)
             else:
-                set_value(made, key, deepcopy(value))
-        return made
+                set_value(settings, key, deepcopy(value))
+        return settings
 
     @property
     def case(self) -> Case:
-        """The case."""
+        """The changed case."""
         return Case.of(self.settings, self.folder)
 
-    def digest(self, asked: str) -> str:
-        """Return what tells this point from every other: of its case, its files and the version."""
-        text = f"{asked}\n{hash_inputs(self.settings, self.folder)}"
+    def digest(self, evaluator: str) -> str:
+        """Return a digest of the evaluator's text, the case, its files and archfem's version."""
+        text = f"{evaluator}\n{hash_inputs(self.settings, self.folder)}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def model_of(point: Point) -> str:
-    """Return what points of one study have in common where they are of one model, as a rule."""
-    told = [change for change in point.changes if change[0].partition(".")[0] in MODEL]
-    return f"{id(point.base)} {told!r}"
+def model_key(point: Point) -> str:
+    """Return a key that points of one model share, as a rule."""
+    changes = [each for each in point.changes if each[0].partition(".")[0] in MODEL_SECTIONS]
+    return f"{id(point.base)} {changes!r}"
 
 
-def by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
-    """Return points in their order, but those of one model together: who has built it goes on."""
+def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
+    """Return points in their order, but those of one model together, so that it is built once."""
     groups: dict[str, list[tuple[int, Point]]] = {}
     for number, point in points:
-        groups.setdefault(model_of(point), []).append((number, point))
+        groups.setdefault(model_key(point), []).append((number, point))
     return list(chain.from_iterable(groups.values()))
 
 
-def _leave_one(settings: dict[str, Any], pair: str) -> None:
-    """Take all other pairs out of a suite."""
+def _select_pair(settings: dict[str, Any], pair: str) -> None:
+    """Remove all other pairs from the suite of a case."""
     pairs = settings.get("suite", {}).get("pairs", {})
     if not pairs:
-        raise InvalidInput(f"{PAIR} = {pair!r}: the case has no [suite] to take a pair of")
+        raise InvalidInput(f"{PAIR_KEY} = {pair!r}: the case has no [suite] to take a pair of")
     refuse_unknown({pair: None}, pairs, "suite.pairs")
     settings["suite"]["pairs"] = {pair: pairs[pair]}

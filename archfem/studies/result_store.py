@@ -1,8 +1,6 @@
-"""Rows of finished points in files, one each: nothing is lost, and nothing is found twice.
+"""Results of a study on disk: a file for each point, the progress, and the table of all findings.
 
-How far a study has come: on a terminal, and in a file that another process reads.
-
-The findings of a study as one table: an `xarray.Dataset`, and files that others read too.
+The table is an `xarray.Dataset`, written as NetCDF, CSV and Parquet.
 """
 
 import fcntl
@@ -26,28 +24,32 @@ from archfem.errors import InvalidInput, StudyStopped
 from archfem.studies.parameter_space import Axis
 from archfem.studies.process_pool import Row
 
-# Folder of the rows; what the study is; file that tells that a driver is at work
-POINTS, PLAN, LOCK = "points", "study.json", ".lock"
+# Files of the table
+NETCDF_FILE = "results.nc"
+CSV_FILE = "results.csv"
 
 
 class Store:
-    """A folder with a file for each finished point, under what tells the point from all others."""
+    """A folder with a file for each finished point, named by the digest of the point."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._points, self._plan = folder / "points", folder / "study.json"
+        self._lock, self._progress = folder / ".lock", folder / "progress.json"
 
     @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep any other driver out for as long as this one is at work, also if it is killed."""
+    def lock(self) -> Iterator[None]:
+        """Refuse other drivers while this one runs."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / LOCK).open("a+") as lock:
+        with self._lock.open("a+") as lock:
             try:
+                # the kernel releases the lock of a driver that is killed
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
                 lock.seek(0)
                 raise InvalidInput(
-                    f"another driver is at work in {self.folder} ({lock.read().strip()}): wait for "
-                    "it to end, or give this study a folder of its own"
+                    f"another driver runs in {self.folder} ({lock.read().strip()}): wait for it to "
+                    "end, or give this study a folder of its own"
                 ) from error
             lock.truncate(0)
             lock.write(f"process {os.getpid()} on {os.uname().nodename}")
@@ -58,92 +60,97 @@ class Store:
 
     @property
     def busy(self) -> bool:
-        """Whether a driver is at work."""
-        if not (self.folder / LOCK).is_file():
-            return False
-        with (self.folder / LOCK).open() as lock:
-            try:
+        """Whether a driver is running."""
+        try:
+            with self._lock.open() as lock:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                return True
+        except FileNotFoundError:
+            return False
+        except BlockingIOError:
+            return True
         return False
 
-    def plan(self) -> dict[str, Any]:
-        """Return what the study in the folder is."""
+    def read_plan(self) -> dict[str, Any]:
+        """Read the title, version and points of the study in the folder."""
         try:
-            plan: dict[str, Any] = json.loads((self.folder / PLAN).read_text(encoding="utf-8"))
+            plan: dict[str, Any] = json.loads(self._plan.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise InvalidInput(f"there is no study in {self.folder}: {error}") from error
         return plan
 
-    def keep_plan(self, plan: dict[str, Any]) -> None:
-        """Keep what the study is."""
-        self._write(self.folder / PLAN, plan)
+    def write_plan(self, plan: dict[str, Any]) -> None:
+        """Write the title, version and points of the study."""
+        self._write(self._plan, plan)
 
-    def finished(self, digests: Iterable[str]) -> dict[str, Row]:
-        """Return the rows that are there, without those that failed for no reason of their own."""
-        there = self.digests()
-        found = {digest: self._row(digest) for digest in digests if digest in there}
+    def load_rows(self, digests: Iterable[str]) -> dict[str, Row]:
+        """Return the stored rows, without those of errors that may not occur again."""
+        stored = self.digests()
+        rows = {digest: self._read_row(digest) for digest in digests if digest in stored}
         return {
-            digest: row
-            for digest, row in found.items()
-            if row and (row["ours"] or not row["error"])
+            digest: row for digest, row in rows.items() if row and (row["ours"] or not row["error"])
         }
 
     def digests(self) -> set[str]:
-        """Return what tells the points apart that are there."""
-        return {path.stem for path in (self.folder / POINTS).glob("??/*.json")}
+        """Return the digests of the stored points."""
+        return {path.stem for path in self._points.glob("??/*.json")}
 
-    def keep(self, digest: str, row: Row) -> None:
-        """Keep the row of a point in one stroke."""
-        self._write(self._path(digest), row)
+    def write_row(self, digest: str, row: Row) -> None:
+        """Write the row of a point."""
+        self._write(self._row_path(digest), row)
 
-    def _row(self, digest: str) -> Row | None:
-        """A row; None where its file cannot be read."""
+    def write_progress(self, status: "Status") -> None:
+        """Write the progress, for another process to read."""
+        self._write(self._progress, asdict(status))
+
+    def read_rate(self) -> float:
+        """Read the points per second of the latest driver; 0 if unknown."""
         try:
-            found: Row = json.loads(self._path(digest).read_text(encoding="utf-8"))
+            return float(json.loads(self._progress.read_text(encoding="utf-8"))["rate"])
+        except (OSError, ValueError, KeyError):
+            return 0.0
+
+    def _read_row(self, digest: str) -> Row | None:
+        """Read a row; None if its file is damaged."""
+        try:
+            row: Row = json.loads(self._row_path(digest).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return found
+        return row
 
-    def _path(self, digest: str) -> Path:
-        return self.folder / POINTS / digest[:2] / f"{digest}.json"
+    def _row_path(self, digest: str) -> Path:
+        """Path of a row; subfolders keep the number of files in a folder small."""
+        return self._points / digest[:2] / f"{digest}.json"
 
     def _write(self, path: Path, content: dict[str, Any]) -> None:
-        with told_when_full(self.folder), atomic_write(path) as draft:
+        """Write a JSON file whole or not at all."""
+        with explain_full_disk(self.folder), atomic_write(path) as draft:
             draft.write_text(json.dumps(content), encoding="utf-8")
 
 
 @contextmanager
-def told_when_full(folder: Path) -> Iterator[None]:
-    """Turn the error of a full disk into one that says what to do."""
+def explain_full_disk(folder: Path) -> Iterator[None]:
+    """Replace the error of a full disk by one with a remedy."""
     try:
         yield
     except OSError as error:
         if error.errno not in DISK_FULL_ERRORS:
             raise
         raise StudyStopped(
-            f"the disk of {folder} is full: what was finished is kept, whole; make room there and "
-            "run the same study to go on"
+            f"the disk of {folder} is full: finished points are kept; make room there and run the "
+            "same study to go on"
         ) from error
-
-
-PROGRESS = "progress.json"
-
-# Seconds between two writings of the file
-EVERY = 1.0
 
 
 @dataclass(frozen=True)
 class Status:
-    """How far a study has come.
+    """Progress of a study.
 
     Attributes:
-        total: how many points it has.
-        done: points that are finished, failed ones among them.
-        failed: points that ended in an error.
-        rate: points a second, of the latest driver; 0 where it has finished none.
-        running: whether a driver is at work.
+        total: number of points.
+        done: number of finished points, failed ones included.
+        failed: number of points that ended in an error.
+        rate: points per second of the latest driver; 0 if it has finished none.
+        running: whether a driver is running.
     """
 
     total: int
@@ -154,12 +161,12 @@ class Status:
 
     @property
     def remaining(self) -> float:
-        """Time that the other points take at this rate [s]; infinite where none is known."""
+        """Remaining time at this rate [s]; infinite if the rate is unknown."""
         left = self.total - self.done
         return 0.0 if not left else left / self.rate if self.rate > 0.0 else inf
 
     def __str__(self) -> str:
-        """The same in words."""
+        """One line of text."""
         words = [f"{self.done} of {self.total} points done", f"{self.failed} failed"]
         if self.done < self.total:
             words.append(f"{self.rate:.3g} a second")
@@ -169,149 +176,130 @@ class Status:
 
 
 class Progress:
-    """Counts points as they are finished."""
+    """Counts finished points, on a progress bar and in a file of the store."""
 
-    def __init__(self, total: int, done: int, failed: int, folder: Path | None) -> None:
-        self._total, self._before, self._failed, self._folder = total, done, failed, folder
-        self._done, self._begun, self._written = 0, monotonic(), -inf
+    def __init__(self, total: int, done: int, failed: int, store: Store | None) -> None:
+        self._total, self._done_before, self._failed, self._store = total, done, failed, store
+        self._done, self._start, self._written = 0, monotonic(), -inf
         self._bar = tqdm(
             total=total, initial=done, unit="point", disable=None, leave=False, desc="study"
         )
 
     def add(self, *, failed: bool) -> None:
-        """Count one point more."""
+        """Count a finished point."""
         self._done += 1
         self._failed += failed
         self._bar.set_postfix(failed=self._failed, refresh=False)
         self._bar.update()
-        if monotonic() - self._written >= EVERY:
+        if monotonic() - self._written >= 1.0:  # points may take milliseconds
             self._write()
 
     def close(self) -> None:
-        """Say for the last time how far it has come."""
+        """Remove the bar and write the final progress."""
         self._bar.close()
         self._write()
 
     def _write(self) -> None:
+        """Write the progress to the store."""
         self._written = monotonic()
-        spent = self._written - self._begun
-        now = Status(
-            self._total,
-            self._before + self._done,
-            self._failed,
-            self._done / spent if spent > 0.0 else 0.0,
-        )
-        if self._folder is not None:
-            with told_when_full(self._folder), atomic_write(self._folder / PROGRESS) as draft:
-                draft.write_text(json.dumps(asdict(now)), encoding="utf-8")
+        rate = self._done / max(self._written - self._start, 1e-9)
+        if self._store is not None:
+            done = self._done_before + self._done
+            self._store.write_progress(Status(self._total, done, self._failed, rate))
 
 
 def status(folder: str | Path) -> Status:
-    """Return how far the study in a folder has come, whether a driver is at work or not.
+    """Return the progress of the study in a folder, whether a driver is running or not.
 
     Args:
-        folder: of the study.
+        folder: folder of the study.
 
     Raises:
         InvalidInput: there is no study in it.
     """
     store = Store(Path(folder))
-    digests = list(dict.fromkeys(store.plan()["points"]))
-    rows = store.finished(digests)
-    try:
-        rate = float(json.loads((store.folder / PROGRESS).read_text(encoding="utf-8"))["rate"])
-    except (OSError, ValueError, KeyError):
-        rate = 0.0
+    digests = list(dict.fromkeys(store.read_plan()["points"]))
+    rows = store.load_rows(digests)
     failed = sum(bool(row["error"]) for row in rows.values())
-    return Status(len(digests), len(rows), failed, rate, store.busy)
+    return Status(len(digests), len(rows), failed, store.read_rate(), store.busy)
 
 
-# How cells begin that a spreadsheet computes
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
+def build_table(
+    axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the rows of a study as a dataset over its axes.
 
-NETCDF, CSV, PARQUET = "results.nc", "results.csv", "results.parquet"
-
-# Dimension of findings that are rows of numbers; shorter rows end in NaN
-ALONG = "entry"
-
-
-def table(axes: Sequence[Axis], rows: Sequence[Row], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """Return the rows of a study as a dataset."""
-    shape = {axis.name: len(axis.rows) for axis in axes}
-    found = xr.Dataset(attrs=dict(attributes))
+    Findings that are rows of numbers have a dimension `entry`; shorter rows end in NaN.
+    """
+    table = xr.Dataset(attrs=dict(attributes))
     for axis in axes:
         for k, key in enumerate(axis.keys):
-            found.coords[_place(key)] = _place(axis.name), _column([row[k] for row in axis.rows])
+            values = [row[k] for row in axis.rows]
+            table.coords[_coordinate(key)] = _coordinate(axis.name), _to_array(values)
         if axis.name not in axis.keys:
-            found.coords[axis.name] = axis.name, np.arange(len(axis.rows))
-    dims, sizes = tuple(_place(name) for name in shape), tuple(shape.values())
+            table.coords[axis.name] = axis.name, np.arange(len(axis.rows))
+    dims = tuple(_coordinate(axis.name) for axis in axes)
+    sizes = tuple(len(axis.rows) for axis in axes)
     for name in dict.fromkeys(name for row in rows for name in row["found"]):
         values = [row["found"].get(name) for row in rows]
-        key = _safe(name) if _safe(name) not in found.coords else f"{_safe(name)} found"
+        key = _variable(name)
+        key = f"{key} found" if key in table.coords else key
         if any(isinstance(value, list) for value in values):
-            found[key] = (*dims, ALONG), _padded(values, rows).reshape(*sizes, -1)
+            table[key] = (*dims, "entry"), _pad(values, rows).reshape(*sizes, -1)
         else:
-            found[key] = dims, _column(values).reshape(sizes)
-    found["error"] = dims, np.array([row["error"] for row in rows], dtype=object).reshape(sizes)
-    return found
+            table[key] = dims, _to_array(values).reshape(sizes)
+    table["error"] = dims, np.array([row["error"] for row in rows], dtype=object).reshape(sizes)
+    return table
 
 
-def load_tables() -> None:
-    """Load what tables take, which is otherwise loaded when the first is made and written."""
+def load_table_libraries() -> None:
+    """Load the libraries that write tables, which are otherwise loaded by the first table."""
     frame = xr.Dataset({"number": ("point", [0.0])}).to_dataframe()
     frame.to_csv()
     with suppress(ImportError):
         frame.to_parquet()
 
 
-def write_table(found: xr.Dataset, folder: Path) -> list[Path]:
-    """Write a table as NetCDF and CSV, and as Parquet where pyarrow is there.
-
-    Rows of numbers are in the NetCDF file alone.
-    """
-    files = [folder / NETCDF, folder / CSV]
-    flat = found.drop_dims(ALONG, errors="ignore")
+def write_table(table: xr.Dataset, folder: Path) -> None:
+    """Write a table as NetCDF and CSV, and as Parquet if pyarrow is installed."""
+    flat = table.drop_dims("entry", errors="ignore")  # rows of numbers are in NetCDF alone
     frame = flat.to_dataframe(dim_order=list(flat.dims) or None).reset_index()
-    with told_when_full(folder):
-        write_dataset(found, files[0])
-        with atomic_write(files[1]) as draft:
-            frame.map(_harmless).rename(columns=_harmless).to_csv(draft, index=False)
-        with suppress(ImportError), atomic_write(folder / PARQUET) as draft:
+    with explain_full_disk(folder):
+        write_dataset(table, folder / NETCDF_FILE)
+        with atomic_write(folder / CSV_FILE) as draft:
+            frame.map(_quote_formula).rename(columns=_quote_formula).to_csv(draft, index=False)
+        with suppress(ImportError), atomic_write(folder / "results.parquet") as draft:
             frame.to_parquet(draft, index=False)
-            files.append(folder / PARQUET)
-    return files
 
 
-def _harmless(value: Any) -> Any:
-    """A value that no spreadsheet takes for a formula: words that look like one are quoted."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
+def _quote_formula(value: Any) -> Any:
+    """Quote a text that a spreadsheet would compute as a formula."""
+    is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if is_formula else value
 
 
 def read_table(path: str | Path) -> xr.Dataset:
-    """Return a table that `write_table` has written, loaded.
+    """Read the table of a study.
 
     Args:
-        path: the NetCDF file.
+        path: path of the NetCDF file.
 
     Raises:
-        InvalidInput: there is none, or it is damaged.
+        InvalidInput: the file is missing or damaged.
     """
     return read_dataset(path, "table")
 
 
-def _column(values: Sequence[Any]) -> Any:
-    """Values as numbers where all are, else as words."""
+def _to_array(values: Sequence[Any]) -> Any:
+    """Convert values to an array of numbers, or of texts if one of them is no number."""
     if all(value is None or isinstance(value, int | float) for value in values):
         return np.array([np.nan if value is None else float(value) for value in values])
-    return np.array(["" if value is None else _words(value) for value in values], dtype=object)
+    texts = ("" if value is None else value for value in values)
+    return np.array([t if isinstance(t, str) else repr(t) for t in texts], dtype=object)
 
 
-def _words(value: Any) -> str:
-    return value if isinstance(value, str) else repr(value)
-
-
-def _padded(values: Sequence[Any], rows: Sequence[Row]) -> Any:
-    """Rows of numbers (points, longest of the study); NaN beyond the end of each."""
+def _pad(values: Sequence[Any], rows: Sequence[Row]) -> Any:
+    """Pad rows of numbers by NaN to the longest row of the study (points, longest)."""
     longest = max(len(v) for row in rows for v in row["found"].values() if isinstance(v, list))
     padded = np.full((len(values), longest), np.nan)
     for k, value in enumerate(values):
@@ -320,11 +308,11 @@ def _padded(values: Sequence[Any], rows: Sequence[Row]) -> Any:
     return padded
 
 
-def _place(name: str) -> str:
-    """A key as the name of a coordinate, in which NetCDF has no spaces."""
-    return _safe(name).replace(" ", "_")
+def _coordinate(key: str) -> str:
+    """Name of the coordinate of a key; NetCDF permits no spaces in it."""
+    return _variable(key).replace(" ", "_")
 
 
-def _safe(name: str) -> str:
-    """A name as NetCDF takes it."""
+def _variable(name: str) -> str:
+    """Name of the variable of a finding; NetCDF permits no slash in it."""
     return name.replace("/", "|")

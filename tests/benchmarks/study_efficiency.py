@@ -32,7 +32,7 @@ from archfem.studies import process_pool
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
 from archfem.studies.process_pool import Row
-from archfem.studies.result_store import load_tables
+from archfem.studies.result_store import load_table_libraries
 
 MESHES = Path(__file__).parents[2] / "meshes"
 RING, BRIDGE = MESHES / "ring.toml", MESHES / "prusias_sensitivity.toml"
@@ -63,12 +63,12 @@ def bridge() -> af.Study:
 
 def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tuple[int, Row]]:
     """Answer points on one process that is not this one."""
-    return process_pool.on_processes(points, asked, 1, meanwhile=load_tables)
+    return process_pool.evaluate_on_processes(points, asked, 1, meanwhile=load_table_libraries)
 
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
     """Wall and processor time of a study [s], and how many points failed."""
-    with tempfile.TemporaryDirectory() as folder, patch("archfem.studies.study.serially", alone):
+    with tempfile.TemporaryDirectory() as folder, patch("archfem.studies.study.evaluate_serially", alone):
         begun, spent = time.monotonic(), processor()
         failed = int((study.run(folder, workers=workers)["error"] != "").sum())
         return time.monotonic() - begun, processor() - spent, failed

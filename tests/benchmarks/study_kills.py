@@ -1,11 +1,11 @@
-"""A study whose processes are killed at random moments ends in the bits of one left alone.
+"""A study whose processes are killed at random moments gives the same bits as an undisturbed one.
 
     python tests/benchmarks/study_kills.py --points 160 --kills 30
 
-The study goes over thickness and scale of a rigid ring, on two processes. The driver, its workers
-and the nursery, from which they are forked, are killed in turn with SIGKILL, ten times each, after
-a time drawn evenly; a killed driver is started again. Should the study end before, it begins anew
-in another folder, which is compared as well. At last nobody is left of all that were begun.
+The study varies thickness and scale of a rigid ring, on two processes. The driver, its workers and
+the fork server are killed in turn with SIGKILL, ten times each, after a time drawn evenly; a killed
+driver is started again. Should the study end before, it begins anew in another folder, which is
+compared as well. At the end no process is left.
 """
 
 import os
@@ -48,23 +48,28 @@ def driver(folder: Path, out: Path, workers: int = 2) -> "subprocess.Popen[bytes
         )
 
 
-def nurseries(process: int) -> list[int]:
-    """Processes that a driver has begun, from which workers are forked."""
-    return [each for each in children(process) if b"studies.nursery" in read(each, "cmdline")]
+def servers(process: int) -> list[int]:
+    """Fork servers that a driver has started."""
+    return [each for each in children(process) if is_fork_server(each)]
+
+
+def is_fork_server(process: int) -> bool:
+    """Whether a process is a fork server, or a worker, which has its command line."""
+    return b"multiprocessing.forkserver" in read(process, "cmdline")
 
 
 def workers(process: int) -> list[int]:
-    """Processes that those have begun."""
-    return [each for nursery in nurseries(process) for each in children(nursery)]
+    """Workers that these have forked."""
+    return [each for server in servers(process) for each in children(server)]
 
 
 def children(process: int) -> list[int]:
-    """Processes that one has begun."""
+    """Processes that a process has started."""
     return [int(word) for word in read(process, f"task/{process}/children").split()]
 
 
 def read(process: int, name: str) -> bytes:
-    """What the machine tells of a process; nothing of one that has ended."""
+    """Content of a file of /proc; empty for a process that has ended."""
     try:
         return Path(f"/proc/{process}/{name}").read_bytes()
     except OSError:
@@ -87,7 +92,7 @@ def disturbed(folder: Path, out: Path, kills: dict[str, int], most: float, chanc
             break
         kind = chance.choice(left)
         time.sleep(chance.uniform(0.0, most))
-        begun = {"nursery": nurseries(process.pid), "worker": workers(process.pid)}
+        begun = {"server": servers(process.pid), "worker": workers(process.pid)}
         met.update(each for some in begun.values() for each in some)
         victims = begun.get(kind, [process.pid])
         if process.poll() is not None or not victims:
@@ -115,13 +120,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         given.points, given.kills = 4, 0
     chance = random.Random(given.seed)
     each = given.kills // 3
-    kills = {"driver": each, "worker": given.kills - 2 * each, "nursery": each}
+    kills = {"driver": each, "worker": given.kills - 2 * each, "server": each}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "ring.toml").write_text(CASE)
         scales = [round(0.5 + 0.01 * k, 2) for k in range(given.points // 4)]
         (folder / "study.toml").write_text(
-            f'case = "ring.toml"\n[over]\nstructure.thickness = [0.5, 0.55, 0.6, 0.05]\n'
+            f'case = "ring.toml"\n[vary]\nstructure.thickness = [0.5, 0.55, 0.6, 0.05]\n'
             f"motion.scale = {scales}\n"
         )
         begun = time.monotonic()
@@ -139,7 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"study {studies}: {rows(out)} points, the same bits: {all(same)}", flush=True)
             if not all(same):
                 raise SystemExit("a study that was killed and gone on with differs")
-            if left := [each for each in met if b"studies.nursery" in read(each, "cmdline")]:
+            if left := [each for each in met if is_fork_server(each)]:
                 raise SystemExit(f"processes {left} are left of it")
     print(f"{total} kills over {studies} studies: the same bits in all, and nobody left")
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from setting import plain_options, print_left_out
 
 import archfem as af
-from archfem.cases.result_text import match_table
+from archfem.cases.result_text import tabulate_matches
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.motions import draw_suite
 from archfem.view.style import COLUMN, LINES, NORMAL, SMALL, dress, save
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     begun = time.perf_counter()
     motions = tuple(records(nested if nested.is_dir() else chosen.folder))
     suite = af.Suite("TBEC-2018, class ZD", motions, reduction=3.0).matched(TARGET)
-    print(match_table(suite.matches))
+    print(tabulate_matches(suite.matches).text)
     print(f"matched in {time.perf_counter() - begun:.1f} s; before the reduction R = 3")
     for component in ("horizontal", "vertical"):
         rms, least, most = mean_difference(suite, component)

@@ -78,7 +78,7 @@ def test_a_worker_of_another_version_is_named(study_file, client, monkeypatch):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "no address"])
 def test_a_dead_scheduler_is_named(study_file, monkeypatch, address):
-    monkeypatch.setattr("archfem.studies.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 0.5)
     with pytest.raises(
         af.InvalidInput, match=r"no scheduler .*answers at .*start 'dask scheduler'"
     ):
@@ -107,23 +107,23 @@ def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_scheduler_that_dies_leaves_what_was_finished(small_ring, finders, tmp_path, monkeypatch):
-    monkeypatch.setattr("archfem.studies.cluster.PATIENCE", 20.0)
+    monkeypatch.setattr("archfem.studies.cluster.SCHEDULER_TIMEOUT", 20.0)
     over = {"structure.thickness": [0.5 + 0.01 * k for k in range(12)]}
     find = {"name": "finders_of_tests:slowly", "seconds": 0.5}
     study, folder = af.Study.of(small_ring, over, find), tmp_path / "out"
     with cluster(tmp_path) as (address, processes):
-        original = Store.keep
+        original = Store.write_row
 
-        def keep(self, digest, row):
+        def write_row(self, digest, row):
             original(self, digest, row)
             if processes[0].poll() is None and len(self.digests()) >= 3:
                 processes[0].kill()
 
-        monkeypatch.setattr(Store, "store_impulses", keep)
+        monkeypatch.setattr(Store, "write_row", write_row)
         with pytest.raises(af.errors.StudyStopped, match="scheduler was lost"):
             study.run(folder, client=address)
     assert 3 <= len(Store(folder).digests()) < 12
-    monkeypatch.setattr(Store, "store_impulses", original)
+    monkeypatch.setattr(Store, "write_row", original)
     assert study.run(folder, workers=1).identical(study.run(workers=1))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.studies.comparison_run import compared
+from archfem.studies.comparison_run import run_comparison
 
 MESHES = Path(__file__).parents[2] / "meshes"
 QUICK = [
@@ -43,7 +43,7 @@ def unscaled(study):
 @pytest.mark.slow
 def test_a_study_finds_what_its_cases_do_alone(study, tmp_path):
     asked = af.studies.Comparison.read(study, QUICK)
-    found = dict(compared(asked, tmp_path / "out"))
+    found = dict(run_comparison(asked, tmp_path / "out"))
     case = af.Case.read(MESHES / "ring_suite.toml", QUICK)
     dead = af.cases.dead_load_of_case(case)
     (motion,) = (m for m in case.ground_suite().motions if m.name == "pair-1")
@@ -108,7 +108,7 @@ def test_ctrl_c_leaves_no_half_of_a_pair(study, tmp_path, monkeypatch, name, ins
     monkeypatch.setattr(f"archfem.studies.evaluators.{name}", instead)
     folder = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        dict(compared(af.studies.Comparison.read(study, QUICK), folder))
+        dict(run_comparison(af.studies.Comparison.read(study, QUICK), folder))
     assert not [*folder.glob("*/*/*.json"), *folder.glob("thi*.json")]
 
 
@@ -117,7 +117,7 @@ def test_a_case_that_does_not_stand_is_named(study, tmp_path):
     unscaled(study)
     study.write_text(study.read_text().replace("thickness=0.4", "thickness=0.1"))
     with pytest.raises(af.DidNotConverge, match=r"^'thin': no equilibrium"):
-        dict(compared(af.studies.Comparison.read(study, QUICK), tmp_path))
+        dict(run_comparison(af.studies.Comparison.read(study, QUICK), tmp_path))
     assert (tmp_path / "thick.json").is_file()
 
 
@@ -134,9 +134,9 @@ def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
     table = (folder / "study.txt").read_text()
     assert (folder / "study.png").is_file()
 
-    monkeypatch.setattr("archfem.studies.study.serially", never)
+    monkeypatch.setattr("archfem.studies.study.evaluate_serially", never)
     asked = af.studies.Comparison.read(study, QUICK)
-    found = dict(compared(asked, folder))
+    found = dict(run_comparison(asked, folder))
     assert af.studies.study_table(found) in table
     assert json.loads((folder / "thin.json").read_text())["case"] == asked.cases["thin"].text()
     assert af.commands.main(command) == 0
@@ -145,4 +145,4 @@ def test_a_study_goes_on_where_it_was_ended(study, tmp_path, monkeypatch):
 
     other = af.studies.Comparison.read(study, [*QUICK, "analysis.dt=4 ms"])
     with pytest.raises(AssertionError, match="run again"):
-        dict(compared(other, folder))
+        dict(run_comparison(other, folder))

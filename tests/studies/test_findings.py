@@ -3,7 +3,7 @@
 import json
 
 import archfem as af
-from archfem.studies.comparison import Finding, study_table, write
+from archfem.studies.comparison import Finding, study_table, write_finding
 
 DEFINITIONS = af.dynamics.MECHANISM_DEFINITIONS
 
@@ -40,7 +40,7 @@ def test_a_study_tells_rings_from_piers_by_their_roles():
 
 def test_findings_are_written_as_they_are(tmp_path):
     path = tmp_path / "case.json"
-    write(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
+    write_finding(finding(search={"precision": 0.1, "between": [0.2, 2.0]}), path)
     kept = json.loads(path.read_text())
     assert set(kept["scales"]) == {"a", "b"}
     assert kept["runs"]["a"]["friction"]["arch"] == float("inf")

@@ -16,7 +16,7 @@ from archfem.dynamics.solvers import base
 from archfem.dynamics.solvers.equation import Equation
 from archfem.models.discretisation import Discretisation
 from archfem.studies import cache
-from archfem.studies.cache import Ready
+from archfem.studies.cache import StepperFactory
 
 DT = 0.005
 
@@ -62,10 +62,10 @@ def test_a_stepper_of_shared_matrices_gives_the_run_of_one_of_its_own_whatever_r
 
     alone = [run(motion, "auto") for motion in (weak, strong)]
     compiled = len(base.advance.signatures)
-    ready = Ready.of(equation)
+    ready = StepperFactory.of(equation)
     for order in ((0, 1), (1, 0), (1, 1)):
         for number in order:
-            found = run((weak, strong)[number], ready.under((weak, strong)[number]))
+            found = run((weak, strong)[number], ready.stepper((weak, strong)[number]))
             assert same(found, alone[number])
     assert not same(*alone)
     assert len(base.advance.signatures) == compiled  # copies are of the types of what was made
@@ -82,7 +82,7 @@ def test_a_search_by_shared_matrices_finds_what_one_by_fresh_ones_does(rest):
 
 def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatch):
     made, synthetic = [], af.Motion.synthetic
-    monkeypatch.setattr(cache, "_kept", {})
+    monkeypatch.setattr(cache, "_cache", {})
     monkeypatch.setattr(
         af.Motion, "synthetic", lambda **given: made.append(given) or synthetic(**given)
     )
@@ -116,7 +116,7 @@ def test_a_suite_is_matched_once_whatever_its_factors(monkeypatch):
 
     monkeypatch.setattr(af.Suite, "matched", matched)
     own = [each.ground_suite().motions[0] for each in cases]
-    monkeypatch.setattr(cache, "_kept", {})
+    monkeypatch.setattr(cache, "_cache", {})
     met.clear()
     for each, motion in zip(cases, own, strict=True):
         assert cache.ground_motion(each).horizontal.tobytes() == motion.horizontal.tobytes()

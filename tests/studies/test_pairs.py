@@ -26,5 +26,5 @@ def test_pairs_are_kept_where_they_are_looked_for(small, tmp_path, workers):
 
 def test_a_model_chosen_for_all_pairs_is_not_chosen_pair_by_pair(small, small_ring, tmp_path):
     for case in (af.Case.read(small, ["model.fidelity=auto"]), small_ring):
-        with pytest.raises(af.InvalidInput, match="pairs run side by side where"):
+        with pytest.raises(af.InvalidInput, match="pairs run in parallel only if"):
             run_pairs(case, tmp_path)

@@ -3,7 +3,9 @@
 import errno
 import json
 import os
+import subprocess
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,7 +16,7 @@ from scipy import stats
 import archfem as af
 from archfem.cases import provenance
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.parameter_space import by_model, parameter_axes
+from archfem.studies.parameter_space import group_by_model, parameter_axes
 from archfem.studies.process_pool import TaskQueue
 from archfem.studies.result_store import Store
 
@@ -85,7 +87,7 @@ def test_what_is_finished_is_not_computed_again(study_file, tmp_path, monkeypatc
         asked.extend(number for number, _ in points)
         return iter([(number, {"found": {}, "error": "", "ours": True}) for number, _ in points])
 
-    monkeypatch.setattr("archfem.studies.study.serially", counted)
+    monkeypatch.setattr("archfem.studies.study.evaluate_serially", counted)
     # what failed for no reason of the case's own is tried again: numbers 4 and 5
     study.run(folder, workers=1)
     assert asked == [4, 5]
@@ -135,7 +137,7 @@ def test_a_changed_case_is_told_apart(
                for study in (before, after)]  # fmt: skip
     if what in ("case", "option"):
         assert not set(digests[0]) & set(digests[1])
-    assert len(Store(folder).finished(digests[1])) == 0
+    assert len(Store(folder).load_rows(digests[1])) == 0
     with caplog.at_level("WARNING", logger="archfem"):
         after.run(folder, workers=1)
     assert "6 points of other cases" in caplog.text
@@ -144,7 +146,7 @@ def test_a_changed_case_is_told_apart(
 def test_a_second_driver_is_refused(study_file, tmp_path):
     folder = tmp_path / "out"
     with (
-        Store(folder).locked(),
+        Store(folder).lock(),
         pytest.raises(af.InvalidInput, match=rf"another driver .*process {os.getpid()}"),
     ):
         af.Study.read(study_file, own_code=True).run(folder, workers=1)
@@ -304,14 +306,12 @@ def test_findings_that_cannot_be_kept(small_ring):
         study.run(workers=0)
 
 
-def test_a_job_for_slurm_names_study_folder_and_workers(study_file, tmp_path):
-    path = af.studies.slurm_job(study_file, tmp_path / "my out", tmp_path / "job.sh", workers=99)
-    text = path.read_text()
-    assert "--ntasks=100" in text
-    assert f"archfem study {study_file} --out '{tmp_path}/my out' --scheduler" in text
-    assert os.system(f"bash -n {path}") == 0
-    with pytest.raises(af.InvalidInput, match="there is no study"):
-        af.studies.slurm_job("none.toml", tmp_path, path, workers=1)
+def test_the_job_for_slurm_in_the_documentation_is_a_script(tmp_path):
+    page = (Path(__file__).parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
+    job = tmp_path / "job.sh"
+    job.write_text(page.partition("```bash\n")[2].partition("```")[0])
+    subprocess.run(["bash", "-n", str(job)], check=True)
+    assert "dask scheduler" in job.read_text()
 
 
 def test_a_file_runs_no_code_unless_one_says_so(study_file, tmp_path, capsys):
@@ -340,7 +340,7 @@ def test_no_spreadsheet_computes_a_cell_of_a_table(small_ring, tmp_path):
 def test_points_of_one_model_are_taken_together(small_ring):
     over = {"motion.scale": [0.1, 0.2], "structure.thickness": [0.5, 0.6]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
-    sorted_points = by_model(points)
+    sorted_points = group_by_model(points)
     thick = [dict(point.changes)["structure.thickness"] for _, point in sorted_points]
     assert thick == [0.5, 0.5, 0.6, 0.6]
     assert [number for number, _ in sorted_points] == [0, 2, 1, 3]
@@ -351,15 +351,15 @@ def test_who_is_free_goes_on_with_the_model_that_it_knows(small_ring):
     over = {"motion.scale": [0.1, 0.2, 0.3], "structure.thickness": [0.5, 0.6, 0.7]}
     points = list(enumerate(af.Study.of(small_ring, over, "dead load").points))
     tasks = TaskQueue(points, Evaluator.of("dead load"))
-    first = tasks.next(None, set())
-    other = tasks.next(None, {first.model})
+    first = tasks.pop(None, set())
+    other = tasks.pop(None, {first.model})
     assert other.model != first.model
-    told = [first, *(tasks.next(first.model, {other.model}) for _ in range(2))]
+    told = [first, *(tasks.pop(first.model, {other.model}) for _ in range(2))]
     assert {task.model for task in told} == {first.model}
-    third = tasks.next(first.model, {other.model})
+    third = tasks.pop(first.model, {other.model})
     assert third.model not in (first.model, other.model)
-    tasks.again(third)
-    rest = [tasks.next(other.model, {third.model}) for _ in range(5)]
+    tasks.put_back(third)
+    rest = [tasks.pop(other.model, {third.model}) for _ in range(5)]
     assert [task.model for task in rest] == 2 * [other.model] + 3 * [third.model]
     assert sorted(task.number for task in (*told, other, *rest)) == list(range(9))
     assert not tasks

@@ -1,0 +1,135 @@
+"""Workers of a study: how they end, what they inherit, and who outlives whom."""
+
+import signal
+import subprocess
+import sys
+import time
+from multiprocessing import forkserver
+from pathlib import Path
+
+import pytest
+
+import archfem as af
+from archfem.studies import process_pool
+
+
+def lives(process):
+    """Whether a process is there that has not ended; one that nobody has waited for has."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def children(process):
+    """Processes that one has begun."""
+    return Path(f"/proc/{process}/task/{process}/children").read_text().split()
+
+
+def all_end(begun, within):
+    """Whether processes end in some time [s]."""
+    until = time.monotonic() + within
+    while any(map(lives, begun)) and time.monotonic() < until:
+        time.sleep(0.02)
+    return not any(map(lives, begun))
+
+
+def study_of(case, find, thicknesses, folder):
+    """A study over thicknesses, by a finder of the tests."""
+    over = {"structure.thickness": thicknesses}
+    find = {"name": f"finders_of_tests:{find}", "folder": str(folder)}
+    return af.Study.of(case, over, find)
+
+
+def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
+    small_ring, tmp_path, finders, monkeypatch
+):
+    monkeypatch.setattr(process_pool, "MAX_DEATHS_PER_POINT", 2)
+    thicknesses = [0.5, 0.6, 0.7, 0.8, 0.81, 0.82, 0.83]
+    study = study_of(small_ring, "ending", thicknesses, tmp_path)
+    table = study.run(tmp_path / "out", workers=2)
+    errors = dict(zip(thicknesses, table["error"].values, strict=True))
+    assert "2 processes that computed this point ended, the last with signal 9" in errors.pop(0.6)
+    assert errors.pop(0.7).endswith("the last with exit code 7")
+    assert errors.pop(0.8).endswith("the last with exit code 5")  # by sys.exit
+    assert not any(errors.values())  # 0.5 ended its first process alone
+    rows = table.isel({"structure.thickness": [0, 4, 5, 6]})
+    assert (rows["sockets"] == 1).all()  # neither the other workers' nor the fork server's
+    assert (rows["threads"] == 1).all()  # of the fork server
+    assert (rows["mpi"] == 0).all()
+    assert (rows["blas"] == 1).all()
+    draws = set(zip(rows["process"].values, rows["draw"].values, strict=True))
+    assert len({draw for _, draw in draws}) == len(draws)  # each has random numbers of its own
+    assert len(set(rows["parent"].values)) == 1
+    assert not any(map(lives, map(int, set(rows["process"].values))))
+    assert not any(Path(f"/proc/{int(each)}").exists() for each in rows["process"].values)
+    assert "an exit is noted" in (tmp_path / "out" / "workers.log").read_text()
+
+
+def test_a_study_outlives_its_fork_server(small_ring, tmp_path, finders):
+    thicknesses = [0.5, 0.6, 0.7, 0.8]
+    table = study_of(small_ring, "orphaned", thicknesses, tmp_path).run(workers=2)
+    assert table["error"].values.tolist() == 4 * [""]
+    assert table["twice"].values.tolist() == [2.0 * each for each in thicknesses]
+    begun = {int(path.name) for path in (tmp_path / "seen").iterdir()}
+    assert len(begun) >= 3  # one fork server at least, and two workers
+    # a second fork server serves later studies; workers of the first have become children of init
+    begun -= {forkserver._forkserver._forkserver_pid, 1}
+    assert all_end(begun, within=5.0)
+
+
+def test_a_study_stops_if_no_worker_starts(small_ring, tmp_path, finders, monkeypatch):
+    def start(process):
+        raise EOFError
+
+    monkeypatch.setattr("multiprocessing.process.BaseProcess.start", start)
+    study = study_of(small_ring, "ending", [0.81, 0.82, 0.83], tmp_path)
+    with pytest.raises(af.errors.StudyStopped, match="no worker could be started in 10 attempts"):
+        study.run(workers=2)
+
+
+def test_a_dead_worker_does_not_end_its_driver(small_ring, tmp_path, finders):
+    """Where gmsh has restored the default action of SIGPIPE."""
+    usual = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    try:
+        table = study_of(small_ring, "deadly", [0.5, 0.81, 0.82], tmp_path).run(workers=2)
+    finally:
+        signal.signal(signal.SIGPIPE, usual)
+    assert table["twice"].values[0] == 1.0
+
+
+def test_a_script_without_a_main_guard_is_not_run_by_workers(small_ring, tmp_path, finders):
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(finders)!r})\n"
+        "import archfem as af\n"
+        f"case = af.Case.read({str(small_ring.folder / 'ring.toml')!r})\n"
+        "vary = {'structure.thickness': [0.5, 0.6]}\n"
+        "table = af.Study.of(case, vary, 'finders_of_tests:lengths').run(workers=2)\n"
+        "print(table['twice'].values.tolist())\n"
+    )
+    ran = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+    assert ran.stdout == "[1.0, 1.2]\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders, ending):
+    code = (
+        f"import sys; sys.path.insert(0, {str(finders)!r})\n"
+        "import archfem as af\n"
+        f"case = af.Case.read({str(small_ring.folder / 'ring.toml')!r})\n"
+        "find = {'name': 'finders_of_tests:slowly', 'seconds': 60.0}\n"
+        "af.Study.of(case, {'motion.scale': [1.0, 2.0, 3.0]}, find).run(workers=2)\n"
+    )
+    driver = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+    begun, workers, until = [], [], time.monotonic() + 60.0
+    while len(workers) < 2 and time.monotonic() < until:
+        time.sleep(0.05)
+        begun = children(driver.pid)
+        workers = [worker for process in begun for worker in children(process)]
+    assert len(workers) == 2
+    time.sleep(0.2)
+    driver.send_signal(ending)
+    driver.wait()
+    assert all_end([*begun, *workers], within=5.0)  # long before their points would
