@@ -59,10 +59,10 @@ from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
-from .studies.verdict_range import verdict_range as verdict_range
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity
 from .studies.ida import ida as ida
 from .studies.joint_stiffness import joint_stiffness as joint_stiffness
 from .studies.study import Study as Study
+from .studies.variations import verdict_range as verdict_range
 
 __version__: str

@@ -68,8 +68,10 @@ def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> Resul
 
 
 # Columns of `tabulate_runs` before those of the mechanisms
-RUN_COLUMNS = ("pair", "outcome", "doubts", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N")
-RUN_COLUMNS += ("apart", "displacement", "residual")
+RUN_COLUMNS = (
+    *("pair", "outcome", "doubts", "max |ax|", "max |ay|", "max |e|", "joint", "max V/N", "apart"),
+    *("displacement", "residual"),
+)
 
 
 def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:

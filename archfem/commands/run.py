@@ -95,6 +95,19 @@ def accuracy(options: argparse.Namespace) -> None:
     print_written(write_accuracy(compared, text, folder))
 
 
+def verdict(options: argparse.Namespace) -> None:
+    """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
+    from archfem.cases.result_folder import write_verdict_range
+    from archfem.studies.variations import verdict_range_of_case
+
+    case = Case.read(options.case, options.changes)
+    print(case.title)
+    computed = verdict_range_of_case(case, workers=options.workers, samples=options.samples)
+    print(computed)
+    if options.out is not None:
+        print_written(write_verdict_range(computed, create_result_folder(options.out)))
+
+
 def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder."""
     from archfem.cases.result_folder import open_results

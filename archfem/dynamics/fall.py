@@ -5,7 +5,7 @@ its blocks are loose, they continue as free rigid blocks (`dynamics.rigid_body`)
 and the momentum of the model, until they rest. The final positions classify the collapse.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,11 +123,12 @@ def classify_collapse(
     """
     free = list_stones(structure)
     start = np.zeros((len(structure.blocks), 3)) if start is None else start
-    farthest = residual = 0.0
+    corners = _place_corners(structure, free)
+    origin, farthest, residual = corners(start), 0.0, 0.0
     sizes = np.sqrt([structure.blocks[number].area for number in free])
     lost, time, last = np.zeros(len(free), dtype=bool), None, None
     for last in frames:
-        residual = _largest_displacement(structure, free, last.poses, start)
+        residual = float(np.linalg.norm(corners(last.poses) - origin, axis=1).max())
         farthest = max(farthest, residual)
         poses = last.poses[free]
         lost |= (poses[:, 1] < -0.5 * sizes) | (np.abs(poses[:, 2]) > np.pi / 4.0)
@@ -170,20 +171,18 @@ def list_stones(structure: Structure) -> list[int]:
     return [number for number in structure.free if number not in fill] or list(structure.free)
 
 
-def _largest_displacement(
-    structure: Structure, blocks: Sequence[int], poses: Array, start: Array
-) -> float:
-    """Return the largest displacement of a corner of some blocks between two poses [m]."""
+def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:
+    """Return a function from poses (n_blocks, 3) to corners of some blocks, less centroids [m]."""
+    all_blocks = structure.blocks
+    corners = [np.asarray(all_blocks[k].points) - all_blocks[k].centroid for k in blocks]
+    owner, (x, y) = np.repeat(blocks, [len(each) for each in corners]), np.concatenate(corners).T
 
-    def corners(block: int, pose: Array) -> Array:
-        arms = np.asarray(structure.blocks[block].points) - structure.blocks[block].centroid
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        return pose[:2] + arms @ np.array([[c, s], [-s, c]])
+    def place(poses: Array) -> Array:
+        pose = poses[owner]
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        return pose[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
 
-    return max(
-        float(np.linalg.norm(corners(k, poses[k]) - corners(k, start[k]), axis=1).max())
-        for k in blocks
-    )
+    return place
 
 
 @dataclass(frozen=True, eq=False)

@@ -459,7 +459,9 @@ def first_mechanisms(run: History, criteria: Criteria | None = None) -> dict[str
     judged = run if criteria is None else run.with_criteria(criteria)
     found = {name: judged.verdict.mechanisms.get(name) for name in MECHANISM_DEFINITIONS}
     found[PUBLISHED_DEFINITION] = judged.verdict.mechanisms[PUBLISHED_DEFINITION]
-    return {name: detected and detected.mechanism for name, detected in found.items()}
+    return {
+        name: None if detected is None else detected.mechanism for name, detected in found.items()
+    }
 
 
 def corner_displacements(model: Model, fields: Array) -> xr.Dataset:

@@ -72,4 +72,5 @@ def _compile_large_displacements(max_half_width: int) -> None:
     equation = Equation(model, _SHORT_MOTION, StiffnessDamping(0.05, 9.0))
     stepper = Stepper(equation, NewtonSolver(equation, max_half_width))
     run = time_history(model, _SHORT_MOTION, dt=_DT, method=stepper)
-    simulate_fall(model, last_state(run), _SHORT_MOTION)
+    end = last_state(run)
+    simulate_fall(model, end, end, _SHORT_MOTION)

@@ -38,7 +38,13 @@ def build_check_section(data: ReportData) -> Section:
     else:
         remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
         blocks.append(missing_note("a comparison of meshes and steps", remedy))
-    return Section("Predicted error and checks", blocks)
+    if (text := data.read_text("verdict_range.txt")) is not None:
+        caption = "Residual displacement over each property; falls are above the line."
+        blocks += [TextBlock(text, "lines"), *data.read_figure("verdict_range.png", caption)]
+    else:
+        remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
+        blocks.append(missing_note("the range of the verdict", remedy))
+    return Section("Predicted error, checks and range of the verdict", blocks)
 
 
 def _check_row(case: Case, name: str, run: History) -> list[str]:

@@ -1,6 +1,7 @@
 """Report sections: case and geometry, dead load, modes, limit analysis, ground motion, response."""
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -414,9 +415,10 @@ def _build_suite_response(data: ReportData) -> list[Any]:
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
     """List the principal results by name, which the report shows first."""
     runs, structure = list(data.runs.values()), data.case.structure
-    facts = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
+    blocks = ("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")
     if not runs:
-        return [*facts, ("runs", "none")]
+        return [blocks, ("runs", "none")]
+    facts = [*_verdict_facts(runs), blocks]
     # Horizontal ground acceleration as recorded.
     pga = max(float(np.abs(run.dataset["ground"].values[:, 0]).max()) for run in runs)
     joints = [assessed_joints(run.joints) for run in runs]
@@ -427,22 +429,28 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
         ("PGA", f"{pga:.2f} m/s²"),
         ("largest |e|", f"{eccentricity:.3f}{opened}"),
         ("largest V / N", format_ratio(friction)),
-        ("mechanism by count", _summarise_mechanisms(data)),
     ]
-    # Only runs with large displacements are followed to rest.
-    falls = [run.fall for run in runs if run.fall is not None]
-    if falls:
-        fallen = f"{sum(fall.kind != 'stands' for fall in falls)} of {len(runs)} fall"
-        facts.append(("after the motion", falls[0].kind if data.case.suite is None else fallen))
     return facts
 
 
-def _summarise_mechanisms(data: ReportData) -> str:
-    """Count the runs with a mechanism, or describe that of the only run."""
-    mechanisms = [run.mechanism for run in data.runs.values() if run.mechanism is not None]
-    if data.case.suite is not None:
-        return f"in {len(mechanisms)} of {len(data.runs)} runs"
-    return f"{mechanisms[0].kind}, at {mechanisms[0].time:.3f} s" if mechanisms else "none"
+def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
+    """Return outcome and doubts of a run, or how many of several runs have each."""
+    verdicts = [run.verdict for run in runs]
+    if len(verdicts) == 1:
+        (verdict,) = verdicts
+        doubts = [("in doubt", str(doubt)) for doubt in verdict.doubts]
+        return [("verdict", verdict.headline), *doubts]
+    outcomes = Counter(verdict.outcome for verdict in verdicts)
+    counts = ", ".join(f"{word} in {count}" for word, count in outcomes.items())
+    facts = [("verdict", f"{counts} of {len(verdicts)} runs")]
+    reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
+    facts += [
+        ("in doubt", f"{count} of {len(verdicts)} runs: {text}") for text, count in reasons.items()
+    ]
+    for name in verdicts[0].mechanisms:
+        met = sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)
+        facts.append((f"mechanism by {name}", f"{met} of {len(verdicts)} runs"))
+    return facts
 
 
 def _sentence(text: str) -> str:

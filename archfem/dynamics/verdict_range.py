@@ -1,0 +1,228 @@
+"""Range of a verdict: runs over properties that nobody knows exactly, and which of them decide."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy.stats import binomtest, rankdata
+
+from archfem._display import ResultDisplay
+from archfem._files import align_columns
+from archfem._netcdf import read_dataset, write_dataset
+from archfem._typing import Array
+from archfem.dynamics.fall import COLLAPSE_STATES, FALLEN_STATES
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VerdictRange(ResultDisplay):
+    """Verdicts over a range of properties.
+
+    Attributes:
+        dataset: over `run`: the value of each varied property; `outcome`, as of `Verdict`;
+            `displacement` and `residual`, the largest of a corner and that at the end [m]; `time`
+            of the first lost block [s]; `error`, the text of a run without an answer, or "";
+            `sampled`, whether the run is of the Latin hypercube.
+            Its attributes `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³].
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def falls(self) -> Array:
+        """Whether the structure partly or wholly falls, by run (runs,)."""
+        return np.isin(self.dataset["outcome"].values, FALLEN_STATES)
+
+    @property
+    def answered(self) -> Array:
+        """Whether a run has an answer (runs,)."""
+        return self.dataset["error"].values == ""
+
+    @property
+    def share(self) -> float:
+        """Share of the sampled runs with an answer in which the structure falls [-]."""
+        sampled = self.dataset["sampled"].values & self.answered
+        return float(self.falls[sampled].mean())
+
+    def interval(self, confidence: float = 0.95) -> tuple[float, float]:
+        """Return the confidence interval of `share` by Clopper and Pearson (1934).
+
+        Args:
+            confidence: probability that the interval contains the share [-].
+        """
+        sampled = self.dataset["sampled"].values & self.answered
+        test = binomtest(int(self.falls[sampled].sum()), int(sampled.sum()))
+        bounds = test.proportion_ci(confidence)
+        return float(bounds.low), float(bounds.high)
+
+    @property
+    def properties(self) -> tuple[str, ...]:
+        """Names of the varied properties."""
+        return tuple(str(name) for name in self.dataset.attrs["properties"])
+
+    def importance(self) -> dict[str, float]:
+        """Return the share of the variance of the damage that each property explains [-].
+
+        Damage is the rank of a run by its outcome and residual displacement. The share is the
+        correlation ratio of the ranks, numbers in three groups of equal size (a first-order index
+        of sensitivity; Saltelli and others, Global Sensitivity Analysis, 2008, section 1.2.6).
+
+        Returns:
+            By property, in descending order; chance alone explains about 2 / runs.
+        """
+        ranks = self._damage_ranks()
+        shares = {
+            name: _correlation_ratio(self.dataset[name].values[self.answered], ranks)
+            for name in self.properties
+        }
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+    def _damage_ranks(self) -> Array:
+        """Return the rank of each answered run by outcome and residual displacement (runs,)."""
+        rows = self.dataset.isel(run=np.flatnonzero(self.answered))
+        kind = np.array([COLLAPSE_STATES.index(str(name)) for name in rows["outcome"].values])
+        # among fallen structures distances to the ground say nothing
+        fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
+        residual = np.where(fallen, 0.0, rows["residual"].values)
+        return rankdata(np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12)))
+
+    @property
+    def sentence(self) -> str:
+        """How often the structure falls, and where."""
+        falls, answered = self.falls[self.answered], int(self.answered.sum())
+        missing = len(self.answered) - answered
+        text = f"falls in {int(falls.sum())} of {answered}"
+        if 0 < falls.sum() < len(falls):
+            text += f": {self._describe_falls()}"
+        low, high = self.interval()
+        text += f"; of those sampled {self.share:.0%} fall ({low:.0%} to {high:.0%})"
+        return text + (f"; {missing} have no answer" if missing else "")
+
+    def _describe_falls(self) -> str:
+        """Return the one or two conditions that separate runs that fall from others best."""
+        rows = self.dataset.isel(run=np.flatnonzero(self.answered))
+        falls, conditions = self.falls[self.answered], []
+        chosen = np.ones(len(falls), dtype=bool)
+        for _ in range(2):
+            best = max(
+                _list_conditions(rows, self.properties, chosen),
+                key=lambda condition: _separation(falls, chosen & condition.holds),
+                default=None,
+            )
+            before = _separation(falls, chosen)
+            if best is None or _separation(falls, chosen & best.holds) <= before:
+                break
+            conditions.append(self._condition_text(best))
+            chosen &= best.holds
+        inside, total = int(falls[chosen].sum()), int(falls.sum())
+        where = " and ".join(conditions)
+        return f"{inside} of the {total} with {where}, where {inside} of {int(chosen.sum())} fall"
+
+    def _condition_text(self, condition: "Condition") -> str:
+        """Return a condition in words, with stiffness as a value."""
+        name, value, below = condition.name, condition.value, condition.below
+        if below is None:
+            return f"{name.replace('_', ' ')} '{value}'"
+        word = "below" if below else "above"
+        if name in ("k_n", "k_s"):
+            return f"{name} {word} {value * self.dataset.attrs[name] / 1e9:.3g} GPa/m"
+        if name == "friction":
+            return f"friction {word} that given {value:+.2g}"
+        return f"{name.replace('_', ' ')} {word} × {value:.3g}"
+
+    def save(self, path: str | Path) -> Path:
+        """Write all runs to a NetCDF file, which `read` reads.
+
+        Args:
+            path: file to write; folders are created.
+        """
+        return write_dataset(self.dataset, Path(path), {})
+
+    @classmethod
+    def read(cls, path: str | Path) -> "VerdictRange":
+        """Read a file written by `save`.
+
+        Args:
+            path: file to read.
+
+        Raises:
+            InvalidInput: there is no such file, or it is damaged.
+        """
+        return cls(read_dataset(path, "file of a verdict's range"))
+
+    def table(self) -> str:
+        """Return the share of the variance that each property explains, and falls by value."""
+        falls, rows = self.falls[self.answered], []
+        data = self.dataset.isel(run=np.flatnonzero(self.answered))
+        for name, share in self.importance().items():
+            groups = _group_values(data[name].values)
+            cells = [
+                f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
+                for label, chosen in groups
+            ]
+            rows.append([name.replace("_", " "), f"{share:.0%}", ", ".join(cells)])
+        return align_columns(["property", "explains", "falls"], rows)
+
+    def __str__(self) -> str:
+        """Sentence, and a line for each property."""
+        return f"{self.sentence}\n{self.table()}"
+
+    def _summary(self) -> str:
+        return f"VerdictRange: {self.sentence}"
+
+
+class Condition(NamedTuple):
+    """Condition on a property: a value of its own, or below or above a number."""
+
+    name: str
+    value: Any
+    below: bool | None
+    holds: Array  # (runs,)
+
+
+def _list_conditions(rows: xr.Dataset, names: Sequence[str], among: Array) -> Iterator[Condition]:
+    """Yield all conditions that split some runs."""
+    for name in names:
+        values = rows[name].values
+        present = np.unique(values[among])
+        if values.dtype.kind == "f":
+            for edge in 0.5 * (present[1:] + present[:-1]):
+                yield Condition(name, float(edge), True, values < edge)
+                yield Condition(name, float(edge), False, values > edge)
+        else:
+            for value in present:
+                yield Condition(name, str(value), None, values == value)
+
+
+def _separation(falls: Array, chosen: Array) -> float:
+    """Return how well chosen runs and runs that fall agree: F1, the mean of both shares [-]."""
+    inside = float(falls[chosen].sum())
+    return 2.0 * inside / max(float(chosen.sum() + falls.sum()), 1.0)
+
+
+def _group_values(values: Array, groups: int = 3) -> list[tuple[str, Array]]:
+    """Return labels and members of the groups of a property: values, or thirds of numbers."""
+    if values.dtype.kind != "f" or len(np.unique(values)) <= groups:
+        return [
+            (f"{value:.3g}" if values.dtype.kind == "f" else str(value), values == value)
+            for value in np.unique(values)
+        ]
+    edges = np.quantile(values, np.linspace(0.0, 1.0, groups + 1))
+    members = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, groups - 1)
+    return [
+        (f"{edges[k]:.3g} to {edges[k + 1]:.3g}", members == k)
+        for k in range(groups)
+        if (members == k).any()
+    ]
+
+
+def _correlation_ratio(values: Array, ranks: Array) -> float:
+    """Return the variance of the group means of ranks over their variance [-]."""
+    total = float(np.sum((ranks - ranks.mean()) ** 2))
+    between = sum(
+        float(chosen.sum() * (ranks[chosen].mean() - ranks.mean()) ** 2)
+        for _, chosen in _group_values(values)
+    )
+    return between / total if total > 0.0 else 0.0
