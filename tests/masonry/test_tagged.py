@@ -130,5 +130,5 @@ def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, end
     """Told by the middles of its edges: all between the joint's ends, and none beside it."""
     middles = np.array([[x, 1.0 + off] for x in ends])
     monkeypatch.setattr(outlines, "read_physical_curves", lambda path, factor: [("mine", middles)])
-    found = outlines._named_by_curves(stack, Path("any.msh"), None)
+    found = outlines._name_joints(stack, Path("any.msh"), None)
     assert [joint.name == "mine" for joint in found.joints] == [False, named]
