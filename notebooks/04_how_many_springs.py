@@ -51,7 +51,7 @@ af.view.draw_structure(ring)
 #
 # A gap $\delta$ between the stones does not exist in joints of no thickness. We model its effects.
 # Stones are shorter, and lighter by $18\,\delta$ in 8.19 m of centre line. The shear force $V$ has
-# an arm $\delta/2$ from the middle of the gap to the stones' faces, so that the thrust there is off
+# an arm $\delta/2$ from the middle of the gap to the stones' faces. So the thrust there is off
 # by $V\delta/2N$ to either side. Joints that are shallower by $\delta\,V/N$ bound the effect, and
 # at the crown's hinges $V/N = 0.6$.
 

@@ -38,8 +38,9 @@ quick = "ARCHFEM_QUICK" in os.environ  # a short motion: for tests
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 motion = af.Motion.synthetic(duration=2.0 if quick else 8.0, pga=1.7, seed=1)
 damping = af.Rayleigh(0.05, (8.0, 16.0))
-for rung in ("rigid", "faces", "condensed", "full"):
-    print(f"{rung:10s} {af.build(ring, fidelity=rung, quadrature='exact').size:4d} coordinates")
+for fidelity in ("rigid", "faces", "condensed", "full"):
+    model = af.build(ring, fidelity=fidelity, quadrature="exact")
+    print(f"{fidelity:10s} {model.size:4d} coordinates")
 
 # %% [markdown]
 # ## How they differ

@@ -239,8 +239,8 @@ for name, scales in factors.items():
 # ## Sensitivity of the verdict
 #
 # - **Friction.** Where joints slide at 0.60, no four of them fail at once under any of the six
-#   pairs, by five springs or exact: they slip by 0.4 to 3 mm and rotate less. By the paper's law,
-#   in which joints never slide, four anywhere fail under three pairs and four in one ring under two
+#   pairs, by five springs or exact: they slip by 0.4 to 3 mm and rotate less. By the paper's law
+#   joints never slide. Then four anywhere fail under three pairs, and four in one ring under two
 #   (under a third, for one step, with half the time step). Friction of 0.5 and softer or stiffer
 #   springs in shear change the amount of slip.
 # - **Damping.** The mass part damps the motion of the whole bridge relative to the ground. Without
