@@ -54,14 +54,13 @@ ring = ring_on(rough)
 # ## The equation
 #
 # A joint now moves with its stones. Let $d$ be the displacement of the middle of its higher face
-# relative to that of the lower, and $n$ and $t$ the normal and the tangent, rotated by the mean of
-# both stones' angles. Let $\delta$ be the difference of these angles. Opening, slip and rotation
-# are then
+# relative to that of the lower. The normal $n$ and the tangent $t$ are rotated by the mean of both
+# stones' angles, and $\delta$ is the difference of these angles. Opening, slip and rotation are then
 #
 # $$ g = n \cdot d, \qquad s = t \cdot d, \qquad \sigma = 2 \sin \tfrac12 \delta , $$
 #
-# exactly, for any angles. The faces are in contact where they still overlap, over a length of $h -
-# |s|$. The rest is as before: a law of compression only over that length, and equilibrium
+# exactly, for any angles. Contact is where the faces still overlap, over a length of $h - |s|$.
+# The rest is as before: a law of compression only over that length, and equilibrium
 #
 # $$ \sum_\text{joints} B(q)^T F(g, s, \sigma) = f_\text{weight} + \lambda\, f_\text{load} . $$
 #
@@ -193,7 +192,7 @@ figure = Figure(figsize=(6.4, 2.8), layout="constrained")
 axes = figure.subplots()
 for scale, run in runs.items():
     axes.plot(run.time, 1e3 * run.joint("joint 13")["rotation"], lw=0.9, label=f"× {scale}")
-axes.set(xlabel="time [s]", ylabel="turn of joint 13 [mrad]")
+axes.set(xlabel="time [s]", ylabel="rotation of joint 13 [mrad]")
 axes.legend(frameon=False, fontsize=8)
 figure
 
@@ -277,7 +276,7 @@ boundary = {
 figure = Figure(figsize=(6.4, 3.2), layout="constrained")
 axes = figure.subplots()
 axes.fill_between(lengths, boundary["joints"], 4.0, color="tab:red", alpha=0.12, lw=0.0)
-axes.plot(lengths, boundary["joints"], "o-", ms=3.0, color="tab:red", label="joints that give")
+axes.plot(lengths, boundary["joints"], "o-", ms=3.0, color="tab:red", label="compliant joints")
 axes.plot(lengths, boundary["rigid stones"], "kx", label="rigid stones")
 axes.axhline(static, color="black", ls="--", lw=1.0, label="limit analysis")
 axes.set(xscale="log", yscale="log", ylim=(0.3, 4.0), xlabel="length of the push [s]")
@@ -312,10 +311,8 @@ def overturns(ratio, peak):
     end = 2.0 * np.pi / (ratio * rate)
     steps = int(np.ceil(end / 1e-3))
     wave = np.sin(2.0 * np.pi * np.arange(steps + 1) / steps)
-    start, motion = (
-        af.dynamics.LooseBlocks.as_built(rocking),
-        af.Motion(peak * G * wave, end / steps),
-    )
+    motion = af.Motion(peak * G * wave, end / steps)
+    start = af.dynamics.LooseBlocks.as_built(rocking)
     frames = free.frames(start, 8.0, motion, spacing=0.1)
     return any(abs(frame.poses[-1, 2]) > 0.8 for frame in frames)
 
@@ -339,9 +336,8 @@ figure
 
 # %% [markdown]
 # Red is overturned. At three times $p$ the block falls from 0.350 g on, stands again between 0.887
-# and 0.916 g, and falls beyond. A fall under a single record at one scale therefore
-# says nothing certain about a larger scale. `above` of `collapse_scale`
-# lists larger scales at which it stood.
+# and 0.916 g, and falls beyond. A fall under a single record at one scale therefore says nothing
+# certain about a larger scale. `above` of `collapse_scale` lists larger scales at which it stood.
 
 # %% [markdown]
 # ## Check
