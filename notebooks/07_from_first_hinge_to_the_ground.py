@@ -55,7 +55,7 @@ ring = ring_on(rough)
 #
 # A joint now moves with its stones. Let $d$ be the displacement of the middle of its higher face
 # relative to that of the lower. The normal $n$ and the tangent $t$ are rotated by the mean of both
-# stones' angles, and $\delta$ is the difference of these angles. Opening, slip and rotation are then
+# stones' angles, and $\delta$ is their difference. Opening, slip and rotation are then
 #
 # $$ g = n \cdot d, \qquad s = t \cdot d, \qquad \sigma = 2 \sin \tfrac12 \delta , $$
 #
