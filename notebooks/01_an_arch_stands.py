@@ -108,8 +108,8 @@ found.rename_axis("cells").round(4)
 #
 # The two springings must carry the whole weight and push against each other. The cells have
 # straight edges, four to a stone, so the model is lighter than the ring by
-# $\varphi^2/6 = 0.03\,\%$, with $\varphi$ the angle of one cell. The springings must carry the weight of the model
-# to the last digit.
+# $\varphi^2/6 = 0.03\,\%$, with $\varphi$ the angle of one cell. The springings must carry the
+# weight of the model to the last digit.
 
 # %%
 springings = [0, len(ring.joints) - 1]
