@@ -225,9 +225,7 @@ def _assign_corners(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
                 "that, or correct the drawing"
             )
     directions = find_directions(blocks, touches)
-    return tuple(
-        replace(each, corners=_find_corners(each, directions.get(each.part))) for each in blocks
-    )
+    return tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in blocks)
 
 
 def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, int, int] | None:
