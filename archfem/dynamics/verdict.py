@@ -205,7 +205,10 @@ def brief_mechanism_remarks(
     begins: dict[float, list[str]] = {}
     for name, brief in detect_mechanisms(loose, structure).items():
         counted = detected[name]
-        if brief is not None and (counted is None or brief.time < counted.time):
+        # over the record each joint counts only once its failure has lasted: it is never brief
+        if name == OVER_RECORD or brief is None:
+            continue
+        if counted is None or brief.time < counted.time:
             begins.setdefault(brief.time, []).append(name)
     return [
         f"{join_names(names)}: what begins at {time:.4f} s lasts less than "

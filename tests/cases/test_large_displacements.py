@@ -72,15 +72,15 @@ def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path):
     written |= {"joints.png", "fall.png"}
     assert written | {"history.nc"} <= names
     summary = (Given.out / "summary.txt").read_text(encoding="utf-8")
-    assert summary.startswith("the structure is fallen, at ")
-    assert "before blocks came loose none was farther than " in summary
+    assert summary.startswith("fallen, first at ")
+    assert summary.splitlines()[0].endswith("; no doubts")
     history = af.dynamics.History.read(Given.out / "history.nc", af.Case.read(path).structure)
     assert history.fall.kind == "fallen"
-    assert tabulate_runs({"pair": history}).text.rstrip().endswith(", fallen")
+    assert tabulate_runs({"pair": history}).rows[0][1] == "fallen"
 
 
 def test_a_run_that_holds_says_so(path):
     case = af.Case.read(path, ["motion.scale=0.01", "motion.end=0.5"])
     *_, done = af.cases.run_case(case)
-    assert done.history.verdict.headline.startswith("stands; ")
+    assert done.history.verdict.headline.startswith("stands")
     assert "largest displacement of a corner " in str(done.history.verdict)

@@ -12,7 +12,7 @@ from archfem.cases.result_text import (
     tabulate_joints,
     tabulate_runs,
 )
-from archfem.limit.mechanism_count import episode
+from archfem.limit.mechanism_count import duration_text
 
 
 @pytest.fixture(scope="module")
@@ -31,26 +31,31 @@ def test_the_verdict_comes_first(run, ring):
     assert "of the largest exchanged at most" in found
 
 
-def test_pair_table_tells_all_three(run, tmp_path):
-    """By count, by the words of the paper, and verified; joints by name, and how far they open."""
-    row = tabulate_runs({"pair": run}).text.splitlines()[1]
-    found, moved = run.mechanism, run.verified.moved
-    met = episode(run.joints, found)
-    words = f"{1e3 * met.duration:.3g} ms  {1e3 * met.opening:.3g} mm"
-    joints = f"joints {', '.join(map(str, found.joints[:-1]))} and {found.joints[-1]}"
-    assert found.names == tuple(f"joint {number}" for number in found.joints)
-    assert re.search(rf"local +{found.time:.3f} s +{re.sub('  ', ' +', words)} +{joints}", row)
-    assert re.search(rf"local +{found.time:.3f} s +local +{moved.time:.3f} s", row.split(joints)[1])
-    assert re.search(r" joint \d+ ", row.split(joints)[0])  # the gravest, by name
-    alone = tabulate_runs({"pair": af.History.read(run.save(tmp_path / "run.nc"))}).text
-    assert re.search(r"unknown +- +- +- ", alone)
+def test_table_of_pairs_has_the_verdict_by_each_definition(run, tmp_path):
+    """Class, time, duration and opening of each mechanism, and how many pairs have one."""
+    calm = run.with_criteria(af.Criteria(hinge=0.5, failures=18, friction=100.0))
+    table = tabulate_runs({"strong": run, "calm": calm})
+    strong, other, total = (dict(zip(table.head, row, strict=True)) for row in table.rows)
+    assert (strong["pair"], other["pair"], total["pair"]) == ("strong", "calm", "all")
+    assert strong["outcome"] == "mechanism"
+    assert re.fullmatch(r"joint \d+", strong["joint"])  # the critical one, by name
+    for name, found in run.verdict.mechanisms.items():
+        words = f"local {found.time:.2f} s, {duration_text(found.duration)}"
+        assert strong[name] == f"{words}, {1e3 * found.opening:.3g} mm"
+    assert other["any joints at once"] == "none"
+    assert total["any joints at once"] == "1 of 2"
+    assert strong["ring and pier at once"] == "-"  # there is no pier
+    alone = tabulate_runs({"pair": af.History.read(run.save(tmp_path / "run.nc"))})
+    assert alone.rows[0][alone.head.index("verified")] == "-"
 
 
 def test_words_and_tables_obey_the_criteria_of_the_run(run):
     loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     assert tabulate_joints(loose.joints) != tabulate_joints(run.joints)
     calm = loose.with_criteria(af.Criteria(failures=18))
-    assert calm.verdict.outcome == "no mechanism"
+    met = [name for name, found in calm.verdict.mechanisms.items() if found]
+    assert met == ["verified"]
+    assert calm.verdict.headline.startswith("mechanism by verified; none by any joints at once, ")
 
 
 def test_limit_analysis_in_words(ring):

@@ -90,12 +90,13 @@ def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypat
     released = fall.ReleasedBlocks(start, 0.5, 2.0, 1.5)
     monkeypatch.setattr(fall, "release_blocks", lambda model, state: released)
     monkeypatch.setattr(fall, "RigidBlockSimulation", Simulation)
-    monkeypatch.setattr(fall, "classify_collapse", lambda structure, frames: len(frames))
+    monkeypatch.setattr(fall, "classify_collapse", lambda structure, frames, start: len(frames))
     motion = af.Motion(np.arange(401.0) / 1e3, 0.01)
     for time, end in ((1.0, 24.0), (6.0, 26.0)):
         calls.clear()
         state = SimpleNamespace(time=time)
-        dataset, count = fall.simulate_fall(tower, state, motion)
+        rest = af.dynamics.State(0.0, *np.zeros((3, tower.size)))
+        dataset, count = fall.simulate_fall(tower, rest, state, motion)
         assert calls[1] == (start, pytest.approx(end), 0.02)
         assert count == 1
     assert dataset["fall_ground"].values == pytest.approx(np.array([[0.1, 0.0]]))

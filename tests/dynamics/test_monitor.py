@@ -123,7 +123,7 @@ def test_numbers_that_overflow_end_in_an_error(method, scheme):
 def looked(model, q=None, energy=(0.0, 0.0, 0.0, 0.0), damps=False):
     """A guard that has seen a step of a megajoule to some state, and energies beside it."""
     q = np.zeros(model.size) if q is None else np.asarray(q, dtype=float)
-    state, rows = af.dynamics.State(0.0, q, *np.zeros((2, model.size))), np.array([energy])
+    state, rows = af.dynamics.State(0.0, 0.0 * q, *np.zeros((2, model.size))), np.array([energy])
     none, one = np.zeros((1, len(model.structure.joints), 3)), np.array([1.0])
     start = af.dynamics.Batch(one, none, 1 + 0 * one, one, np.zeros((1, 4)), lambda _: state)
     guard = RunMonitor(model, start, damps=damps)

@@ -225,7 +225,7 @@ def test_a_search_makes_forty_runs_at_most():
 def fallen(*scales):
     """Runs at some scales, those of a negative one fallen."""
     made = (
-        af.dynamics.CollapseState("fallen" if s < 0 else "stands", {}, 0.1, None, True)
+        af.dynamics.CollapseState("fallen" if s < 0 else "stands", None, (), 0.1, 0.1, True)
         for s in scales
     )
     runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))

@@ -143,7 +143,7 @@ def test_files_have_the_verdict_of_the_run(run, tmp_path):
     del old.dataset.attrs["displacement"], old.dataset.attrs["residual"]
     read = af.History.read(old.save(tmp_path / "old.nc"), run.structure).verdict
     assert np.isnan(read.displacement)
-    assert "displacement" not in str(read)
+    assert "largest displacement" not in str(read)
     assert read.mechanisms["verified"].time == run.verified.moved.time
 
 
@@ -194,8 +194,8 @@ def test_the_share_of_damping_by_mass_is_that_of_the_energy_lost():
 
         patch.setattr(module, "RunMonitor", Kept)
         af.time_history(model, motion, dt=0.0005, damping=damping)
-    # power by the kinetic energy at both ends of a step against the work of the forces
-    assert monitors[0].mass_damping_share == pytest.approx(1.0, rel=2e-3)
+    # the power at the ends of steps exceeds that of their mean velocities by (ω Δt)² / 12 and more
+    assert monitors[0].mass_damping_share == pytest.approx(1.0, rel=1e-2)
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
