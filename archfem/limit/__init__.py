@@ -2,6 +2,7 @@
 
     backfill              earth pressure, load spreading, self-weight programme
     collapse              collapse_factor, stands, warnings
+    instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion

@@ -25,6 +25,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
+from archfem.limit.instability import explain_instability
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
 from archfem.masonry.structure import join_joint_names
@@ -161,7 +162,10 @@ def dead_load(
     """
     check_model(model)
     if stages is None:
-        return equilibrium_under(model, self_weight(model), newton)
+        try:
+            return equilibrium_under(model, self_weight(model), newton)
+        except DidNotConverge as error:
+            raise DidNotConverge(_describe_failure(model, error), last=error.last) from error
     # blocks are placed by small displacements on supports that have not moved
     small = model.small_displacement_model()
     if not isinstance(small, LinearBlockModel):
@@ -177,6 +181,20 @@ def dead_load(
         solver, built = _create_solver(whole, newton), replace(built, model=whole)
         built = _apply_remaining_weight(solver, built, whole, "what was built")
     return _move_supports(solver, built, self_weight(model), model.support_motion)
+
+
+def _describe_failure(model: Model, error: DidNotConverge) -> str:
+    """Return the message of a failed dead load, with its cause by limit analysis."""
+    try:
+        cause = explain_instability(model.structure)
+    except (InvalidInput, DidNotConverge):  # soft bodies or bonds: limit analysis does not apply
+        return str(error)
+    if cause is not None:
+        return f"'{model.structure.name}' does not stand under its own weight: {cause}"
+    return (
+        f"{error}; as rigid blocks it stands, so that its joints or blocks are too soft for its "
+        "depth: compare with stiffer joints"
+    )
 
 
 def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -> Equilibrium:
@@ -272,9 +290,7 @@ def _increment_load(
             if step >= MIN_LOAD_STEP:
                 continue
             raise DidNotConverge(
-                f"no equilibrium beyond {factor:.3f} of the {what} ({error}): the structure cannot "
-                "carry it; make it thicker, or check the outline, the supports and the load",
-                last=state,
+                f"no equilibrium beyond {factor:.3f} of the {what}: {error}", last=state
             ) from error
         iterations = state.iterations + solution.iterations
         state = Equilibrium(model, solution.q, iterations, state.steps + 1)

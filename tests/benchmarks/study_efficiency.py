@@ -68,7 +68,10 @@ def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tup
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
     """Wall and processor time of a study [s], and how many points failed."""
-    with tempfile.TemporaryDirectory() as folder, patch("archfem.studies.study.evaluate_serially", alone):
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        patch("archfem.studies.study.evaluate_serially", alone),
+    ):
         begun, spent = time.monotonic(), processor()
         failed = int((study.run(folder, workers=workers)["error"] != "").sum())
         return time.monotonic() - begun, processor() - spent, failed

@@ -203,7 +203,7 @@ def test_other_rules_stop_it():
 
 def test_a_ring_that_does_not_stand_is_not_pushed():
     thin = af.circular_arch(radius=1.0, thickness=0.09, embrace=180.0, voussoirs=17)
-    with pytest.raises(af.DidNotConverge, match="cannot carry it"):
+    with pytest.raises(af.DidNotConverge, match="joints hinge"):
         pushover(rigid(thin), af.BodyForce(1.0))
 
 

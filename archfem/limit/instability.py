@@ -1,0 +1,105 @@
+"""Cause of a structure that does not stand under its own weight: support, friction or thickness.
+
+Limit analysis of the weight is repeated with one property relaxed at a time. The property that
+lets the structure stand is the cause, and the least change of it the remedy.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from archfem._typing import Array
+from archfem.limit.backfill import is_balanced, self_weight_programme
+from archfem.limit.linear_programme import Programme, RigidBlocks, friction_limits
+from archfem.masonry.structure import Structure, join_joint_names
+
+# Depth of joints, as a multiple of that given, and friction from which more does not help [-]
+UNLIMITED_DEPTH, UNLIMITED_FRICTION = 1e3, 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class DeepenedBlocks(RigidBlocks):
+    """Rigid blocks of the same weight whose joints are deeper, about their middles."""
+
+    factor: float = 1.0
+
+    @property
+    def balance(self) -> sparse.csr_matrix:  # type: ignore[override]
+        """Balance of the free blocks with forces at the ends of the deeper joints."""
+        count = len(self.structure.depths)
+        # an end at ± f h/2 is the sum of (1 ± f)/2 of the forces at the ends at ± h/2
+        near, far = (0.5 * (1.0 + s * self.factor) * sparse.identity(count) for s in (1.0, -1.0))
+        shear = sparse.identity(count)
+        ends = sparse.bmat([[near, far, None], [far, near, None], [None, None, shear]])
+        return (RigidBlocks(self.structure).balance @ ends).tocsr()
+
+
+def explain_instability(structure: Structure) -> str | None:
+    """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can.
+
+    Args:
+        structure: structure whose blocks are all rigid bodies.
+
+    Returns:
+        A sentence that names sliding joints with the coefficient of friction from which they hold,
+        hinges with the depth of joints from which it stands, or a block that nothing holds.
+
+    Raises:
+        InvalidInput: joints have tensile strength, or bodies are too soft to be rigid.
+    """
+    stones, dead = self_weight_programme(structure, "coulomb", None, None)
+    fall = dead.minimise_residual()
+    if is_balanced(fall, dead):
+        return None
+    intrados, extrados, slip = dead.blocks.gaps(dead.blocks.motion(fall.multipliers))
+    moving = 1e-6 * np.abs([intrados, extrados, slip]).max()
+    names = np.array([structure.joints[number].name for number in stones.rigid_regions.joints])
+    sliding = join_joint_names(names[np.abs(slip) > moving])
+    turning = join_joint_names(names[np.abs(extrados - intrados) > moving])
+    if _stands(dead, friction=UNLIMITED_FRICTION):
+        least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
+        text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
+        if not _stands(dead, depth=UNLIMITED_DEPTH):
+            text += ", and no thickness helps"
+        return text
+    if _stands(dead, depth=UNLIMITED_DEPTH):
+        least = _least_value(dead, "depth", 1.0, UNLIMITED_DEPTH)
+        return (
+            f"joints hinge ({turning}): it stands if they are {least:.3g} times as deep, at the "
+            "same weight; no friction helps"
+        )
+    if _stands(dead, friction=UNLIMITED_FRICTION, depth=UNLIMITED_DEPTH):
+        return (
+            f"joints slide ({sliding}) and hinge ({turning}): it needs more friction and deeper "
+            "joints"
+        )
+    number = int(np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1).argmax())
+    block = dead.blocks.structure.blocks[dead.blocks.structure.free[number]].name
+    return (
+        f"no compression in its joints can hold '{block}', however deep and rough they are: add a "
+        "support, or check the outline"
+    )
+
+
+def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) -> bool:
+    """Return whether blocks stand with at least a friction, and joints deeper by a factor."""
+    blocks: RigidBlocks = dead.blocks
+    coefficient: Array = blocks.structure.friction
+    if friction is not None:
+        coefficient = np.maximum(coefficient, friction)
+    limits = friction_limits(coefficient, blocks.cohesion)
+    relaxed = replace(dead, blocks=DeepenedBlocks(blocks.structure, depth), limits=limits)
+    return is_balanced(relaxed.minimise_residual(), relaxed)
+
+
+def _least_value(
+    dead: Programme, name: str, lower: float, upper: float, precision: float = 2e-3
+) -> float:
+    """Return the least value of a property with which blocks stand, by bisection."""
+    while upper > (1.0 + precision) * max(lower, precision):
+        middle = 0.5 * (lower + upper)
+        if upper > 4.0 * max(lower, precision):  # far apart: by the geometric mean
+            middle = float(np.sqrt(max(lower, precision) * upper))
+        lower, upper = (lower, middle) if _stands(dead, **{name: middle}) else (middle, upper)
+    return upper
