@@ -26,7 +26,7 @@ from archfem.limit.backfill import BlocksWithFill, Fill, is_balanced, self_weigh
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement, list_loads
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_joint_names, join_names
 
 logger = logging.getLogger("archfem")
 
@@ -107,14 +107,13 @@ class Collapse(ResultDisplay):
         return f"Collapse: {self}"
 
     def __str__(self) -> str:
-        """Describe outcome, factor and failing joints, by number and name, in one line."""
+        """Describe outcome, factor and failing joints in one line."""
         turning = zip(self.hinges, self.hinge_names, strict=True)
-        hinges = ", ".join(f"{j} ({name}) {side}" for (j, side), name in turning) or "none"
-        slipping = zip(self.sliding, self.sliding_names, strict=True)
-        sliding = ", ".join(f"{j} ({name})" for j, name in slipping) or "none"
-        text = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges {hinges}; "
+        hinges = join_names([f"{name} at the {side}" for (_, side), name in turning], "; ") or "none"
+        sliding = join_joint_names(self.sliding_names) or "none"
+        text = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
-        return f"{text}sliding {sliding}{solutions}"
+        return f"{text}sliding: {sliding}{solutions}"
 
 
 def collapse_factor(
@@ -315,7 +314,7 @@ def _solve_collapse(
         if friction is not None:
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)
     if friction == "coulomb":
-        warn_sliding(result.sliding, result.sliding_names, result.factor)
+        warn_sliding(result.sliding_names, result.factor)
     return result
 
 
@@ -392,14 +391,13 @@ def warn_dilatancy(structure: Structure) -> None:
         )
 
 
-def warn_sliding(sliding: Sequence[int], names: Sequence[str], factor: float) -> None:
+def warn_sliding(names: Sequence[str], factor: float) -> None:
     """Warn of joints that slide and, by associated flow, dilate."""
-    if sliding:
+    if names:
         logger.warning(
-            "joints %s (%s) slide: with the dilatancy of associated flow the factor %.4g is an "
+            "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",
-            list(sliding),
-            ", ".join(names),
+            join_joint_names(names),
             factor,
         )
 

@@ -39,7 +39,7 @@ from archfem.limit.linear_programme import (
     rigid_load,
 )
 from archfem.masonry.loads import Settlement
-from archfem.masonry.structure import Structure, rigid_motion_matrix
+from archfem.masonry.structure import Structure, join_names, rigid_motion_matrix
 
 # First and longest step, as a share of the full movement [-]
 MAX_MOVEMENT_STEP = 0.01
@@ -90,14 +90,14 @@ class Stage:
     names: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Describe share, work, and hinges by number and name, in one line."""
+        """Describe share, work, and hinges, in one line."""
         hinges = [
-            f"{joint} ({name}) {side}"
-            for (joint, side), name in zip(self.hinges, self.names, strict=True)
+            f"{name} at the {side}"
+            for (_, side), name in zip(self.hinges, self.names, strict=True)
         ]
         return (
             f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "
-            f"hinges {', '.join(hinges) or 'none'}"
+            f"hinges: {join_names(hinges, '; ') or 'none'}"
         )
 
 

@@ -103,7 +103,7 @@ class Pushover(ResultDisplay):
             limit = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}"
         return (
             f"Pushover: factor {self.factor:.4g} after {steps} steps{limit}, "
-            f"{len(self.hinges)} hinges; {self.outcome}"
+            f"{len(self.hinges)} hinge{'s' if len(self.hinges) != 1 else ''}; {self.outcome}"
         )
 
     def joint(self, joint: str | int) -> xr.Dataset:

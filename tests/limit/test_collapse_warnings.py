@@ -27,10 +27,10 @@ def test_the_steepest_dilatancy_that_is_left_out_is_told(each, said, warned):
 
 
 def test_joints_that_slide_are_told_with_their_factor(warned):
-    collapse.warn_sliding([], [], 0.3)
+    collapse.warn_sliding([], 0.3)
     assert not warned()
-    collapse.warn_sliding([2, 5], ["a", "b"], 0.31416)
-    assert "joints [2, 5] (a, b) slide" in warned()
+    collapse.warn_sliding(["a", "b"], 0.31416)
+    assert "joints slide (a; b)" in warned()
     assert "factor 0.3142 is" in warned()
 
 

@@ -229,7 +229,7 @@ def test_the_first_thrust_is_that_of_the_small_movement():
 def test_the_words_name_the_joints():
     found = largest_movement(semicircle(0.15, 8), SPREAD, friction=None)
     assert "moves by -0.2269 m" in str(found)
-    assert "1 (joint 1) intrados, 4 (joint 4) extrados" in str(found)
+    assert "joint 1 at the intrados; joint 4 at the extrados" in str(found)
     assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
 
 
