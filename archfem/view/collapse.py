@@ -152,8 +152,8 @@ def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float
     thin = [point for point, factor in known.items() if factor == 0.0]
     strong = [point for point, factor in known.items() if factor > 0.0]
     for points, label, style in (
-        (thin, "reference: least thickness", {"marker": "D", "mfc": "white", "mec": Colour.TEXT}),
-        (strong, "reference: acceleration", {"marker": "o", "mfc": Colour.HINGE, "mec": "white"}),
+        (thin, "reference thickness", {"marker": "D", "mfc": "white", "mec": Colour.TEXT}),
+        (strong, "reference acceleration", {"marker": "o", "mfc": Colour.HINGE, "mec": "white"}),
     ):
         if points:
             style |= {"ls": "", "ms": 6.5, "zorder": 5, "clip_on": False}

@@ -29,25 +29,24 @@ MARKED_QUANTITIES = ("eccentricity", "V", "hinge", "slide", "open")
 logger = logging.getLogger("archfem")
 
 
-def _no_points(*shape: int) -> Array:
-    """Return an empty array of points."""
-    return field(default_factory=lambda: np.zeros((0, *shape)))
-
-
 @dataclass(frozen=True, eq=False)
 class Marks:
     """Places of the marks at one instant; none by default."""
 
     # points of the thrust line (n_joints, 2) [m]; NaN in an open joint, and in one that is not of
     # a ring or pier
-    thrust: Array = _no_points(2)
+    thrust: Array = field(default_factory=lambda: np.zeros((0, 2)))
     # segments of the thrust line across the blocks between two such joints (n_links, 2, 2) [m]
-    links: Array = _no_points(2, 2)
-    hinges: Array = _no_points(2)  # contact points of hinged joints (n_hinges, 2) [m]
+    links: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    hinges: Array = field(
+        default_factory=lambda: np.zeros((0, 2))
+    )  # contact points of hinged joints (n_hinges, 2) [m]
     # outlines of two opposite arrows beside each sliding joint: the upper block's, then the
     # lower's (2 n_sliding, 7, 2) [m]
-    slips: Array = _no_points(7, 2)
-    gaps: Array = _no_points(2, 2)  # ends of the open joints (n_open, 2, 2) [m]
+    slips: Array = field(default_factory=lambda: np.zeros((0, 7, 2)))
+    gaps: Array = field(
+        default_factory=lambda: np.zeros((0, 2, 2))
+    )  # ends of the open joints (n_open, 2, 2) [m]
 
 
 class Marker:

@@ -301,7 +301,8 @@ def draw_loads(
         tip = start + length * direction
         arrow = {"arrowstyle": "-|>", "color": Colour.LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tuple(tip), tuple(start), zorder=9, arrowprops=arrow)
-        axes.update_datalim(np.array([start, tip, start + [0.0, 0.04 * structure.size]]))
+        above = (start[0], start[1] + 0.04 * structure.size)  # room for the text
+        axes.update_datalim([start, tip, above])
         if not number:
             axes.plot([], [], color=Colour.LOAD, lw=2.2, marker=">", ms=5, label="live load")
         # the text stands above a steep arrow's tail, beside an upward arrow, else above its middle

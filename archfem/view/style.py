@@ -131,8 +131,8 @@ def annotate(
     **style: Any,
 ) -> Annotation:
     """Write a text at an offset [points] from a point."""
-    style = {"textcoords": "offset points", "fontsize": LABEL_SIZE} | style
-    return axes.annotate(text, tuple(point), tuple(offset), **style)
+    default = {"textcoords": "offset points", "fontsize": LABEL_SIZE, "color": Colour.TEXT}
+    return axes.annotate(text, tuple(point), tuple(offset), **(default | style))
 
 
 def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:

@@ -300,7 +300,7 @@ class FrameLayout:
         times, ground = ground_acceleration(run)
         draw_ground(axes, times, ground, size=self.font_size, width=0.9)
         axes.set_xlabel("time [s]", fontsize=self.font_size)
-        instants = [(run.time[-1], "loose")] if len(times) > len(run.time) else []
+        instants = [(run.time[-1], "blocks loose")] if len(times) > len(run.time) else []
         if run.mechanism is not None and run.mechanism.time is not None:
             instants.append((run.mechanism.time, "mechanism"))
         for time, text in instants:
