@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from archfem._typing import Array
@@ -26,6 +26,7 @@ from archfem.view.style import (
     TITLE_SIZE,
     Colour,
     add_legend,
+    add_polygons,
     annotate,
     new_figure,
     set_title,
@@ -50,16 +51,15 @@ def draw_collapse(structure: Structure, found: Collapse) -> Figure:
     axes = figure.axes[0]
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
-        _draw_mechanism(axes, structure, motion)
+        style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism"}
+        outlines = outline_moving_blocks(structure, motion)
+        add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
+        axes.autoscale_view()
         _mark_hinges(axes, structure, found, motion)
-        for count, number in enumerate(found.sliding):
-            axes.plot(
-                *structure.joints[number].ends.T,
-                color=Colour.SLIDING,
-                lw=2.4,
-                zorder=4,
-                label="_" if count else "sliding joint",
-            )
+        if found.sliding:
+            ends = structure.ends[list(found.sliding)]
+            style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
+            axes.add_collection(LineCollection(ends, label="sliding joint", **style))
     line = thrust_line(structure, found.joints).values
     if np.isfinite(line).any():
         style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
@@ -114,16 +114,6 @@ def draw_capacity(
     add_legend(axes)
     style_colour_bar(figure.colorbar(filled), "horizontal acceleration at collapse [g]")
     return figure
-
-
-def _draw_mechanism(axes: Axes, structure: Structure, motion: Array) -> None:
-    """Draw the blocks that move, displaced by a motion (n_blocks, 3)."""
-    style = {"facecolors": f"{Colour.MECHANISM}30", "edgecolors": Colour.MECHANISM}
-    outlines = outline_moving_blocks(structure, motion)
-    axes.add_collection(
-        PolyCollection(outlines, linewidths=0.8, zorder=2, label="mechanism", **style)
-    )
-    axes.autoscale_view()
 
 
 def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Array) -> None:
@@ -207,10 +197,8 @@ def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
     axes.set_aspect("equal")
     axes.axhline(falls.level, color=Colour.EDGE, lw=1.2, zorder=0)
     built = [block.drawn() for block in structure.blocks]
-    style = {"facecolors": "none", "edgecolors": Colour.UNDEFORMED, "linewidths": 0.6}
-    axes.add_collection(PolyCollection(built, zorder=1, **style))
-    style = {"facecolors": block_colours(structure), "edgecolors": Colour.EDGE, "linewidths": 0.7}
-    axes.add_collection(PolyCollection(falls.outlines(time), zorder=2, gid="blocks", **style))
+    add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
+    add_polygons(axes, falls.outlines(time), block_colours(structure), zorder=2, gid="blocks")
     axes.set_title(f"t = {time:.2f} s", fontsize=TITLE_SIZE, color=Colour.TEXT)
     axes.autoscale_view()
     axes.label_outer()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
@@ -86,16 +87,13 @@ class FallingBlocks:
         """Return the poses of all blocks at a time (n_blocks, 3)."""
         return _interpolate(self.times, self.poses, np.array([time]))[0]
 
-    def places(self, points: Array, block: Array, time: float) -> Array:
-        """Return the positions of points of blocks at a time (m, 2) [m]."""
+    def places(self, points: Array, block: int | NDArray[np.intp], time: float) -> Array:
+        """Return the positions at a time (m, 2) [m] of points of a block, or of one block each."""
         poses = self.pose(time)[block]
         centres = np.array([each.centroid for each in self.structure.blocks])[block]
-        return centres + poses[:, :2] + rotate(points - centres, poses[:, 2])
+        return centres + poses[..., :2] + rotate(points - centres, poses[..., 2])
 
     def outlines(self, time: float) -> list[Array]:
         """Return the outlines of all blocks at a time, each (k, 2) [m]."""
-        outlines = [block.drawn() for block in self.structure.blocks]
-        sizes = [len(outline) for outline in outlines]
-        block = np.repeat(np.arange(len(outlines)), sizes)
-        places = self.places(np.concatenate(outlines), block, time)
-        return np.split(places, np.cumsum(sizes)[:-1])
+        blocks = enumerate(self.structure.blocks)
+        return [self.places(block.drawn(), number, time) for number, block in blocks]

@@ -8,10 +8,8 @@ from typing import cast
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
@@ -23,9 +21,7 @@ from archfem.statics.free_body import FreeBody, forces_on
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import kN, mm
-from archfem.view.joint_marks import support_outlines
-from archfem.view.positions import block_kinds
-from archfem.view.structure import draw_structure
+from archfem.view.structure import DisplacedBlocks, draw_structure
 from archfem.view.style import (
     COLUMN_WIDTH,
     LABEL_SIZE,
@@ -34,6 +30,7 @@ from archfem.view.style import (
     Colour,
     add_legend,
     add_legend_below,
+    add_polygons,
     annotate,
     fitting_width,
     new_figure,
@@ -158,53 +155,18 @@ class ModePanel:
     """One mode shape on its axes."""
 
     def __init__(self, axes: Axes, modes: Modes, number: int) -> None:
-        model, cells = modes.model, modes.model.cells
+        cells = modes.model.cells
         shape = cells.displacement(modes.shapes[:, number - 1])
-        amplitude = MODE_AMPLITUDE * model.structure.size
+        amplitude = MODE_AMPLITUDE * modes.model.structure.size
         self._displacements = shape * amplitude / np.linalg.norm(shape, axis=1).max()
-        self._places = cells.places
-        kinds = block_kinds(model.structure)
-        # soil is drawn first, below the stones
-        self._loops = sorted(
-            _block_loops(cells), key=lambda loop: kinds[cells.block[loop[0]]] != "soil"
-        )
-        soil = [kinds[cells.block[loop[0]]] == "soil" for loop in self._loops]
-        self._blocks = PolyCollection(
-            [],
-            facecolors=[Colour.SOIL if pale else Colour.STONE for pale in soil],
-            edgecolors=[Colour.GREY if pale else Colour.EDGE for pale in soil],
-            linewidths=0.6,
-            zorder=2,
-        )
-        style = {"facecolors": Colour.SUPPORT, "edgecolors": Colour.EDGE, "linewidths": 0.6}
-        edges = cells.places[cells.outline_edges]
-        for drawing in (
-            LineCollection(edges, colors=Colour.UNDEFORMED, linewidths=0.9, zorder=1),
-            PolyCollection(support_outlines(model, 1.0), **style),
-            self._blocks,
-        ):
-            axes.add_collection(drawing, autolim=False)
+        self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
         title = f"mode {number}: {frequency:.2f} Hz\neffective mass: x {x:.0f} %, y {y:.0f} %"
         axes.set_title(title, fontsize=LABEL_SIZE, color=Colour.TEXT)
 
     def show_phase(self, factor: float) -> None:
         """Displace the blocks by the mode shape times a factor."""
-        places = self._places + factor * self._displacements
-        self._blocks.set_verts([places[loop] for loop in self._loops])
-
-
-def _block_loops(cells: Cells) -> list[list[int]]:
-    """Return the points around each block, in order."""
-    following, loops = dict(cells.outline_edges.tolist()), []
-    while following:
-        start, point = following.popitem()
-        loop = [start]
-        while point != start:
-            loop.append(point)
-            point = following.pop(point)
-        loops.append(loop)
-    return loops
+        self._blocks.move(self._places + factor * self._displacements)
 
 
 def draw_free_body(
@@ -282,10 +244,9 @@ def _draw_block_forces(
     outline, number = body.block.drawn(), structure.blocks.index(body.block)
     for joint in (structure.joints[k] for k in body.joints):
         (other,) = set(joint.blocks) - {number}
-        style = {"facecolor": "none", "edgecolor": Colour.UNDEFORMED, "lw": 0.8, "zorder": 1}
-        axes.add_patch(Polygon(structure.blocks[other].drawn(), **style))
-    style = {"facecolor": Colour.STONE, "edgecolor": Colour.EDGE, "lw": 1.2, "zorder": 2}
-    axes.add_patch(Polygon(outline, **style))
+        neighbour = [structure.blocks[other].drawn()]
+        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
+    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
     size = float(np.ptp(outline, axis=0).max())
     # the largest force is drawn 0.75 times as long as the block
     length = 0.75 * size / body.sizes.max()

@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -27,6 +27,7 @@ from archfem.view.style import (
     CLIPPED_PERCENT,
     Colour,
     add_legend_below,
+    add_polygons,
     set_title,
     structure_figure,
     style_colour_bar,
@@ -72,8 +73,7 @@ def draw_stress(
     draw_blocks(axes, structure)
     _shade(axes, cells, -principal_values(*corners.T)[1], blocks)
     outlines = [block.drawn() for block in structure.blocks]
-    style = {"facecolors": "none", "edgecolors": Colour.EDGE, "linewidths": 0.6}
-    axes.add_collection(PolyCollection(outlines, zorder=3, **style))
+    add_polygons(axes, outlines, "none", width=0.6, zorder=3)
     _draw_crosses(axes, cells, cell_stress(model, q), blocks)
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))

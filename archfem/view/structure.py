@@ -32,6 +32,7 @@ from archfem.view.style import (
     Colour,
     add_legend,
     add_legend_below,
+    add_polygons,
     annotate,
     drawing_scale,
     new_figure,
@@ -124,8 +125,32 @@ def block_colours(structure: Structure) -> list[str]:
 def draw_blocks(axes: Axes, structure: Structure) -> None:
     """Draw the undeformed blocks, supports darker, soil paler."""
     outlines = [block.drawn() for block in structure.blocks]
-    style = {"facecolors": block_colours(structure), "edgecolors": Colour.EDGE, "linewidths": 0.7}
-    axes.add_collection(PolyCollection(outlines, zorder=1, gid="blocks", **style))
+    add_polygons(axes, outlines, block_colours(structure), gid="blocks")
+
+
+class DisplacedBlocks:
+    """Blocks of a model on axes, over their undeformed outlines."""
+
+    def __init__(self, axes: Axes, model: Model, magnification: float = 1.0) -> None:
+        cells, self._edges = model.cells, model.cells.outline_edges
+        colours = np.array(block_colours(model.structure))[cells.owner]
+        # soil is drawn first, below the stones
+        order = np.argsort(colours != Colour.SOIL, kind="stable")
+        self._polygons = [np.asarray(cells.polygons[k]) for k in order]
+        # cells are outlined in their own colour, which covers the seams between them
+        style = {"facecolors": colours[order], "edgecolors": "face", "linewidths": 0.3}
+        self._cells = PolyCollection([], zorder=1, gid="blocks", **style)
+        self._rims = LineCollection([], colors=Colour.EDGE, linewidths=0.7, zorder=2)
+        style = {"colors": Colour.UNDEFORMED, "linewidths": 0.6}
+        undeformed = LineCollection(cells.places[self._edges], zorder=0, **style)
+        for drawing in (undeformed, self._cells, self._rims):
+            axes.add_collection(drawing)
+        add_polygons(axes, support_outlines(model, magnification), Colour.SUPPORT)
+
+    def move(self, places: Array) -> None:
+        """Move the points of the cells to places (m, 2) [m]."""
+        self._cells.set_verts([places[polygon] for polygon in self._polygons])
+        self._rims.set_segments(places[self._edges])
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
@@ -144,8 +169,8 @@ def draw_marks(axes: Axes, marks: Marks) -> None:
         style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
         axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **style)
     if len(marks.slips):
-        style = {"facecolors": Colour.SLIDING, "edgecolors": "white", "linewidths": 0.4}
-        axes.add_collection(PolyCollection(list(marks.slips), zorder=6, gid="slips", **style))
+        style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
+        add_polygons(axes, list(marks.slips), Colour.SLIDING, **style)
         style = {"marker": r"$\rightleftharpoons$", "ms": 12, "mew": 0.5, "color": Colour.SLIDING}
         axes.plot([], [], ls="", label="sliding joint", **style)
     if len(marks.gaps):
@@ -254,20 +279,8 @@ def draw_displaced(
     axes = structure_figure(structure).add_subplot() if axes is None else axes
     style_structure_axes(axes, structure)
     places = cells.places + magnification * cells.displacement(q)
-    edges, stone = cells.outline_edges, Colour.STONE
-    faces = [places[np.asarray(cell)] for cell in cells.polygons]
-    supports = support_outlines(model, magnification)
-    outline: dict[str, Any] = {"edgecolors": Colour.EDGE, "linewidths": 0.7}
-    for drawing in (
-        LineCollection(cells.places[edges], colors=Colour.UNDEFORMED, linewidths=0.6, zorder=0),
-        # cells are outlined in their own colour: it covers the seams between them
-        PolyCollection(
-            faces, facecolors=stone, edgecolors=stone, linewidths=0.3, zorder=1, gid="blocks"
-        ),
-        LineCollection(places[edges], zorder=2, **outline),
-        PolyCollection(supports, facecolors=Colour.SUPPORT, zorder=1, **outline),
-    ):
-        axes.add_collection(drawing)
+    DisplacedBlocks(axes, model, magnification).move(places)
+    axes.update_datalim(places)
     shift = magnification * model.observer().joint_ends(q)
     draw_marks(axes, joint_marks(structure, joints, shift=shift))
     add_legend(axes)

@@ -1,5 +1,6 @@
 """Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
+from matplotlib.collections import PolyCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -133,6 +135,21 @@ def annotate(
     """Write a text at an offset [points] from a point."""
     default = {"textcoords": "offset points", "fontsize": LABEL_SIZE, "color": Colour.TEXT}
     return axes.annotate(text, tuple(point), tuple(offset), **(default | style))
+
+
+def add_polygons(
+    axes: Axes,
+    outlines: Sequence[Array],
+    face: str | list[str],
+    *,
+    edge: str = Colour.EDGE,
+    width: float = 0.7,
+    zorder: float = 1,
+    **options: Any,
+) -> None:
+    """Add polygons, each (k, 2), with a face and an edge colour, and a width of the edge."""
+    style = {"facecolors": face, "edgecolors": edge, "linewidths": width, "zorder": zorder}
+    axes.add_collection(PolyCollection(outlines, **style, **options))
 
 
 def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:

@@ -25,6 +25,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
+from archfem.masonry.block import triangulate_polygon
 from archfem.models.model import Cells
 from archfem.view.films.encoder import Image
 from archfem.view.films.frames import Frame
@@ -101,7 +102,7 @@ class Triangles:
     """Triangulation of the cells of a model; `cell` is the cell of each triangle (t,)."""
 
     def __init__(self, cells: Cells) -> None:
-        cut = [_triangulate(cell, cells.places[cell]) for cell in cells.polygons]
+        cut = [np.asarray(c)[triangulate_polygon(cells.places[c])] for c in cells.polygons]
         corners = np.concatenate(cut)
         # with 600 triangles, the linear variation of colours cannot be seen
         pieces = int(np.clip(round((600 / len(corners)) ** 0.5), 1, 4))
@@ -129,41 +130,6 @@ def _subdivide_triangle(pieces: int) -> tuple[Array, Numbers]:
     up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in places if i + j < pieces]
     down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in places if i + j < pieces - 1]
     return share, np.array([[number[place] for place in corners] for corners in up + down])
-
-
-def _triangulate(cell: Numbers, places: Array) -> Numbers:
-    """Divide a polygon (n,), concave or not, into triangles (n - 2, 3) by ear clipping."""
-    left, triangles = list(range(len(cell))), []
-    x, y = places.T
-    if x @ np.roll(y, -1) - y @ np.roll(x, -1) < 0.0:  # clockwise
-        left.reverse()
-    while len(left) > 3:
-        ears = np.stack([np.roll(left, 1), left, np.roll(left, -1)], axis=1)
-        # the best shaped ear first, so that there are few slivers
-        order = np.argsort(-_roundness(places[ears]), kind="stable")
-        best = next((k for k in order if _is_ear(places, ears[k], left)), order[0])
-        triangles.append(ears[best])
-        del left[best]
-    triangles.append(np.array(left))
-    return cell[np.array(triangles)]
-
-
-def _roundness(corners: Array) -> Array:
-    """Return area over squared sides of triangles (t, 3, 2); negative for clockwise ones."""
-    (x1, y1), (x2, y2) = (corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0)
-    sides = corners - np.roll(corners, 1, axis=1)
-    return (x1 * y2 - y1 * x2) / np.sum(sides**2, axis=(1, 2)).clip(1e-300)
-
-
-def _is_ear(places: Array, ear: Numbers, left: list[int]) -> bool:
-    """Return whether a triangle lies inside the polygon and contains no other corner."""
-    corners = places[ear]
-    if _roundness(corners[None])[0] <= 0.0:
-        return False
-    others = places[[k for k in left if k not in ear]]
-    side, step = np.roll(corners, -1, axis=0) - corners, others[:, None] - corners
-    inside = side[:, 0] * step[..., 1] - side[:, 1] * step[..., 0] > 0.0
-    return not inside.all(axis=1).any()
 
 
 class FramePainter:

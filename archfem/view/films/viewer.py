@@ -126,11 +126,7 @@ class Viewer:
 
 
 def viewer(
-    run: History,
-    model: Model,
-    *,
-    magnification: float | None = None,
-    colour: str = "displacement",
+    run: History, model: Model, *, magnification: float | None = None, colour: str = "displacement"
 ) -> Viewer:
     """Return an interactive viewer of a run until blocks come loose: blocks, thrust line, hinges.
 

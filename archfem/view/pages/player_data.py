@@ -24,12 +24,7 @@ from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
 from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs
-from archfem.view.positions import (
-    FallingBlocks,
-    block_kinds,
-    ground_acceleration,
-    recorded_fields,
-)
+from archfem.view.positions import FallingBlocks, block_kinds, ground_acceleration, recorded_fields
 
 # Default size of the packed part of a player [bytes]
 MAX_PACKED_BYTES = 3_000_000
