@@ -4,6 +4,7 @@ Thrust line and mechanism of a limit analysis, capacity map of rings, and instan
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -141,13 +142,13 @@ def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float
     """Mark reference values on the capacity map."""
     thin = [point for point, factor in known.items() if factor == 0.0]
     strong = [point for point, factor in known.items() if factor > 0.0]
-    for points, label, style in (
-        (thin, "reference thickness", {"marker": "D", "mfc": "white", "mec": Colour.TEXT}),
-        (strong, "reference acceleration", {"marker": "o", "mfc": Colour.HINGE, "mec": "white"}),
+    style: dict[str, Any] = {"ms": 6.5, "zorder": 5, "clip_on": False}
+    for points, label, marker, face, edge in (
+        (thin, "reference thickness", "D", "white", Colour.TEXT),
+        (strong, "reference acceleration", "o", Colour.HINGE, "white"),
     ):
         if points:
-            style |= {"ls": "", "ms": 6.5, "zorder": 5, "clip_on": False}
-            axes.plot(*np.array(points).T, label=label, **style)
+            axes.plot(*np.array(points).T, marker, mfc=face, mec=edge, label=label, **style)
     for point, factor in known.items():
         text = f"{factor:.3f}".rstrip("0") if factor else f"{point[1]:.4g}"
         annotate(axes, text, point, (-8, 3), ha="right", zorder=6, path_effects=white_halo(2.0))

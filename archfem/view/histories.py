@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from archfem._typing import Array
@@ -175,23 +175,12 @@ def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[st
         style_axes(panel, "joint [-]", "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(panel, hinge)
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-        panel.xaxis.set_major_formatter(
-            _name_formatter([short_name(name, part) for name in names[part]])
-        )
+        labels = dict(enumerate(short_name(name, part) for name in names[part]))
+        panel.xaxis.set_major_formatter(lambda x, _, labels=labels: labels.get(round(x), ""))
         if len(parts) > 1:
             set_title(panel, part)
             panel.set_xlim(-0.7, sizes[part] - 0.3)
     return panels
-
-
-def _name_formatter(names: Sequence[str]) -> FuncFormatter:
-    """Return a formatter that labels 0, 1, … with names."""
-
-    def name(place: float, _: object) -> str:
-        number = round(place)
-        return names[number] if 0 <= number < len(names) else ""
-
-    return FuncFormatter(name)
 
 
 def _lay_out_panels(
@@ -313,8 +302,8 @@ def draw_ground(
     if ground[:, 1].any():
         axes.plot(times, ground[:, 1], color=LINE_COLOURS[4], lw=0.85 * width, label="vertical")
         # above the axes' right end: inside it would cover the lines
-        place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
-        axes.legend(ncols=2, frameon=False, fontsize=size, **place)
+        style: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+        axes.legend(ncols=2, frameon=False, fontsize=size, **style)
     axes.set_xlim(times[0], max(times[-1], times[0] + 1e-9))
 
 

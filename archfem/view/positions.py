@@ -50,8 +50,7 @@ def ground_acceleration(run: History) -> tuple[Array, Array]:
 
 def fields_at(run: History, times: Array) -> Array:
     """Interpolate the recorded fields linearly at times (len(times), n)."""
-    known, fields = recorded_fields(run)
-    return _interpolate(known, fields, times)
+    return _interpolate(*recorded_fields(run), times)
 
 
 def _interpolate(known: Array, values: Array, times: Array) -> Array:

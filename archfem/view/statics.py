@@ -301,7 +301,8 @@ def _draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
 def _number_force(axes: Axes, index: int, place: Array, colour: str) -> None:
     """Write the number of a force, counted from 1."""
     style = {"fontsize": TITLE_SIZE, "ha": "center", "va": "center", "zorder": 7}
-    axes.text(*place, str(index + 1), color=colour, **style)
+    x, y = place
+    axes.text(x, y, str(index + 1), color=colour, **style)
 
 
 def draw_pushover(

@@ -33,6 +33,7 @@ from archfem.view.style import (
     style_colour_bar,
     style_structure_axes,
 )
+from archfem.view.triangles import Triangles
 
 Numbers = NDArray[np.intp]
 
@@ -98,18 +99,17 @@ def _select_blocks(structure: Structure, parts: Collection[str] | None) -> Numbe
 
 def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> None:
     """Shade the cells of blocks by compression at their corners [Pa], and add a colour bar."""
-    shaded = [c for c, own in zip(cells.polygons, cells.owner, strict=True) if own in blocks]
-    # a triangle is a quadrilateral with its last corner repeated
-    corners = np.array([[*cell, cell[-1]][:4] for cell in shaded])
-    shown = compression[np.unique(corners)].clip(0.0)
+    triangles = Triangles(cells)
+    shaded = np.isin(cells.owner[triangles.cell], blocks)
+    corners = triangles.corners(cells.places)[shaded].reshape(-1, 2)
+    shown = compression[np.isin(cells.block, blocks)].clip(0.0)
     highest = max(float(np.percentile(shown, 100.0 - CLIPPED_PERCENT)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
-    places, values, triangles = _subdivide(cells.places[corners], compression[corners])
     # warm colours, so that the blue thrust line stands out
     colours = (Colour.STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
     painted = axes.tripcolor(
-        Triangulation(*places.reshape(-1, 2).T, triangles),
-        values.ravel().clip(0.0) / unit,
+        Triangulation(*corners.T, np.arange(len(corners)).reshape(-1, 3)),
+        triangles.corners(compression)[shaded].ravel().clip(0.0) / unit,
         shading="gouraud",
         cmap=LinearSegmentedColormap.from_list("compression", colours),
         vmin=0.0,
@@ -124,22 +124,6 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     extend = "max" if shown.max() > highest else "neither"
     bar = axes.figure.colorbar(painted, cax=beside, extend=extend, ticks=MaxNLocator(5))
     style_colour_bar(bar, f"largest compression [{name}]")
-
-
-def _subdivide(places: Array, values: Array, count: int = 3) -> tuple[Array, Array, Numbers]:
-    """Divide cells (c, 4) into a grid: points (c, p, 2), values (c, p), triangles (m, 3).
-
-    Colours of a triangle are linear between its corners and leave the colour map: over a whole cell
-    of a coarse mesh the difference would be visible.
-    """
-    s, t = np.meshgrid(*(np.linspace(0.0, 1.0, count + 1),) * 2)
-    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]).reshape(4, -1)
-    row = count + 1
-    first = (np.arange(count)[:, None] * row + np.arange(count)).ravel()
-    square = np.stack([first, first + 1, first + row + 1, first, first + row + 1, first + row], 1)
-    starts = np.arange(len(places)) * row**2
-    triangles = (starts[:, None, None] + square.reshape(-1, 3)).reshape(-1, 3)
-    return np.einsum("kp,ckd->cpd", shape, places), values @ shape, triangles
 
 
 def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> None:

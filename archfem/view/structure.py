@@ -112,8 +112,9 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
 
 def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
     """Return a name, with the time of the joints if they have one."""
-    timed = joints is not None and "time" in joints.coords
-    return f"{name}, t = {float(joints['time']):.3f} s" if timed else name
+    if joints is None or "time" not in joints.coords:
+        return name
+    return f"{name}, t = {float(joints['time']):.3f} s"
 
 
 def block_colours(structure: Structure) -> list[str]:

@@ -1,6 +1,7 @@
 """Figures of studies: IDA, fragility, sensitivity, convergence, and accuracy over time."""
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,22 +42,19 @@ def draw_study(
         The figure.
     """
     names = list(factors)
-    definitions = [
-        definition
-        for definition in next(iter(factors.values()))
-        if any(np.isfinite(case[definition]).any() for case in factors.values())
-    ]
+    definitions = list(next(iter(factors.values())))
+    scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
+    scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
     figure = new_figure(0.75 * PAGE_WIDTH, 1.6 + 0.42 * len(names))
     axes = figure.add_subplot()
     style_axes(axes, "scale of the motions at the first mechanism [-]")
-    scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
     finite = np.concatenate([[1.0], *(each[np.isfinite(each)] for each in scales.values())])
     end = 1.3 * finite.max()
     _draw_ranges(axes, scales, end)
     for scale, text in {1.0 / reduction: f"1 / R, R = {reduction:g}", 1.0: "unscaled"}.items():
         axes.axvline(scale, color=Colour.GREY, lw=0.9, ls="--", zorder=0)
-        style = {"xycoords": ("data", "axes fraction"), "color": Colour.EDGE, "ha": "center"}
-        annotate(axes, text, (scale, 1.0), (0, 2), va="bottom", **style)
+        style: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "color": Colour.EDGE}
+        annotate(axes, text, (scale, 1.0), (0, 2), ha="center", va="bottom", **style)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xscale("log")
@@ -296,7 +294,8 @@ def _draw_settings(axes: Axes, found: Accuracy, floor: float) -> None:
         if np.isfinite(trial.error):
             # other fidelities are mixed ones
             marker = shapes.get(setting.name, "*")
-            style = {"mfc": colours[setting.quadrature], "mec": "white", "mew": 0.5, "zorder": 4}
+            colour = colours.get(str(setting.quadrature), Colour.GREY)
+            style = {"mfc": colour, "mec": "white", "mew": 0.5, "zorder": 4}
             axes.plot(trial.seconds, max(trial.error, floor), marker, ms=6, **style)
     for name in (name for name in shapes if name in {each.name for each in tried}):
         axes.plot([], [], shapes[name], color=Colour.EDGE, ms=6, label=name)

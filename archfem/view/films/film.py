@@ -162,11 +162,11 @@ def _draw_frames(
 ) -> Iterator[Image]:
     """Yield the images of a film, with a progress bar."""
     times = timing.times
-    loose = np.zeros(len(times), dtype=bool) if falls is None else times >= falls.times[0]
-    layout, held = FrameLayout(setup, size, run), times[~loose]
+    held = times if falls is None else times[times < falls.times[0]]
+    layout = FrameLayout(setup, size, run)
     frames = frames_of_run(setup, run, held, fields_at(run, held))
     if falls is not None:
-        frames = chain(frames, frames_of_fall(setup, falls, times[loose]))
+        frames = chain(frames, frames_of_fall(setup, falls, times[len(held) :]))
     bar = tqdm(frames, total=len(times), unit="frame", disable=None, leave=False)
     for frame, speed in zip(bar, timing.speeds, strict=True):
         yield layout.compose(frame, float(speed))

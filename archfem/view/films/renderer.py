@@ -20,13 +20,9 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox, IdentityTransform
-from numpy.typing import NDArray
-from scipy import sparse
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
-from archfem.masonry.block import triangulate_polygon
-from archfem.models.model import Cells
 from archfem.view.films.encoder import Image
 from archfem.view.films.frames import Frame
 from archfem.view.films.settings import Scale, Setup
@@ -34,8 +30,7 @@ from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import ground_acceleration
 from archfem.view.style import Colour, annotate, style_colour_bar
-
-Numbers = NDArray[np.intp]
+from archfem.view.triangles import Triangles
 
 
 class Canvas:
@@ -96,40 +91,6 @@ class Canvas:
         style.set_clip_rectangle(self._window)
         style.set_snap(False)
         return style
-
-
-class Triangles:
-    """Triangulation of the cells of a model; `cell` is the cell of each triangle (t,)."""
-
-    def __init__(self, cells: Cells) -> None:
-        cut = [np.asarray(c)[triangulate_polygon(cells.places[c])] for c in cells.polygons]
-        corners = np.concatenate(cut)
-        # with 600 triangles, the linear variation of colours cannot be seen
-        pieces = int(np.clip(round((600 / len(corners)) ** 0.5), 1, 4))
-        share, parts = _subdivide_triangle(pieces)
-        count = len(share)
-        rows = np.repeat(np.arange(count * len(corners)), 3)
-        columns = np.repeat(corners, count, axis=0).ravel()
-        values = np.tile(share.ravel(), len(corners))
-        shape = count * len(corners), len(cells.places)
-        self._interpolation = sparse.csr_matrix((values, (rows, columns)), shape)
-        self._corners = (count * np.arange(len(corners))[:, None, None] + parts).reshape(-1, 3)
-        owner = np.repeat(np.arange(len(cut)), [len(triangles) for triangles in cut])
-        self.cell: Numbers = np.repeat(owner, len(parts))
-
-    def corners(self, values: Array) -> Array:
-        """Interpolate values at the points of the cells to the corners (t, 3, …)."""
-        return (self._interpolation @ values)[self._corners]
-
-
-def _subdivide_triangle(pieces: int) -> tuple[Array, Numbers]:
-    """Divide each side into pieces: barycentric coordinates (p, 3), and triangles (t, 3)."""
-    places = [(i, j) for i in range(pieces + 1) for j in range(pieces + 1 - i)]
-    number = {place: k for k, place in enumerate(places)}
-    share = np.array([(pieces - i - j, i, j) for i, j in places]) / pieces
-    up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in places if i + j < pieces]
-    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in places if i + j < pieces - 1]
-    return share, np.array([[number[place] for place in corners] for corners in up + down])
 
 
 class FramePainter:
@@ -271,9 +232,9 @@ class FrameLayout:
             instants.append((run.mechanism.time, "mechanism"))
         for time, text in instants:
             axes.axvline(time, color=Colour.GREY, lw=1.0, ls="--")
-            style = {"xycoords": ("data", "axes fraction"), "color": Colour.EDGE, "ha": "center"}
+            style: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "ha": "center"}
             style |= {"va": "bottom", "fontsize": self.font_size}
-            annotate(axes, text, (time, 1.0), (0, 1), **style)
+            annotate(axes, text, (time, 1.0), (0, 1), color=Colour.EDGE, **style)
         return axes.axvline(run.time[0], color=Colour.HINGE, lw=1.8, animated=True)
 
     def _add_axes(self, *box: float) -> Axes:

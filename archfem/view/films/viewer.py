@@ -13,11 +13,11 @@ from archfem.dynamics.history import History
 from archfem.models.model import Model
 from archfem.view.films.film import check_film
 from archfem.view.films.frames import frames_of_run
-from archfem.view.films.renderer import Triangles
 from archfem.view.films.settings import Setup
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import fields_at, recorded_fields
 from archfem.view.style import Colour
+from archfem.view.triangles import Triangles
 
 
 class Viewer:

@@ -83,8 +83,8 @@ class Outlines:
             along = cells.places[edge[1]] - cells.places[edge[0]]
             across = np.array([-along[1], along[0]])
             # components of the offset from the edge, along and across it, rotate with the edge
-            rotation = np.outer(away, along) + np.outer([-away[1], away[0]], across)
-            rotation = rotation / float(along @ along)
+            product = np.outer(away, along) + np.outer([-away[1], away[0]], across)
+            rotation = product / float(along @ along)
             entries = np.hstack([(1.0 - share) * one - rotation, share * one + rotation])
             columns = np.repeat(2 * edge, 2) + np.tile([0, 1], 2)
             place = np.repeat([0, 1], 4), np.tile(columns, 2)
