@@ -158,7 +158,7 @@ def draw_fall(run: History) -> Figure:
     """Draw the blocks at four instants of a collapse, over their original positions.
 
     Args:
-        run: a history in which blocks came loose, with its structure.
+        run: a history with its structure and with loose blocks.
 
     Returns:
         The figure, with a panel for each instant.

@@ -174,13 +174,18 @@ def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[st
         first = panel.get_subplotspec() is None or panel.get_subplotspec().is_first_col()
         style_axes(panel, "joint [-]", "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(panel, hinge)
-        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-        labels = dict(enumerate(short_name(name, part) for name in names[part]))
-        panel.xaxis.set_major_formatter(lambda x, _, labels=labels: labels.get(round(x), ""))
+        _label_joints(panel, [short_name(name, part) for name in names[part]])
         if len(parts) > 1:
             set_title(panel, part)
             panel.set_xlim(-0.7, sizes[part] - 0.3)
     return panels
+
+
+def _label_joints(axes: Axes, names: Sequence[str]) -> None:
+    """Write the names of joints at 0, 1, …, as far as there is room."""
+    labels = dict(enumerate(names))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place), ""))
 
 
 def _lay_out_panels(

@@ -101,14 +101,14 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     """Shade the cells of blocks by compression at their corners [Pa], and add a colour bar."""
     triangles = Triangles(cells)
     shaded = np.isin(cells.owner[triangles.cell], blocks)
-    corners = triangles.corners(cells.places)[shaded].reshape(-1, 2)
+    x, y = triangles.corners(cells.places)[shaded].reshape(-1, 2).T
     shown = compression[np.isin(cells.block, blocks)].clip(0.0)
     highest = max(float(np.percentile(shown, 100.0 - CLIPPED_PERCENT)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
     # warm colours, so that the blue thrust line stands out
     colours = (Colour.STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
     painted = axes.tripcolor(
-        Triangulation(*corners.T, np.arange(len(corners)).reshape(-1, 3)),
+        Triangulation(x, y, np.arange(len(x)).reshape(-1, 3)),
         triangles.corners(compression)[shaded].ravel().clip(0.0) / unit,
         shading="gouraud",
         cmap=LinearSegmentedColormap.from_list("compression", colours),
@@ -161,7 +161,7 @@ def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> N
 def _group_cells(corners: Array, centre: Array, spacing: float, size: int = 4) -> list[Numbers]:
     """Return groups of neighbouring cells of a block, at about equal distances."""
     middle = corners.mean(axis=0)
-    # principal axes of the block: the grid follows a voussoir, whatever its inclination
+    # principal axes of the block: the grid follows an inclined voussoir
     axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
     along, local = (corners - middle) @ axes.T, (centre - middle) @ axes.T
     low, high = along.min(axis=0), along.max(axis=0)

@@ -55,9 +55,9 @@ def film(  # noqa: PLR0913  (a film has many settings)
     """Write a film of a time history: moving blocks, thrust line, hinges, ground acceleration.
 
     Displacements are magnified. Blocks are coloured by displacement or by least principal stress.
-    A red disc marks a hinge at the face where its blocks stay in contact, and leaves a pale trace;
-    two opposite arrows mark a sliding joint. The ground acceleration is drawn below the structure.
-    Frames are evenly spaced in time: displacements are interpolated linearly between the recorded
+    A red disc marks a hinge at the face where its blocks stay in contact, a pale one an earlier
+    hinge; two opposite arrows mark a sliding joint. The ground acceleration is drawn below the
+    structure. Frames are evenly spaced in time: displacements are interpolated linearly between the recorded
     fields, and marks are those of the nearest record. The file is written atomically: an
     interrupted film does not replace an older one.
 
@@ -189,7 +189,7 @@ def _check_options(
 def film_modes(
     modes: Modes, path: str | Path, numbers: Sequence[int] | None = None, *, swings: int = 1
 ) -> Path:
-    """Write a film of mode shapes that swing together, whatever their periods.
+    """Write a film of mode shapes that swing together at one frequency.
 
     Args:
         modes: result of `modes`.

@@ -1,6 +1,6 @@
 """Rendering of a frame: structure, title, colour bar, legend and ground acceleration.
 
-What is constant over a film is drawn once. Blocks and marks are drawn into a window of the image by
+Constant parts of a film are drawn once. Blocks and marks are drawn into a window of the image by
 matplotlib's Agg renderer, many shapes per call; blocks are divided into triangles so fine that
 colours may vary linearly between their corners.
 """
