@@ -57,9 +57,9 @@ def film(  # noqa: PLR0913  (a film has many settings)
     Displacements are magnified. Blocks are coloured by displacement or by least principal stress.
     A red disc marks a hinge at the face where its blocks stay in contact, a pale one an earlier
     hinge; two opposite arrows mark a sliding joint. The ground acceleration is drawn below the
-    structure. Frames are evenly spaced in time: displacements are interpolated linearly between the recorded
-    fields, and marks are those of the nearest record. The file is written atomically: an
-    interrupted film does not replace an older one.
+    structure. Frames are evenly spaced in time: displacements are interpolated linearly between
+    the recorded fields, and marks are those of the nearest record. The file is written atomically:
+    an interrupted film does not replace an older one.
 
     In a run with large displacements, the displacements, thrust line and marks are true to scale;
     after blocks have come loose, the film shows their fall to the ground.
