@@ -171,7 +171,7 @@ def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[st
     panels = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
     hinge = min(Criteria.of(joints).hinge for joints in states.values())
     for part, panel in panels.items():
-        first = panel.get_subplotspec() is None or panel.get_subplotspec().is_first_col()
+        first = axes is not None or panel.get_subplotspec().is_first_col()
         style_axes(panel, "joint [-]", "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(panel, hinge)
         _label_joints(panel, [short_name(name, part) for name in names[part]])

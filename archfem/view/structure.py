@@ -56,8 +56,8 @@ def draw_structure(
     """Draw the blocks and, if joints are given, their thrust lines and failures at one instant.
 
     Supports are darker, soil is paler. Each ring and pier has its thrust line, interrupted where a
-    joint is open. A red circle marks a hinge at the face where its blocks stay in contact, two
-    opposite arrows mark a sliding joint, and a white gap marks an open joint.
+    joint is open. A red circle marks a hinge at the face where its blocks stay in contact. Two
+    opposite arrows mark a sliding joint, a white gap an open one.
 
     Args:
         structure: the structure, undeformed.

@@ -29,8 +29,8 @@ def draw_study(
     """Draw the motion scales at which mechanisms begin, a row for each case.
 
     A mark is the median over the pairs of motions, its line their range; an arrow means that no
-    mechanism began at the scales tried. A definition of a mechanism that no case meets is left
-    out, such as that of a ring and a pier where there are no piers.
+    mechanism began at the scales tried. Definitions of a mechanism that no case meets are left
+    out, such as a ring and a pier where there are no piers.
 
     Args:
         factors: by name of the case and definition of a mechanism, the least scale at which it
