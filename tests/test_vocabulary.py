@@ -14,7 +14,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 PAGES += sorted((ROOT / "meshes").glob("*.toml"))
 
 # Rooms and pages whose words are not revised yet; nothing is to be added here.
-UNREVISED_ROOMS = ("view", "studies", "survey")
+UNREVISED_ROOMS = ("view", "survey")
 UNREVISED_PAGES = (
     "README.md", "about.md", "gallery.md", "bridges.md", "capacity.md", "cluster.md", "falls.md",
     "geometry.md", "record.md", "results.md", "index.md", "limits.md", "speed.md", "criteria.md",
@@ -32,7 +32,7 @@ AVOIDED = re.compile(
 )
 
 # Phrases in which such a word has its plain sense.
-PLAIN_SENSE = ("rungs: fidelities", "comes to rest", "come to rest", "came to rest")
+PLAIN_SENSE = ("rungs: fidelities", "asked: evaluator", "comes to rest", "come to rest", "came to rest")
 
 
 def plain(text):

@@ -1,4 +1,4 @@
-"""Comparison of several cases under the motions of their suites: definition, findings and tables."""
+"""Comparison of several cases under the motions of their suites: definition and tables."""
 
 import json
 import re

@@ -21,9 +21,9 @@ from archfem.studies.evaluators import Evaluator, refuse_code
 from archfem.studies.parameter_space import (
     Axis,
     Point,
-    group_by_model,
     changes_along,
     check_points,
+    group_by_model,
     parameter_axes,
 )
 from archfem.studies.process_pool import Row, evaluate_on_processes, evaluate_serially
