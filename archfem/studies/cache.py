@@ -12,7 +12,7 @@ import os
 import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,36 +41,23 @@ Value = TypeVar("Value")
 _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
-@dataclass(frozen=True, eq=False)
-class StepperFactory:
-    """Makes steppers of one model, damping and scheme, which share their matrices."""
-
-    equation: Equation  # of motion, under any motion
-    solver: StepSolver | None  # of a step; None for SNES
-    _systems: dict[float, Any] = field(default_factory=dict)  # matrices by time step
-
-    @classmethod
-    def of(cls, equation: Equation) -> "StepperFactory":
-        """Select the solver of an equation of motion."""
-        return cls(equation, select_solver(equation))
-
-    def stepper(self, motion: Motion) -> Stepper:
-        """Return a new stepper for a run under a motion."""
-        return SharedStepper(replace(self.equation, motion=motion), self.solver, self._systems)
-
-
 class SharedStepper(Stepper):
-    """Stepper whose matrices are copies of shared ones.
+    """Stepper whose matrices are copies of those that steppers of the same model share.
 
     A run changes its matrices, for instance by the compliance rows that it computes. Copies of the
     matrices as they were assembled make each run independent of earlier runs.
     """
 
     def __init__(
-        self, equation: Equation, solver: StepSolver | None, systems: dict[float, Any]
+        self, equation: Equation, solver: StepSolver | None, shared_systems: dict[float, Any]
     ) -> None:
         super().__init__(equation, solver)
-        self._shared_systems = systems
+        self._shared_systems = shared_systems  # by time step
+
+    def under(self, motion: Motion) -> "SharedStepper":
+        """Return a new stepper for a run under another motion."""
+        equation = replace(self.equation, motion=motion)
+        return SharedStepper(equation, self.solver, self._shared_systems)
 
     def allocate_batch(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
         """Return the arguments of `base.advance`, as `Stepper.allocate_batch` does."""
@@ -165,12 +152,12 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
     """Return a new stepper for a run from the dead load."""
     dead, damping, scheme = result.dead, result.damping[0], result.case.scheme or Conserving()
 
-    def make() -> StepperFactory:
+    def make() -> SharedStepper:
         equation = Equation(dead.transfer_memory(dead.model), motion, damping, scheme)
-        return StepperFactory.of(equation)
+        return SharedStepper(equation, select_solver(equation), {})
 
     key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _cached_model("steppers", key, make).stepper(motion)
+    return _cached_model("steppers", key, make).under(motion)
 
 
 def _model_key(case: Case) -> str:

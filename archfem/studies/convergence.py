@@ -183,6 +183,7 @@ def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with i
     """
     find = find or ("history" if case.has_motion else "dead load")
     finest: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
+    variations: list[tuple[str, str, dict[str, Any]]]
     variations = [("mesh", f"{1.0 / n:.17g}", {"model.cells": [n, n]}) for n in cells]
     if find != "dead load":
         finest["analysis.dt"] = steps[-1]

@@ -217,7 +217,7 @@ def _find_function(name: str) -> Callable[..., Mapping[str, Any]]:
         hint = suggest_name(name, NAMED_EVALUATORS) or f"use one of {sorted(NAMED_EVALUATORS)}"
         raise InvalidInput(f"cannot compute '{name}': {hint}, or 'package.module:function'")
     try:
-        return getattr(import_module(module), function)  # type: ignore[no-any-return]
+        return getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InvalidInput(f"cannot compute '{name}': {error}") from error
 
