@@ -32,7 +32,9 @@ AVOIDED = re.compile(
 )
 
 # Phrases in which such a word has its plain sense.
-PLAIN_SENSE = ("rungs: fidelities", "asked: evaluator", "comes to rest", "come to rest", "came to rest")
+PLAIN_SENSE = (
+    "rungs: fidelities", "asked: evaluator", "comes to rest", "come to rest", "came to rest",
+)  # fmt: skip
 
 
 def plain(text):

@@ -96,18 +96,20 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     """
     preload()
     key = _model_key(case)
-    dead: Equilibrium = _cached_model("equilibria", key, lambda: dead_load_of_case(case))
+    dead: Equilibrium = _look_up_model("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)
     damping_key = f"{key} {case.analysis.get('damping')!r}"
     # stored as the cached property `damping` of the result would store it
-    result.__dict__["damping"] = _cached("damping", damping_key, lambda: damping_of(case, dead))
+    result.__dict__["damping"] = _look_up("damping", damping_key, lambda: damping_of(case, dead))
     return result
 
 
 def first_mode(result: DeadLoadResult) -> Modes:
     """Compute the first mode about the dead load."""
     dead = result.dead
-    return _cached_model("modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead))
+    return _look_up_model(
+        "modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead)
+    )
 
 
 def ground_motion(case: Case) -> Motion:
@@ -132,7 +134,7 @@ def ground_motion(case: Case) -> Motion:
     # The scale is applied last, so that scaled motions share one file and one matching.
     unscaled = replace(case, motion=_without(case.motion, ("scale",)))
     key = _key(case, ("motion",), ("scale",))
-    return _cached("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
+    return _look_up("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
 
 def ground_suite(case: Case) -> Suite:
@@ -141,7 +143,7 @@ def ground_suite(case: Case) -> Suite:
         return case.ground_suite()  # raises the error for a case without suite
     keys = ("scale", "reduction", "reversed")
     plain = replace(case, suite=_without(settings, keys))
-    suite = _cached("suites", _key(case, ("suite",), keys), plain.ground_suite)
+    suite = _look_up("suites", _key(case, ("suite",), keys), plain.ground_suite)
     suite = replace(
         suite, scale=settings.get("scale", 1.0), reduction=settings.get("reduction", 1.0)
     )
@@ -157,7 +159,7 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
         return SharedStepper(equation, select_solver(equation), {})
 
     key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _cached_model("steppers", key, make).under(motion)
+    return _look_up_model("steppers", key, make).under(motion)
 
 
 def _model_key(case: Case) -> str:
@@ -182,12 +184,12 @@ def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key not in keys}
 
 
-def _cached_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
-    """As `_cached`, for objects as large as a model."""
-    return _cached(kind, key, make, limit=4)
+def _look_up_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
+    """As `_look_up`, for objects as large as a model."""
+    return _look_up(kind, key, make, limit=4)
 
 
-def _cached(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
+def _look_up(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
     """Return a cached object of a kind, or make it; the least recently used one is dropped."""
     objects = _cache.setdefault(kind, OrderedDict())
     if key not in objects:

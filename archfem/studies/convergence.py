@@ -76,7 +76,7 @@ def converged(sizes: Any, values: Any) -> Convergence:
     last, before = float(f[-1] - f[-2]), float(f[-2] - f[-3])
     ratio = float(h[-2] / h[-1])
     monotonic = last != 0.0 and before / last > 1.0
-    order = _observed_order(before / last, ratio, float(h[-3] / h[-2])) if monotonic else nan
+    order = _solve_order(before / last, ratio, float(h[-3] / h[-2])) if monotonic else nan
     # The order of elements and schemes is 2 at most: a larger observed order is chance.
     if not 0.5 <= order <= 2.1:
         return Convergence(h / h[-1], f, order, float(f[-1]), 3.0 * float(np.ptp(f[-3:])))
@@ -85,7 +85,7 @@ def converged(sizes: Any, values: Any) -> Convergence:
     return Convergence(h / h[-1], f, order, float(f[-1]) + correction, 1.25 * abs(correction))
 
 
-def _observed_order(changes: float, ratio: float, coarser: float) -> float:
+def _solve_order(changes: float, ratio: float, coarser: float) -> float:
     """Solve changes = (c^p - 1) r^p / (r^p - 1) for the order p by fixed-point iteration."""
     order = log(changes) / log(ratio)
     for _ in range(100):
@@ -256,9 +256,9 @@ def case_accuracy(
         damping = damping(build(case.structure, references[0].discretisation))
     settings = [*references, *candidate_settings(case.structure)]
     varied = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
-    kept = {key: v for key, v in case.settings.get("model", {}).items() if key not in varied}
+    fixed = {key: v for key, v in case.settings.get("model", {}).items() if key not in varied}
     study = Study.of(
-        Case.of({**case.settings, "model": kept}, case.folder),
+        Case.of({**case.settings, "model": fixed}, case.folder),
         [_case_keys(setting) for setting in settings],
         {"name": evaluate_time, "damping": damping},
         title=f"{case.title}: speed against error",
@@ -266,7 +266,7 @@ def case_accuracy(
     table = study.run(folder, workers=workers, client=client)
     if "peaks" not in table:
         raise DidNotConverge(f"no setting ran: {table['error'].values[0] or 'each failed'}")
-    runs = [_timed_run(table.isel(point=k)) for k in range(len(settings))]
+    runs = [_to_run(table.isel(point=k)) for k in range(len(settings))]
     return compare_runs(settings, runs, motion.duration, case.tolerance)
 
 
@@ -290,7 +290,7 @@ def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
     return findings if run.peaks is None else findings | {"peaks": run.peaks}
 
 
-def _timed_run(row: xr.Dataset) -> TimedRun:
+def _to_run(row: xr.Dataset) -> TimedRun:
     """The run of a row; the row of a point that failed is NaN."""
     if not row["coordinates"].notnull():
         return TimedRun(0, inf, None)

@@ -173,7 +173,7 @@ class WorkerPool:
         with suppress(ValueError):
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
         forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
-        with _isolated():
+        with _isolate_start():
             forkserver.ensure_running()
         self._tasks, self._max_workers, self._log = tasks, max_workers, log
         self._workers: list[Worker] = []
@@ -224,7 +224,7 @@ class WorkerPool:
 
 def _start(process: BaseProcess, attempts: int = 10) -> None:
     """Start a process; if the fork server has died, by another one."""
-    with _isolated():
+    with _isolate_start():
         for _ in range(attempts):
             with suppress(EOFError, OSError):
                 return process.start()
@@ -235,7 +235,7 @@ def _start(process: BaseProcess, attempts: int = 10) -> None:
 
 
 @contextmanager
-def _isolated() -> Iterator[None]:
+def _isolate_start() -> Iterator[None]:
     """Start processes with the search path of this one, but without its script."""
     main, path = sys.modules["__main__"], os.environ.get("PYTHONPATH")
     # multiprocessing would import the user's script in each worker, which would run the study anew
