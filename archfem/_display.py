@@ -22,6 +22,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "Motion.plot": "view.motions:draw_motion",
     "Pushover.plot": "view.statics:draw_pushover",
     "Structure.plot": "view.structure:draw_structure",
+    "VerdictRange.plot": "view.studies:draw_verdict_range",
 }
 
 

@@ -13,6 +13,7 @@ from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
 from archfem.cases.toml_file import read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
@@ -27,7 +28,7 @@ from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
-from archfem.view.studies import draw_accuracy
+from archfem.view.studies import draw_accuracy, draw_verdict_range
 from archfem.view.style import LINE_COLOURS, save
 
 CASE_FILE = "case.toml"
@@ -229,6 +230,15 @@ def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:
     return [
         _write_text(text, folder / "accuracy.txt"),
         save(draw_accuracy(accuracy), folder / "accuracy.png"),
+    ]
+
+
+def write_verdict_range(verdicts: VerdictRange, folder: Path) -> list[Path]:
+    """Write and draw the verdicts over a range of properties."""
+    return [
+        verdicts.save(folder / "verdict_range.nc"),
+        _write_text(str(verdicts), folder / "verdict_range.txt"),
+        save(draw_verdict_range(verdicts), folder / "verdict_range.png"),
     ]
 
 

@@ -118,7 +118,8 @@ class VerdictRange(ResultDisplay):
             chosen &= best.holds
         inside, total = int(falls[chosen].sum()), int(falls.sum())
         where = " and ".join(conditions)
-        return f"{inside} of the {total} with {where}, where {inside} of {int(chosen.sum())} fall"
+        which = "all" if inside == total else f"{inside} of them"
+        return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:
         """Return a condition in words, with stiffness as a value."""

@@ -92,8 +92,7 @@ class Stage:
     def __str__(self) -> str:
         """Describe share, work, and hinges, in one line."""
         hinges = [
-            f"{name} at the {side}"
-            for (_, side), name in zip(self.hinges, self.names, strict=True)
+            f"{name} at the {side}" for (_, side), name in zip(self.hinges, self.names, strict=True)
         ]
         return (
             f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "

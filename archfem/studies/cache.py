@@ -12,7 +12,7 @@ import os
 import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,36 +41,23 @@ Value = TypeVar("Value")
 _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
-@dataclass(frozen=True, eq=False)
-class StepperFactory:
-    """Makes steppers of one model, damping and scheme, which share their matrices."""
-
-    equation: Equation  # of motion, under any motion
-    solver: StepSolver | None  # of a step; None for SNES
-    _systems: dict[float, Any] = field(default_factory=dict)  # matrices by time step
-
-    @classmethod
-    def of(cls, equation: Equation) -> "StepperFactory":
-        """Select the solver of an equation of motion."""
-        return cls(equation, select_solver(equation))
-
-    def stepper(self, motion: Motion) -> Stepper:
-        """Return a new stepper for a run under a motion."""
-        return SharedStepper(replace(self.equation, motion=motion), self.solver, self._systems)
-
-
 class SharedStepper(Stepper):
-    """Stepper whose matrices are copies of shared ones.
+    """Stepper whose matrices are copies of those that steppers of the same model share.
 
     A run changes its matrices, for instance by the compliance rows that it computes. Copies of the
     matrices as they were assembled make each run independent of earlier runs.
     """
 
     def __init__(
-        self, equation: Equation, solver: StepSolver | None, systems: dict[float, Any]
+        self, equation: Equation, solver: StepSolver | None, shared_systems: dict[float, Any]
     ) -> None:
         super().__init__(equation, solver)
-        self._shared_systems = systems
+        self._shared_systems = shared_systems  # by time step
+
+    def under(self, motion: Motion) -> "SharedStepper":
+        """Return a new stepper for a run under another motion."""
+        equation = replace(self.equation, motion=motion)
+        return SharedStepper(equation, self.solver, self._shared_systems)
 
     def allocate_batch(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
         """Return the arguments of `base.advance`, as `Stepper.allocate_batch` does."""
@@ -109,18 +96,20 @@ def dead_load_of(case: Case) -> DeadLoadResult:
     """
     preload()
     key = _model_key(case)
-    dead: Equilibrium = _cached_model("equilibria", key, lambda: dead_load_of_case(case))
+    dead: Equilibrium = _look_up_model("equilibria", key, lambda: dead_load_of_case(case))
     result = DeadLoadResult(case, dead)
     damping_key = f"{key} {case.analysis.get('damping')!r}"
     # stored as the cached property `damping` of the result would store it
-    result.__dict__["damping"] = _cached("damping", damping_key, lambda: damping_of(case, dead))
+    result.__dict__["damping"] = _look_up("damping", damping_key, lambda: damping_of(case, dead))
     return result
 
 
 def first_mode(result: DeadLoadResult) -> Modes:
     """Compute the first mode about the dead load."""
     dead = result.dead
-    return _cached_model("modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead))
+    return _look_up_model(
+        "modes", _model_key(result.case), lambda: modes(dead.model, 1, about=dead)
+    )
 
 
 def ground_motion(case: Case) -> Motion:
@@ -145,7 +134,7 @@ def ground_motion(case: Case) -> Motion:
     # The scale is applied last, so that scaled motions share one file and one matching.
     unscaled = replace(case, motion=_without(case.motion, ("scale",)))
     key = _key(case, ("motion",), ("scale",))
-    return _cached("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
+    return _look_up("motions", key, unscaled.ground_motion).scaled(case.motion.get("scale", 1.0))
 
 
 def ground_suite(case: Case) -> Suite:
@@ -154,7 +143,7 @@ def ground_suite(case: Case) -> Suite:
         return case.ground_suite()  # raises the error for a case without suite
     keys = ("scale", "reduction", "reversed")
     plain = replace(case, suite=_without(settings, keys))
-    suite = _cached("suites", _key(case, ("suite",), keys), plain.ground_suite)
+    suite = _look_up("suites", _key(case, ("suite",), keys), plain.ground_suite)
     suite = replace(
         suite, scale=settings.get("scale", 1.0), reduction=settings.get("reduction", 1.0)
     )
@@ -165,12 +154,12 @@ def stepper_of(result: DeadLoadResult, motion: Motion) -> Stepper:
     """Return a new stepper for a run from the dead load."""
     dead, damping, scheme = result.dead, result.damping[0], result.case.scheme or Conserving()
 
-    def make() -> StepperFactory:
+    def make() -> SharedStepper:
         equation = Equation(dead.transfer_memory(dead.model), motion, damping, scheme)
-        return StepperFactory.of(equation)
+        return SharedStepper(equation, select_solver(equation), {})
 
     key = f"{_model_key(result.case)} {damping!r} {scheme!r}"
-    return _cached_model("steppers", key, make).stepper(motion)
+    return _look_up_model("steppers", key, make).under(motion)
 
 
 def _model_key(case: Case) -> str:
@@ -195,12 +184,12 @@ def _without(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key not in keys}
 
 
-def _cached_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
-    """As `_cached`, for objects as large as a model."""
-    return _cached(kind, key, make, limit=4)
+def _look_up_model(kind: str, key: str, make: Callable[[], Value]) -> Value:
+    """As `_look_up`, for objects as large as a model."""
+    return _look_up(kind, key, make, limit=4)
 
 
-def _cached(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
+def _look_up(kind: str, key: str, make: Callable[[], Value], limit: int = 64) -> Value:
     """Return a cached object of a kind, or make it; the least recently used one is dropped."""
     objects = _cache.setdefault(kind, OrderedDict())
     if key not in objects:

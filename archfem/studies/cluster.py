@@ -36,15 +36,11 @@ def _connect(address: str) -> Client:
     try:
         client = Client(address, timeout=SCHEDULER_TIMEOUT)
         client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT)
-    except TimeoutError as error:
+    except (OSError, ValueError) as error:  # a timeout is an OSError
         raise InvalidInput(
-            f"no scheduler with a worker answers at {address}: start 'dask scheduler' and 'dask "
-            "worker', and give the address that the scheduler prints"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise InvalidInput(
-            f"no scheduler answers at {address!r} ({error}): start 'dask scheduler' and give the "
-            "address that it prints, such as tcp://host:8786"
+            f"no scheduler with a worker answers at {address!r} ({error}): start 'dask scheduler' "
+            "and 'dask worker', and give the address that the scheduler prints, such as "
+            "tcp://host:8786"
         ) from error
     return client
 

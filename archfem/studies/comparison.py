@@ -1,9 +1,9 @@
-"""Comparison of several cases under the motions of their suites: definition, findings and tables."""
+"""Comparison of several cases under the motions of their suites: definition and tables."""
 
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -62,16 +62,6 @@ class Finding:
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
     scales: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
     search: dict[str, Any] | None = None
-
-    def of_pairs(self, pairs: Sequence[str]) -> "Finding":
-        """Return the findings under some of the pairs.
-
-        Args:
-            pairs: names of pairs; pairs without findings are left out.
-        """
-        runs = {pair: self.runs[pair] for pair in pairs if pair in self.runs}
-        scales = {pair: self.scales[pair] for pair in pairs if pair in self.scales}
-        return replace(self, runs=runs, scales=scales)
 
     def least(self, definition: str) -> Array:
         """Return the smallest failing scale of each pair (pairs,) [-].

@@ -1,4 +1,4 @@
-"""Runs of several cases: a comparison with a file of findings for each case, the pairs of a suite."""
+"""Runs of a comparison, with a file of findings for each case, and of the pairs of a suite."""
 
 from collections.abc import Iterator, Mapping
 from math import nan
@@ -89,7 +89,7 @@ def _run_findings(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _select(row: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Values whose names have a prefix, without NaN and "", which stand for parts of other cases."""
+    """Values whose names have a prefix; NaN and "" stand for parts that only other cases have."""
     prefix = f"{prefix}: "
     return {
         name.removeprefix(prefix): value

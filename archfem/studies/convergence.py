@@ -1,11 +1,9 @@
-"""How far a finding hangs on mesh, step, joint quadrature and rung: order, limit and error bar.
+"""Convergence of a finding over mesh and time step, and time against error of a case.
 
 References:
     Richardson, Phil. Trans. R. Soc. A 210 (1911) 307-357. Roache, J. Fluids Eng. 116 (1994) 405-413
     and Celik and others, J. Fluids Eng. 130 (2008) 078001 for the grid convergence index.
-    Eça and Hoekstra, J. Comput. Phys. 262 (2014) 104-130 where no order can be believed.
-
-Speed against error of a case over rungs, meshes, rules and steps: a study, a point a setting.
+    Eça and Hoekstra, J. Comput. Phys. 262 (2014) 104-130 for data without a plausible order.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,25 +35,19 @@ from archfem.studies.cache import dead_load_of, ground_motion
 from archfem.studies.evaluators import Findings
 from archfem.studies.study import Study
 
-# Factors on the estimated error: where an order is seen, and where none is
-SAFETY, UNSURE = 1.25, 3.0
-
-# Orders that are believed of elements and schemes whose order is 2: more is chance
-ORDERS = 0.5, 2.1
-
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """A value over sizes of cells or steps.
+    """Values of a finding over sizes of cells or time steps.
 
     Attributes:
-        sizes: relative to the finest (n,), the coarsest first [-].
-        values: at each (n,).
-        order: observed from the last three; NaN where they do not approach each other steadily.
-        limit: value at size zero by Richardson's extrapolation, or the finest where no order is
-            seen that can be believed.
-        error: grid convergence index of the finest value, in its unit; where no order can be
-            believed, three times the range of the last three values.
+        sizes: sizes relative to the finest, the coarsest first (n,) [-].
+        values: values of the finding (n,).
+        order: observed order of the last three values; NaN if their differences do not decrease.
+        limit: value at size zero by Richardson's extrapolation; the finest value if the order is
+            not plausible.
+        error: grid convergence index of the finest value, in its unit; three times the range of the
+            last three values if the order is not plausible.
     """
 
     sizes: Array
@@ -66,14 +58,15 @@ class Convergence:
 
 
 def converged(sizes: Any, values: Any) -> Convergence:
-    """Return order, limit and error bar of a value over three sizes or more.
+    """Return observed order, extrapolated limit and error bar of a value.
 
     Args:
-        sizes: of cells or steps (n,), any unit, the coarsest first.
-        values: at each (n,).
+        sizes: sizes of cells or steps, three or more, in any unit, the coarsest first (n,).
+        values: values (n,).
 
     Raises:
-        InvalidInput: there are fewer than three, sizes do not fall, or a value is no number.
+        InvalidInput: there are fewer than three sizes, they do not decrease, or a value is not
+            finite.
     """
     h, f = np.array(sizes, dtype=float), np.array(values, dtype=float)
     if len(h) < 3 or h.shape != f.shape or (np.diff(h) >= 0.0).any() or not np.isfinite(f).all():
@@ -82,37 +75,38 @@ def converged(sizes: Any, values: Any) -> Convergence:
         )
     last, before = float(f[-1] - f[-2]), float(f[-2] - f[-3])
     ratio = float(h[-2] / h[-1])
-    steady = last != 0.0 and before / last > 1.0
-    order = _order(before / last, ratio, float(h[-3] / h[-2])) if steady else nan
-    if not ORDERS[0] <= order <= ORDERS[1]:
-        return Convergence(h / h[-1], f, order, float(f[-1]), UNSURE * float(np.ptp(f[-3:])))
-    rest = last / (ratio**order - 1.0)
-    return Convergence(h / h[-1], f, order, float(f[-1]) + rest, SAFETY * abs(rest))
+    monotonic = last != 0.0 and before / last > 1.0
+    order = _solve_order(before / last, ratio, float(h[-3] / h[-2])) if monotonic else nan
+    # The order of elements and schemes is 2 at most: a larger observed order is chance.
+    if not 0.5 <= order <= 2.1:
+        return Convergence(h / h[-1], f, order, float(f[-1]), 3.0 * float(np.ptp(f[-3:])))
+    correction = last / (ratio**order - 1.0)
+    # 1.25 is the safety factor of Roache
+    return Convergence(h / h[-1], f, order, float(f[-1]) + correction, 1.25 * abs(correction))
 
 
-def _order(changes: float, ratio: float, coarser: float) -> float:
-    """The order p of (c^p - 1) r^p / (r^p - 1), the ratio of two changes, by fixed points."""
+def _solve_order(changes: float, ratio: float, coarser: float) -> float:
+    """Solve changes = (c^p - 1) r^p / (r^p - 1) for the order p by fixed-point iteration."""
     order = log(changes) / log(ratio)
     for _ in range(100):
-        more = (ratio**order - 1.0) / (coarser**order - 1.0)
-        now = max(log(changes * more) / log(ratio), 1e-6)
-        if abs(now - order) < 1e-12:
+        factor = (ratio**order - 1.0) / (coarser**order - 1.0)
+        previous, order = order, max(log(changes * factor) / log(ratio), 1e-6)
+        if abs(order - previous) < 1e-12:
             break
-        order = now
     return order
 
 
 @dataclass(frozen=True, eq=False)
 class MeshSensitivity:
-    """What a finding hangs on besides the structure.
+    """Sensitivity of a finding to mesh, time step, joint quadrature and fidelity.
 
     Attributes:
         quantity: name of the finding.
-        mesh: over cells a block.
-        step: over time steps; None where time is not stepped.
-        rules: values by quadrature of the joints.
-        rungs: values by rung.
-        table: all findings of all points, by `point`.
+        mesh: convergence over the cells of a block.
+        step: convergence over time steps; None without time steps.
+        rules: values by joint quadrature.
+        rungs: fidelities and their values.
+        table: all findings of all points, over `point`.
     """
 
     quantity: str
@@ -124,34 +118,34 @@ class MeshSensitivity:
 
     @property
     def error(self) -> float:
-        """Error bars of mesh and step together, in the unit of the finding."""
+        """Sum of the error bars of mesh and step, in the unit of the finding."""
         return self.mesh.error + (0.0 if self.step is None else self.step.error)
 
     def of(self, quantity: str) -> "MeshSensitivity":
-        """Return the same of another finding.
+        """Return the sensitivity of another finding.
 
         Args:
-            quantity: its name.
+            quantity: name of the finding.
 
         Raises:
-            InvalidInput: there is no such finding, or a point that it needs failed.
+            InvalidInput: there is no such finding, or a point of the mesh or step failed.
         """
-        return _told(self.table, quantity)
+        return _sensitivity(self.table, quantity)
 
     def text(self) -> str:
-        """One line for each of these."""
+        """Return a table with a line for mesh, step, and each quadrature and fidelity."""
         rows = []
-        for name, found in (("mesh", self.mesh), ("step", self.step)):
-            if found is not None:
-                order = f"{found.order:.2f}" if isfinite(found.order) else "-"
-                rows.append([name, f"{found.values[-1]:.6g}", order, f"{found.limit:.6g}",
-                             f"{found.error:.2g}"])  # fmt: skip
-        for kind, values in (("rule", self.rules), ("rung", self.rungs)):
-            rows += [[f"{kind} {name}", f"{each:.6g}", "", "", ""] for name, each in values.items()]
+        for name, path in (("mesh", self.mesh), ("step", self.step)):
+            if path is not None:
+                order = f"{path.order:.2f}" if isfinite(path.order) else "-"
+                finest, limit = f"{path.values[-1]:.6g}", f"{path.limit:.6g}"
+                rows.append([name, finest, order, limit, f"{path.error:.2g}"])
+        for kind, values in (("quadrature", self.rules), ("fidelity", self.rungs)):
+            rows += [[f"{kind} {name}", f"{v:.6g}", "", "", ""] for name, v in values.items()]
         return align_columns([self.quantity, "value", "order", "limit", "error bar"], rows)
 
 
-def mesh_sensitivity(  # noqa: PLR0913  (what differs, each with its usual values)
+def mesh_sensitivity(  # noqa: PLR0913  (each varied setting is a keyword with its usual values)
     case: Case,
     quantity: str = "eccentricity",
     find: Any = None,
@@ -163,143 +157,143 @@ def mesh_sensitivity(  # noqa: PLR0913  (what differs, each with its usual value
     folder: str | Path | None = None,
     workers: int | None = None,
 ) -> MeshSensitivity:
-    """Find how a finding of a case hangs on mesh, step, joint quadrature and rung.
+    """Compute the sensitivity of a finding to mesh, time step, joint quadrature and fidelity.
 
-    One differs at a time from the finest mesh, the finest step, and the case's own rule and rung.
+    One setting at a time differs from the finest mesh, the finest step, and the quadrature and
+    fidelity of the case.
 
     Args:
-        case: with or without a motion.
-        quantity: name of a finding.
-        find: what is to be found, as for `Study.of`; by default "history" where the case has a
+        case: case with or without a motion.
+        quantity: name of the finding.
+        find: function to evaluate, as for `Study.of`; by default "history" for a case with a
             motion, else "dead load".
-        cells: a block, each way; three or more, the coarsest first.
-        steps: in time [s], likewise.
-        rules: quadratures of the joints.
+        cells: cells of a block in each direction, three or more numbers, the coarsest first.
+        steps: time steps, three or more, the coarsest first [s].
+        rules: joint quadratures.
         rungs: fidelities.
-        folder: as for `Study.run`, and `workers`.
-        workers: likewise.
+        folder: folder for finished points, as for `Study.run`.
+        workers: number of processes, as for `Study.run`.
 
     Returns:
-        Observed order, Richardson's value and error bar over mesh and step, and values by rule and
-        rung; `of(name)` gives them of every other finding.
+        Observed order, extrapolated value and error bar over mesh and step, and the values by
+        quadrature and fidelity; `of(name)` returns those of another finding.
 
     Raises:
-        InvalidInput: there is no such finding, or a point of the mesh or the steps failed.
+        InvalidInput: there is no such finding, or a point of the mesh or step failed.
     """
     find = find or ("history" if case.has_motion else "dead load")
-    timed = find != "dead load"
-    base: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
-    base |= {"analysis.dt": steps[-1]} if timed else {}
-    points = [base | {"model.cells": [n, n]} for n in cells]
-    points += [base | {"analysis.dt": step} for step in steps] if timed else []
-    points += [base | {"model.quadrature": rule} for rule in rules]
-    points += [base | {"model.fidelity": rung} for rung in rungs]
+    finest: dict[str, Any] = {"model.cells": [cells[-1], cells[-1]]}
+    variations: list[tuple[str, str, dict[str, Any]]]
+    variations = [("mesh", f"{1.0 / n:.17g}", {"model.cells": [n, n]}) for n in cells]
+    if find != "dead load":
+        finest["analysis.dt"] = steps[-1]
+        variations += [("step", f"{dt:.17g}", {"analysis.dt": dt}) for dt in steps]
+    variations += [("quadrature", rule, {"model.quadrature": rule}) for rule in rules]
+    variations += [("fidelity", name, {"model.fidelity": name}) for name in rungs]
+    points = [finest | changes for *_, changes in variations]
     study = Study.of(case, points, find, title=f"{case.title}: mesh and step")
-    found = study.run(folder, workers=workers)
-    marks = [("mesh", f"{1.0 / n:.17g}") for n in cells]
-    marks += [("step", f"{step:.17g}") for step in steps] if timed else []
-    marks += [("rule", rule) for rule in rules] + [("rung", rung) for rung in rungs]
-    kinds, values = (np.array(each, dtype=object) for each in zip(*marks, strict=True))
-    return _told(found.assign_coords(varied=("point", kinds), to=("point", values)), quantity)
+    table = study.run(folder, workers=workers)
+    kinds, values = (np.array(c, dtype=object) for c in list(zip(*variations, strict=True))[:2])
+    return _sensitivity(
+        table.assign_coords(varied=("point", kinds), to=("point", values)), quantity
+    )
 
 
-def _told(table: xr.Dataset, quantity: str) -> MeshSensitivity:
-    """What the points of a study tell of one finding."""
+def _sensitivity(table: xr.Dataset, quantity: str) -> MeshSensitivity:
+    """Evaluate the points of the study of `mesh_sensitivity` for one finding."""
     if quantity not in table or table[quantity].dtype == object:
-        known = [name for name in table.data_vars if table[name].dtype != object]
+        numeric = [name for name in table.data_vars if table[name].dtype != object]
         raise InvalidInput(
-            f"quantity '{quantity}' is none of the numbers that were found: {known}"
+            f"quantity '{quantity}' is none of the numbers that were computed: {numeric}"
             + "".join({f"; {error}" for error in table["error"].values if error})
         )
 
-    def along(kind: str) -> dict[str, float]:
-        there = table["varied"].values == kind
-        values = table[quantity].values[there].tolist()
-        return dict(zip(table["to"].values[there].tolist(), values, strict=True))
+    def select(kind: str) -> dict[str, float]:
+        rows = table["varied"].values == kind
+        values = table[quantity].values[rows].tolist()
+        return dict(zip(table["to"].values[rows].tolist(), values, strict=True))
 
-    mesh, step = (along(kind) for kind in ("mesh", "step"))
-    broken = [value for value in (*mesh.values(), *step.values()) if not abs(value) < inf]
-    if broken:
+    paths = [select("mesh"), select("step")]
+    invalid = [value for path in paths for value in path.values() if not abs(value) < inf]
+    if invalid:
         errors = "; ".join(sorted({error for error in table["error"].values if error}))
         raise InvalidInput(
-            f"'{quantity}' is {broken[0]} for a mesh or a step: take another finding. {errors}"
+            f"'{quantity}' is {invalid[0]} for a mesh or a step: take another finding. {errors}"
         )
-    paths = [
-        converged([float(size) for size in found], list(found.values())) if found else None
-        for found in (mesh, step)
-    ]
-    assert paths[0] is not None
-    return MeshSensitivity(quantity, paths[0], paths[1], along("rule"), along("rung"), table)
-
-
-# Keys of a case's model that settings say
-VARIED = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
+    mesh, *step = (converged(list(map(float, path)), list(path.values())) for path in paths if path)
+    time_step = step[0] if step else None
+    return MeshSensitivity(
+        quantity, mesh, time_step, select("quadrature"), select("fidelity"), table
+    )
 
 
 def case_accuracy(
     case: Case, folder: str | Path | None = None, *, workers: int | None = 1, client: Any = None
 ) -> Accuracy:
-    """Run a case over rungs × meshes × quadratures × time steps against a converged reference.
+    """Compare processor time and error of fidelities, meshes, quadratures and steps of a case.
+
+    It is `archfem.accuracy` as a study, from the dead load of the case.
 
     Args:
-        case: with one motion; its own rung, mesh, rule and step do not matter.
-        folder: as for `Study.run`, and `workers` and `client`.
-        workers: more than one share what there is of memory bandwidth: seconds are the processor's,
-            and rise by a few per cent.
-        client: likewise.
+        case: case with one motion; its own fidelity, mesh, quadrature and time step are not used.
+        folder: folder for finished settings, as for `Study.run`.
+        workers: number of processes; several share the memory bandwidth, which raises the processor
+            time by a few per cent.
+        client: client of Dask, as for `Study.run`.
 
     Returns:
-        As `archfem.accuracy`, of the structure under its dead load as the case says it was built.
+        All settings with times and errors, the reference and the error of the reference.
 
     Raises:
-        InvalidInput: the case has no motion, or several; or as `Study.run`.
+        InvalidInput: the case has no motion, or several; or as for `Study.run`.
         DidNotConverge: the reference failed.
-        StudyStopped: the disk is full or the scheduler was lost; what was finished is kept.
+        StudyStopped: as for `Study.run`; finished settings are kept.
     """
     motion = ground_motion(case)
     references = reference_settings(case.structure)
     damping = expected_damping(case)
-    if callable(damping):
+    if callable(damping):  # damping from modes is that of the reference model in all runs
         damping = damping(build(case.structure, references[0].discretisation))
     settings = [*references, *candidate_settings(case.structure)]
-    model = {key: v for key, v in case.settings.get("model", {}).items() if key not in VARIED}
+    varied = ("fidelity", "cells", "quadrature", "quadrature_points", "tolerance")
+    fixed = {key: v for key, v in case.settings.get("model", {}).items() if key not in varied}
     study = Study.of(
-        Case.of({**case.settings, "model": model}, case.folder),
-        [_changes(setting) for setting in settings],
-        {"name": timed_case, "damping": damping},
+        Case.of({**case.settings, "model": fixed}, case.folder),
+        [_case_keys(setting) for setting in settings],
+        {"name": evaluate_time, "damping": damping},
         title=f"{case.title}: speed against error",
     )
     table = study.run(folder, workers=workers, client=client)
     if "peaks" not in table:
         raise DidNotConverge(f"no setting ran: {table['error'].values[0] or 'each failed'}")
-    runs = [_run(table.isel(point=k)) for k in range(len(settings))]
+    runs = [_to_run(table.isel(point=k)) for k in range(len(settings))]
     return compare_runs(settings, runs, motion.duration, case.tolerance)
 
 
-def _changes(setting: Setting) -> dict[str, Any]:
-    """What a setting is in a case file."""
-    asked = setting.discretisation
-    told: dict[str, Any] = {
-        "model.fidelity": asked.fidelity,
-        "model.cells": list(asked.cells),
-        "model.quadrature": asked.quadrature,
+def _case_keys(setting: Setting) -> dict[str, Any]:
+    """Keys of a case for a setting."""
+    model = setting.discretisation
+    keys: dict[str, Any] = {
+        "model.fidelity": model.fidelity,
+        "model.cells": list(model.cells),
+        "model.quadrature": model.quadrature,
         "analysis.dt": setting.dt,
     }
-    return told if asked.points is None else told | {"model.quadrature_points": asked.points}
+    return keys if model.points is None else keys | {"model.quadrature_points": model.points}
 
 
-def _run(row: xr.Dataset) -> TimedRun:
-    """A point of the table: one that ended in an error has neither size nor peaks."""
+def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
+    """Return the processor time of a run of a case, and the largest |e| of each joint."""
+    result, motion = dead_load_of(case), ground_motion(case)
+    run = time_run(result.dead.model, motion, damping, case.analysis["dt"], start=result.dead)
+    findings: Findings = {"coordinates": run.size, "seconds": run.seconds}
+    return findings if run.peaks is None else findings | {"peaks": run.peaks}
+
+
+def _to_run(row: xr.Dataset) -> TimedRun:
+    """The run of a row; the row of a point that failed is NaN."""
     if not row["coordinates"].notnull():
         return TimedRun(0, inf, None)
     peaks = row["peaks"].values
     failed = bool(np.isnan(peaks).any())
     return TimedRun(int(row["coordinates"]), float(row["seconds"]), None if failed else peaks)
-
-
-def timed_case(case: Case, damping: Viscous | None) -> Findings:
-    """Return how long a run of a case takes, and the largest |e| of each joint."""
-    rest, motion = dead_load_of(case), ground_motion(case)
-    run = time_run(rest.dead.model, motion, damping, case.analysis["dt"], start=rest.dead)
-    found: Findings = {"coordinates": run.size, "seconds": run.seconds}
-    return found if run.peaks is None else found | {"peaks": run.peaks}

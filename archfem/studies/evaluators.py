@@ -44,19 +44,19 @@ def evaluate_history(case: Case) -> Findings:
     return of_history(run_motion(dead_load_of(case), ground_motion(case)))
 
 
-def run_motion(rest: DeadLoadResult, motion: Motion) -> History:
+def run_motion(result: DeadLoadResult, motion: Motion) -> History:
     """Return the time history of a case under a motion, independent of earlier runs.
 
     Args:
-        rest: dead-load result of the case.
+        result: dead-load result of the case.
         motion: ground motion.
 
     Raises:
         DidNotConverge: a step failed.
         KeyboardInterrupt: on Ctrl-C.
     """
-    stepper = stepper_of(rest, motion)
-    run = run_time_history(rest.case, motion, rest.dead, rest.damping[0], method=stepper)
+    stepper = stepper_of(result, motion)
+    run = run_time_history(result.case, motion, result.dead, result.damping[0], method=stepper)
     if run.ending is Ending.INTERRUPTED:
         raise KeyboardInterrupt
     return run
@@ -108,18 +108,18 @@ def evaluate_scales(
     return scales_of(dead_load_of(case), motion, precision=precision, between=between)
 
 
-def scales_of(rest: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
+def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Findings:
     """Return the scales of a motion at first mechanisms, as `evaluate_scales` does."""
     options["between"] = tuple(options.get("between", (0.05, 5.0)))
-    with log_prefix(rest.case.title, motion.name):
+    with log_prefix(result.case.title, motion.name):
         scales = mechanism_scales(
-            rest.dead.model,
+            result.dead.model,
             motion,
-            start=rest.dead,
-            damping=rest.damping[0],
-            dt=rest.case.analysis.get("dt"),
-            criteria=rest.case.criteria,
-            method=partial(stepper_of, rest),
+            start=result.dead,
+            damping=result.damping[0],
+            dt=result.case.analysis.get("dt"),
+            criteria=result.case.criteria,
+            method=partial(stepper_of, result),
             **options,
         )
     if scales.interrupted:
@@ -219,7 +219,7 @@ def _find_function(name: str) -> Callable[..., Mapping[str, Any]]:
         hint = suggest_name(name, NAMED_EVALUATORS) or f"use one of {sorted(NAMED_EVALUATORS)}"
         raise InvalidInput(f"cannot compute '{name}': {hint}, or 'package.module:function'")
     try:
-        return getattr(import_module(module), function)  # type: ignore[no-any-return]
+        return getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InvalidInput(f"cannot compute '{name}': {error}") from error
 

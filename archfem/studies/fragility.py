@@ -213,7 +213,7 @@ def _curve(intensity: Array, median: Any, dispersion: Any) -> Array:
 
 
 def _fit_normal(ends: Array) -> tuple[Array, Array]:
-    """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by the EM method."""
+    """Mean and deviation (samples,) of normal data in brackets (2, samples, n), by EM."""
     low, high = ends
     # initial guess: the middle of a bracket, or the end of an unbounded one
     bounded = np.where(np.isfinite(high), high, low)
@@ -278,7 +278,7 @@ def _distance(ends: Array, mean: Array, deviation: Array) -> Array:
 
 
 def _probit(x: Array, failed: Array, count: Array) -> tuple[Array, Array]:
-    """Medians and dispersions (samples,) of failures (samples, n) at levels (n,), by Fisher scoring.
+    """Medians and dispersions (samples,) for failures (samples, n) at levels, by Fisher scoring.
 
     The probability of failure is Φ(intercept + slope · s), with s the standardised logarithm of x.
     """

@@ -109,10 +109,10 @@ def _run(
     if complete:
         findings = of_history(run, mechanisms)
         demands = {name: findings[name] for name in DEMAND_NAMES}
-    return run, _reached_limits(run, mechanisms), demands
+    return run, _find_limits(run, mechanisms), demands
 
 
-def _reached_limits(
+def _find_limits(
     run: History, mechanisms: Mapping[str, Mechanism | None]
 ) -> dict[str, Mechanism | None]:
     """Limit states that a run reaches; a first hinge is expressed as a mechanism too."""
@@ -177,7 +177,7 @@ class Ida:
             InvalidInput: limit state or measure are unknown.
         """
         check_choice(limit, self.limits, "limit")
-        unscaled, power = self._unscaled(measure)
+        unscaled, power = self._measure(measure)
         valid = np.isfinite(unscaled)
         low, high = (self.table[name].values for name in (f"{limit}, survives", limit))
         return (unscaled * low**power)[valid], (unscaled * high**power)[valid]
@@ -213,7 +213,7 @@ class Ida:
         Raises:
             InvalidInput: measure or demand are unknown.
         """
-        unscaled, power = self._unscaled(measure)
+        unscaled, power = self._measure(measure)
         check_choice(demand, DEMAND_NAMES, "demand")
         for k, name in enumerate(self.table["motion"].values):
             scale = self.table["scale"].values[k]
@@ -221,7 +221,7 @@ class Ida:
             intensity = unscaled[k] * scale[valid] ** power
             yield str(name), intensity, self.table[demand].values[k][valid]
 
-    def _unscaled(self, measure: str) -> tuple[Array, int]:
+    def _measure(self, measure: str) -> tuple[Array, int]:
         """A measure of the unscaled motions, and the power of the scale with which it grows."""
         check_choice(measure, SCALE_POWERS, "measure")
         return self.table[measure].values, SCALE_POWERS[measure]

@@ -1,13 +1,12 @@
-"""Which stiffness has a dry joint? Ranges by the stone and its faces, and what hangs on them.
+"""Stiffness of dry joints: ranges from properties of stone and faces, and their influence.
 
-Faces touch at their asperities, so that joints are softer than stone by far, and stiffer the more
-they are pressed. The relations are those of rock joints at the stress of the structure; faces cut
-apart do not match each other, which halves their stiffness.
+Faces touch at their asperities. Joints are therefore much softer than stone, and stiffer under a
+larger stress. The relations are those of rock joints at the stress of the structure. The faces of
+two voussoirs are cut separately and do not match, which halves their stiffness.
 
-Two things are judgements of ours, not found in print for masonry: what roughness and strength of
-faces "dressed", "hewn" and "weathered" stand for, and that the divisor for joints that do not
-match, of dislocated rock joints and cited from memory, holds for faces cut apart. What was measured
-of dry joints goes before both.
+Two assumptions are judgements, not taken from publications on masonry: roughness and strength of
+faces for "dressed", "hewn" and "weathered", and that the divisor for mismatched rock joints, cited
+from memory, holds for separately cut faces. Measurements of dry joints are to be preferred to both.
 
 References:
     Bandis, Lumsden and Barton, Int. J. Rock Mech. Min. Sci. 20 (1983) 249-268: closure, initial
@@ -18,8 +17,8 @@ References:
     (2023) 130880: stiffness and damping of dry joints, measured. Costa et al., Buildings 14 (2024)
     3744: contacts of dry stone, measured.
     Lourenço, Computational strategies for masonry structures, Delft (1996): k_s by elasticity.
-    Demirel and Aldemir, Buildings 11 (2021): 1.48 and 0.30 MPa/mm, of which the first is below what
-    these relations give of weathered faces.
+    Demirel and Aldemir, Buildings 11 (2021): 1.48 and 0.30 MPa/mm, of which the first is below the
+    range of these relations for weathered faces.
 """
 
 from collections.abc import Sequence
@@ -40,54 +39,46 @@ from archfem.masonry.materials import Contact
 from archfem.studies.study import Study
 from archfem.units import MPa, mm
 
-# Joint roughness coefficients JRC from and to, and the strength of the faces over the stone's: as
-# we judge them, between the second and the fifth of the profiles of Barton and Choubey (1977), and
-# sound; between the third and the seventh, and weaker; as rough, and of a third of the strength
-CONDITIONS = {
+# Smallest and largest joint roughness coefficient JRC, and strength of the faces over that of the
+# stone. Judgement: dressed faces are sound and between profiles 2 and 5 of Barton and Choubey
+# (1977); hewn ones are weaker and between profiles 3 and 7; weathered ones have a third of it.
+FACE_CONDITIONS = {
     "dressed": ((4.0, 8.0), 1.0),
     "hewn": ((6.0, 12.0), 0.6),
     "weathered": ((6.0, 12.0), 0.33),
 }
 
-# Friction angle of flat faces [degree]
-RESIDUAL = 30.0
-
-# Usual k_s / k_n, as 0.30 / 1.48 in Demirel and Aldemir (2021) [-]
-SHEAR = 0.2
-
-SOURCES = (
-    "k_n: Bandis, Lumsden and Barton (1983), aperture by Barton and Bandis (1982), without match",
-    "JRC and strength of the faces by their condition, and that none match: a judgement of ours",
-    "k_s, low: Barton and Choubey (1977), secant to the peak at 1 % of the length",
-    "k_s, high: k_n / (2 (1 + ν)), Lourenço (1996); usual: 0.2 k_n, Demirel and Aldemir (2021)",
-)
-
 
 @dataclass(frozen=True)
 class JointStiffness:
-    """What the stiffness of a joint may be: a low, a usual and a high value of each.
+    """Low, usual and high value of the normal and shear stiffness of a joint.
 
     Attributes:
-        normal: k_n [Pa/m].
-        shear: k_s [Pa/m].
-        sources: of the relations.
+        normal: normal stiffness k_n [Pa/m].
+        shear: shear stiffness k_s [Pa/m].
+        sources: sources of the relations.
     """
 
     normal: tuple[float, float, float]
     shear: tuple[float, float, float]
-    sources: tuple[str, ...] = SOURCES
+    sources: tuple[str, ...] = (
+        "k_n: Bandis, Lumsden and Barton (1983), aperture by Barton and Bandis (1982), mismatched",
+        "JRC and strength of the faces by their condition, and their mismatch: judgement",
+        "k_s, low: Barton and Choubey (1977), secant to the peak at 1 % of the length",
+        "k_s, high: k_n / (2 (1 + ν)), Lourenço (1996); usual: 0.2 k_n, Demirel and Aldemir (2021)",
+    )
 
     def contact(self, friction: float | None = 0.6, name: str = "stone to stone") -> Contact:
-        """Return a contact of the usual stiffness.
+        """Return a contact with the usual stiffness.
 
         Args:
-            friction: of the contact [-].
-            name: likewise.
+            friction: coefficient of friction [-].
+            name: name of the contact.
         """
         return Contact(self.normal[1], self.shear[1], friction, name)
 
     def table(self) -> str:
-        """The ranges in MPa/mm, and their sources."""
+        """Return the ranges in MPa/mm and their sources as text."""
         rows = [
             [name, *(f"{value * mm / MPa:.3g}" for value in values)]
             for name, values in (("k_n", self.normal), ("k_s", self.shear))
@@ -105,41 +96,42 @@ def joint_stiffness(
     poisson: float = 0.2,
     rigid: bool = False,
 ) -> JointStiffness:
-    """Return what the stiffness of dry joints may be, by the stone, its faces and its stress.
+    """Estimate the range of the stiffness of dry joints from stone, faces and stress.
 
     With JRC the roughness, JCS the strength of the faces, σ_c that of the stone [MPa] and a the
-    aperture [mm], the stiffness at no stress and the largest closure of matching faces are
+    aperture [mm], the initial stiffness k_i and the largest closure v of matching faces are
 
         a = JRC / 5 (0.2 σ_c / JCS - 0.1),   k_i = -7.15 + 1.75 JRC + 0.02 JCS / a,
         v = -0.1032 - 0.0074 JRC + 1.135 (JCS / a)^-0.251,
         k_n = k_i (1 - σ / (v k_i + σ))^-2 / (2 + 0.0004 JRC JCS σ),
 
-    the last divisor for faces that do not match. That it holds for faces cut apart, JRC, 4 to 8 of
-    dressed faces and 6 to 12 of hewn and weathered ones, and JCS / σ_c, 1, 0.6 and 0.33, are
-    judgements of ours. Of rigid blocks a joint also stands for the blocks between it and the next,
-    in series: 1 / k = 1 / k_n + spacing / E.
+    where the last divisor is for mismatched faces. Judgements are: that it holds for separately cut
+    faces; JRC from 4 to 8 for dressed faces and from 6 to 12 for hewn and weathered ones; JCS / σ_c
+    of 1, 0.6 and 0.33. A joint between rigid blocks also includes the flexibility of the stone up
+    to the next joint, in series: 1 / k = 1 / k_n + spacing / E.
 
     Args:
-        young: modulus of the blocks [Pa].
-        spacing: of the joints, taken for the length of their faces too [m].
-        condition: of the faces, "dressed", "hewn" or "weathered".
-        strength: of the stone [Pa].
-        stress: normal to the joints, as under dead load [Pa].
-        poisson: ratio of the blocks [-].
-        rigid: whether the blocks are taken as rigid, and the joints for their flexibility too.
+        young: Young's modulus of the blocks [Pa].
+        spacing: spacing of the joints, also taken for the length of their faces [m].
+        condition: condition of the faces, "dressed", "hewn" or "weathered".
+        strength: compressive strength of the stone [Pa].
+        stress: compressive stress normal to the joints, as under dead load [Pa].
+        poisson: Poisson's ratio of the blocks [-].
+        rigid: whether the model has rigid blocks, so that joints include their flexibility.
 
     Returns:
-        Ranges and their sources. They are wide: ask for `stiffness_report` what hangs on them.
+        Ranges and their sources. They are wide: `stiffness_report` computes their influence.
 
     Raises:
-        InvalidInput: the condition is not known, or a value cannot be meant.
+        InvalidInput: the condition is unknown, or a value is out of range.
 
     Example:
         >>> low, usual, high = af.joint_stiffness(30e9, 0.5, "weathered").normal
         >>> low < usual < high
         True
     """
-    (least, most), weathering = CONDITIONS[check_choice(condition, CONDITIONS, "condition")]
+    check_choice(condition, FACE_CONDITIONS, "condition")
+    (least, most), weathering = FACE_CONDITIONS[condition]
     for name, value in (("young", young), ("spacing", spacing), ("strength", strength)):
         if check_number(value, name, minimum=0.0) == 0.0:
             raise InvalidInput(f"{name} = {value!r} is not above 0: give it in SI")
@@ -148,16 +140,18 @@ def joint_stiffness(
             f"stress {stress!r} Pa is not between 0 and the strength {strength!r} Pa"
         )
     roughness = np.linspace(least, most, 21)
-    alone = [_normal(each, strength, strength * weathering, stress) for each in roughness]
-    low, high = min(alone), max(alone)
-    shear = [_shear(each, strength * weathering, stress, spacing) for each in (least, most)]
+    # the stiffness is not monotonic in the roughness
+    normal = [_normal(jrc, strength, strength * weathering, stress) for jrc in roughness]
+    low, high = min(normal), max(normal)
+    shear = [_shear(jrc, strength * weathering, stress, spacing) for jrc in (least, most)]
     usual = sqrt(low * high)
-    blocks = spacing / young if rigid else 0.0
-    slide = 2.0 * (1.0 + poisson)
-    normals = tuple(1.0 / (1.0 / each + blocks) for each in (low, usual, high))
+    ratio = 0.2  # usual k_s / k_n, as 0.30 / 1.48 in Demirel and Aldemir (2021)
+    elastic = 2.0 * (1.0 + poisson)  # E / G, and k_n / k_s of an elastic layer
+    flexibility = spacing / young if rigid else 0.0
+    normals = tuple(1.0 / (1.0 / k + flexibility) for k in (low, usual, high))
     shears = tuple(
-        1.0 / (1.0 / each + slide * blocks)
-        for each in (min(*shear, SHEAR * low), SHEAR * usual, high / slide)
+        1.0 / (1.0 / k + elastic * flexibility)
+        for k in (min(*shear, ratio * low), ratio * usual, high / elastic)
     )
     return JointStiffness((normals[0], normals[1], normals[2]), (shears[0], shears[1], shears[2]))
 
@@ -171,22 +165,22 @@ def stiffness_report(
     folder: str | Path | None = None,
     workers: int | None = None,
 ) -> xr.Dataset:
-    """Find what of a case hangs on the stiffness of its joints.
+    """Compute the influence of the joint stiffness on the findings of a case.
 
     Args:
-        case: of the structure.
-        stiffness: what it may be.
-        find: what is to be found, as for `Study.of`.
-        contact: whose stiffness it is.
-        folder: as for `Study.run`, and `workers`.
-        workers: likewise.
+        case: case of the structure.
+        stiffness: range of the stiffness.
+        find: function to evaluate, as for `Study.of`.
+        contact: name of the contact whose stiffness is varied.
+        folder: folder for finished points, as for `Study.run`.
+        workers: number of processes, as for `Study.run`.
 
     Returns:
-        The findings, over `point`: the usual values, then k_n low and high, then k_s low and high;
-        `archfem.view.draw_tornado` draws it.
+        The findings over `point`: usual values, k_n low, k_n high, k_s low, k_s high;
+        `archfem.view.draw_tornado` draws them.
 
     Raises:
-        InvalidInput: the findings cannot be meant.
+        InvalidInput: the function is invalid.
     """
     keys = tuple(f"contacts.{contact}.{kind}_stiffness" for kind in ("normal", "shear"))
     ranges = (stiffness.normal, stiffness.shear)
@@ -199,17 +193,18 @@ def stiffness_report(
 
 
 def _normal(roughness: float, strength: float, faces: float, stress: float) -> float:
-    """Normal stiffness of faces that do not match [Pa/m]."""
-    stone, wall, pressed = strength / MPa, faces / MPa, stress / MPa
-    aperture = 0.2 * roughness * (0.2 * stone / wall - 0.1)
-    initial = max(-7.15 + 1.75 * roughness + 0.02 * wall / aperture, 0.1)
-    closure = -0.1032 - 0.0074 * roughness + 1.135 * (wall / aperture) ** -0.251
-    pressing = (1.0 - pressed / (max(closure, 1e-3) * initial + pressed)) ** -2
-    apart = 2.0 + 0.0004 * roughness * wall * pressed
-    return float(initial * pressing / apart * MPa / mm)
+    """Normal stiffness of mismatched faces [Pa/m]."""
+    stone, jcs, sigma = strength / MPa, faces / MPa, stress / MPa
+    aperture = 0.2 * roughness * (0.2 * stone / jcs - 0.1)  # [mm]
+    # the regressions are limited to positive values
+    initial = max(-7.15 + 1.75 * roughness + 0.02 * jcs / aperture, 0.1)  # [MPa/mm]
+    closure = max(-0.1032 - 0.0074 * roughness + 1.135 * (jcs / aperture) ** -0.251, 1e-3)  # [mm]
+    matching = initial * (1.0 - sigma / (closure * initial + sigma)) ** -2  # hyperbolic closure
+    return float(matching / (2.0 + 0.0004 * roughness * jcs * sigma) * MPa / mm)
 
 
 def _shear(roughness: float, faces: float, stress: float, length: float) -> float:
     """Shear stiffness as the secant to the peak, at a hundredth of the length [Pa/m]."""
-    angle = min(roughness * log10(faces / stress) + RESIDUAL, 70.0)
+    residual_angle = 30.0  # of flat faces [degree]
+    angle = min(roughness * log10(faces / stress) + residual_angle, 70.0)
     return stress * tan(radians(angle)) * 100.0 / length

@@ -83,17 +83,11 @@ def evaluate_on_processes(
     meanwhile: Callable[[], object] | None = None,
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points on processes of this machine; `meanwhile` runs while they start."""
-    tasks, pool = TaskQueue(points, evaluator), WorkerPool(workers, str(log or os.devnull))
+    pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull))
     try:
         if meanwhile is not None:
             meanwhile()
-        pool.assign(tasks)
-        while pool.busy:
-            for worker in pool.wait():
-                finished = pool.receive(worker, tasks)
-                pool.assign(tasks)  # before the caller stores this row: no worker waits for that
-                if finished is not None:
-                    yield finished
+        yield from pool.rows()
     finally:
         pool.close()
 
@@ -171,42 +165,47 @@ class Worker:
 
 
 class WorkerPool:
-    """Workers of a study."""
+    """Workers that evaluate the tasks of a queue."""
 
-    def __init__(self, max_workers: int, log: str) -> None:
+    def __init__(self, tasks: TaskQueue, max_workers: int, log: str) -> None:
         # gmsh restores the default action of SIGPIPE, by which a send to a dead worker would end
         # this process; signals can be set in the main thread alone.
         with suppress(ValueError):
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
         forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
-        with _isolated():
+        with _isolate_start():
             forkserver.ensure_running()
-        self._max_workers, self._log = max_workers, log
+        self._tasks, self._max_workers, self._log = tasks, max_workers, log
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()
 
-    @property
-    def busy(self) -> bool:
-        """Whether a worker has a task."""
-        return any(worker.task is not None for worker in self._workers)
+    def rows(self) -> Iterator[tuple[int, Row]]:
+        """Yield number and row of points as they finish."""
+        self._assign()
+        while busy := {worker.pipe: worker for worker in self._workers if worker.task}:
+            for pipe in wait(list(busy)):
+                finished = self._receive(busy[pipe])  # type: ignore[index]
+                self._assign()  # before the caller stores this row: no worker waits for that
+                if finished is not None:
+                    yield finished
 
-    def assign(self, tasks: TaskQueue) -> None:
+    def close(self) -> None:
+        """End all workers."""
+        for worker in self._workers:
+            worker.end()
+
+    def _assign(self) -> None:
         """Give a task to each free worker, and to new workers up to the largest number."""
         free = [worker for worker in self._workers if worker.task is None]
-        while tasks and (free or len(self._workers) < self._max_workers):
+        while self._tasks and (free or len(self._workers) < self._max_workers):
             if not free:
                 free.append(Worker(self._log))
                 self._workers += free
             worker = free.pop()
             others = {other.model for other in self._workers if other is not worker and other.model}
-            worker.send(tasks.pop(worker.model, others))
+            worker.send(self._tasks.pop(worker.model, others))
 
-    def wait(self) -> list[Worker]:
-        """Wait for workers that have a row or have died, and return them."""
-        busy = {worker.pipe: worker for worker in self._workers if worker.task is not None}
-        return [busy[pipe] for pipe in wait(list(busy))]  # type: ignore[index]
-
-    def receive(self, worker: Worker, tasks: TaskQueue) -> tuple[int, Row] | None:
+    def _receive(self, worker: Worker) -> tuple[int, Row] | None:
         """Return number and row of a point; None if its worker died and the task was put back."""
         task = worker.task
         assert task is not None
@@ -217,20 +216,15 @@ class WorkerPool:
         reason = worker.end()
         self._deaths[task.number] += 1
         if self._deaths[task.number] < MAX_DEATHS_PER_POINT:
-            tasks.put_back(task)
+            self._tasks.put_back(task)
             return None
         text = f"{MAX_DEATHS_PER_POINT} processes that computed this point ended"
         return task.number, make_row({}, f"WorkerDied: {text}, the last with {reason}", ours=False)
 
-    def close(self) -> None:
-        """End all workers."""
-        for worker in self._workers:
-            worker.end()
-
 
 def _start(process: BaseProcess, attempts: int = 10) -> None:
     """Start a process; if the fork server has died, by another one."""
-    with _isolated():
+    with _isolate_start():
         for _ in range(attempts):
             with suppress(EOFError, OSError):
                 return process.start()
@@ -241,7 +235,7 @@ def _start(process: BaseProcess, attempts: int = 10) -> None:
 
 
 @contextmanager
-def _isolated() -> Iterator[None]:
+def _isolate_start() -> Iterator[None]:
     """Start processes with the search path of this one, but without its script."""
     main, path = sys.modules["__main__"], os.environ.get("PYTHONPATH")
     # multiprocessing would import the user's script in each worker, which would run the study anew
@@ -257,7 +251,7 @@ def _isolated() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, log: str) -> None:
-    """Evaluate points that come through a pipe until it is closed: the main function of a worker."""
+    """Evaluate points that come through a pipe until it is closed: a worker."""
     threading.Thread(target=_end_with_driver, daemon=True).start()
     with open(log, "a") as file:
         for stream in (1, 2):

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from archfem._typing import Array
 from archfem.dynamics.accuracy import Accuracy
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.view.style import (
     COLUMN_WIDTH,
     LABEL_SIZE,
@@ -19,6 +20,7 @@ from archfem.view.style import (
     add_legend_below,
     annotate,
     new_figure,
+    set_title,
     style_axes,
 )
 
@@ -76,9 +78,10 @@ def draw_study(
 def _draw_ranges(axes: Axes, scales: Mapping[str, Array], end: float) -> None:
     """Draw median and range of scales (cases, pairs) by definition; arrows at the end."""
     explanations = {
-        "any joints at once": "any four joints fail",
-        "one part at once": "four of one ring fail",
-        "ring and pier at once": "four of a ring and a pier fail",
+        "any joints at once": "enough joints fail at once",
+        "one part at once": "enough of one ring or pier fail at once",
+        "ring and pier at once": "enough of a ring and a pier fail at once",
+        "one part over the record": "enough of one ring or pier have failed",
         "verified": "blocks can move (verified)",
     }
     for number, (definition, least) in enumerate(scales.items()):
@@ -219,6 +222,61 @@ def draw_tornado(
     axes.margins(x=0.08)
     add_legend_below(figure, 2)
     return figure
+
+
+def draw_verdict_range(verdicts: VerdictRange) -> Figure:
+    """Draw the residual displacement over each varied property; falls lie above a line.
+
+    Args:
+        verdicts: runs, as by `archfem.verdict_range`.
+
+    Returns:
+        The figure, with a panel for each property, that which explains most of the damage first.
+    """
+    rows = verdicts.dataset.isel(run=np.flatnonzero(verdicts.answered))
+    falls, residual = verdicts.falls[verdicts.answered], 1e3 * rows["residual"].values
+    standing = residual[~falls]
+    top = 3.0 * float(standing.max(initial=1.0))
+    heights = np.where(falls, 2.0 * top, np.maximum(residual, 1e-3 * top))
+    shares = verdicts.importance()
+    columns = min(4, len(shares))
+    lines = -(-len(shares) // columns)
+    figure = new_figure(PAGE_WIDTH, 0.7 + 2.1 * lines)
+    panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
+    for axes in panels[len(shares) :]:
+        axes.set_visible(False)
+    for axes, (name, share) in zip(panels, shares.items(), strict=False):
+        first = axes in panels[::columns]
+        style_axes(axes, name.replace("_", " "), "residual [mm]" if first else "")
+        set_title(axes, f"explains {share:.0%}")
+        _draw_property(axes, rows[name].values, heights, falls)
+        axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
+        axes.set_yscale("log")
+        axes.set_ylim(0.7e-3 * top, 4.0 * top)
+    annotate(panels[0], "falls", (0.0, 1.4 * top), (3, 0), xycoords=("axes fraction", "data"))
+    figure.suptitle(verdicts.sentence, fontsize=TITLE_SIZE, color=Colour.TEXT, wrap=True)
+    return figure
+
+
+def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> None:
+    """Draw a dot for each run over a property, labels side by side."""
+    if values.dtype.kind == "f":
+        places = values
+    else:
+        labels, number = np.unique(values, return_inverse=True)
+        # runs of one label are spread out, so that equal results remain visible
+        spread = np.linspace(-0.3, 0.3, len(values))
+        places = number + spread
+        axes.set_xticks(
+            range(len(labels)), [str(label).replace(" and ", "\nand ") for label in labels]
+        )
+        axes.set_xlim(-0.5, len(labels) - 0.5)
+    for chosen, colour, label in (
+        (~falls, LINE_COLOURS[0], "stands"),
+        (falls, Colour.HINGE, "falls"),
+    ):
+        style = {"ms": 4, "alpha": 0.8, "label": label}
+        axes.plot(places[chosen], heights[chosen], "o", color=colour, **style)
 
 
 def draw_convergence(

@@ -20,6 +20,7 @@ import time
 import tomllib
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
+from multiprocessing import forkserver
 from pathlib import Path
 from unittest.mock import patch
 
@@ -68,12 +69,12 @@ def alone(points: Sequence[tuple[int, Point]], asked: Evaluator) -> Iterator[tup
 
 def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
     """Wall and processor time of a study [s], and how many points failed."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        patch("archfem.studies.study.evaluate_serially", alone),
-    ):
+    serially = "archfem.studies.study.evaluate_serially"
+    with tempfile.TemporaryDirectory() as folder, patch(serially, alone):
         begun, spent = time.monotonic(), processor()
         failed = int((study.run(folder, workers=workers)["error"] != "").sum())
+        # The workers' time counts once their fork server has ended, which else serves later studies.
+        forkserver._forkserver._stop()
         return time.monotonic() - begun, processor() - spent, failed
 
 

@@ -40,7 +40,7 @@ def test_error_bar_of_a_ring_holds_its_converged_eccentricity():
     assert found.step is None
     assert found.rules["exact"] == pytest.approx(found.mesh.values[-1])
     assert found.of("N").mesh.error < 0.01 * found.of("N").mesh.limit
-    assert "rung rigid" in found.text()
+    assert "fidelity rigid" in found.text()
 
 
 def test_findings_that_have_no_numbers(small_ring):

@@ -14,9 +14,10 @@ from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.schemes import StiffnessDamping
 from archfem.dynamics.solvers import base
 from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.selection import select_solver
 from archfem.models.discretisation import Discretisation
 from archfem.studies import cache
-from archfem.studies.cache import StepperFactory
+from archfem.studies.cache import SharedStepper
 
 DT = 0.005
 
@@ -62,10 +63,10 @@ def test_a_stepper_of_shared_matrices_gives_the_run_of_one_of_its_own_whatever_r
 
     alone = [run(motion, "auto") for motion in (weak, strong)]
     compiled = len(base.advance.signatures)
-    ready = StepperFactory.of(equation)
+    ready = SharedStepper(equation, select_solver(equation), {})
     for order in ((0, 1), (1, 0), (1, 1)):
         for number in order:
-            found = run((weak, strong)[number], ready.stepper((weak, strong)[number]))
+            found = run((weak, strong)[number], ready.under((weak, strong)[number]))
             assert same(found, alone[number])
     assert not same(*alone)
     assert len(base.advance.signatures) == compiled  # copies are of the types of what was made
