@@ -109,9 +109,8 @@ class Collapse(ResultDisplay):
     def __str__(self) -> str:
         """Describe outcome, factor and failing joints in one line."""
         turning = zip(self.hinges, self.hinge_names, strict=True)
-        hinges = (
-            join_names([f"{name} at the {side}" for (_, side), name in turning], "; ") or "none"
-        )
+        sides = [f"{name} at the {side}" for (_, side), name in turning]
+        hinges = join_names(sides, "; ") or "none"
         sliding = join_joint_names(self.sliding_names) or "none"
         text = f"{self.outcome.sentence}: factor {self.factor:.4g}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"

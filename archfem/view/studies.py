@@ -239,6 +239,15 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     top = 3.0 * float(standing.max(initial=1.0))
     heights = np.where(falls, 2.0 * top, np.maximum(residual, 1e-3 * top))
     shares = verdicts.importance()
+    labels = {
+        "k_n": "normal stiffness, factor [-]",
+        "k_s": "shear stiffness, factor [-]",
+        "friction": "friction, added [-]",
+        "damping_ratio": "damping ratio, factor [-]",
+        "dt": "time step",
+        "sign": "sign of the motion",
+        "scale": "scale of the motion [-]",
+    }
     columns = min(4, len(shares))
     lines = -(-len(shares) // columns)
     figure = new_figure(PAGE_WIDTH, 0.7 + 2.1 * lines)
@@ -247,13 +256,15 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         axes.set_visible(False)
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
         first = axes in panels[::columns]
-        style_axes(axes, name.replace("_", " "), "residual [mm]" if first else "")
+        label = labels.get(name, name.replace("_", " "))
+        style_axes(axes, label, "residual displacement [mm]" if first else "")
         set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
-    annotate(panels[0], "falls", (0.0, 1.4 * top), (3, 0), xycoords=("axes fraction", "data"))
+    handles, words = panels[0].get_legend_handles_labels()
+    add_legend_below(figure, 2, handles=handles, labels=words)
     figure.suptitle(verdicts.sentence, fontsize=TITLE_SIZE, color=Colour.TEXT, wrap=True)
     return figure
 
@@ -267,14 +278,11 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> N
         # runs of one label are spread out, so that equal results remain visible
         spread = np.linspace(-0.3, 0.3, len(values))
         places = number + spread
-        axes.set_xticks(
-            range(len(labels)), [str(label).replace(" and ", "\nand ") for label in labels]
-        )
+        words = [str(label).replace(" and ", "\nand ") for label in labels]
+        axes.set_xticks(range(len(labels)), words)
         axes.set_xlim(-0.5, len(labels) - 0.5)
-    for chosen, colour, label in (
-        (~falls, LINE_COLOURS[0], "stands"),
-        (falls, Colour.HINGE, "falls"),
-    ):
+    groups = ((~falls, LINE_COLOURS[0], "stands"), (falls, Colour.HINGE, "falls, above the line"))
+    for chosen, colour, label in groups:
         style = {"ms": 4, "alpha": 0.8, "label": label}
         axes.plot(places[chosen], heights[chosen], "o", color=colour, **style)
 
