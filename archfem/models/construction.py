@@ -1,7 +1,6 @@
 """Partly built structures: blocks that are not there yet, and blocks on centring."""
 
 from collections.abc import Iterable
-from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +41,11 @@ class PartialStructure(LinearBlockModel):
         self, blocks: Iterable[int], q: Array, *, centring: bool = False
     ) -> "PartialStructure":
         """Return the model with further blocks, placed on the structure displaced by q."""
-        other = copy(self)
         new = np.zeros_like(self.standing)
         new[list(blocks)] = True
-        other.standing = self.standing | new
-        other.centred = self.centred | (new & centring)
+        other = self.copy_with(
+            standing=self.standing | new, centred=self.centred | (new & centring)
+        )
         begin = other._active_points & ~self._active_points
         gaps = np.stack([self.operator.openings(q), self.operator.slips(q)])
         initial = np.zeros_like(gaps) if self.initial_gaps is None else self.initial_gaps
@@ -54,10 +53,7 @@ class PartialStructure(LinearBlockModel):
 
     def struck(self) -> "PartialStructure":
         """Return the model without its centring."""
-        other = copy(self)
-        other.centred = np.zeros_like(self.centred)
-        other._last = None
-        return other
+        return self.copy_with(centred=np.zeros_like(self.centred), _last=None)
 
     def finished(self) -> LinearBlockModel:
         """Return the model of all blocks with these initial gaps and this memory."""

@@ -190,9 +190,7 @@ def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
 
 def _array(name: str, values: NDArray[Any]) -> str:
     """Return an array as XML: the number of bytes and the bytes, base64-encoded."""
-    kind, number_type = (
-        VTK_NUMBER_TYPES[values.dtype.kind] if values.dtype != np.uint8 else VTK_NUMBER_TYPES["u"]
-    )
+    kind, number_type = VTK_NUMBER_TYPES[values.dtype.kind]
     data = np.ascontiguousarray(values, dtype=number_type).tobytes()
     size = np.array([len(data)], dtype="<u8").tobytes()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
