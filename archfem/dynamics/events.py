@@ -34,7 +34,7 @@ from archfem.limit.mechanism_count import (
     counted_mechanisms,
     matching_definitions,
 )
-from archfem.limit.mechanism_kinematics import cached_verifier, joint_freedoms
+from archfem.limit.mechanism_kinematics import get_verifier, joint_freedoms
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.structure import Structure, join_joint_names
 
@@ -200,7 +200,7 @@ class CountedMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
+        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
 
         def count(joints: xr.Dataset) -> Mechanism | None:
             return counted_mechanism(joints, kinds=self.kinds)
@@ -257,7 +257,7 @@ class MovingMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
+        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
 
         def moves(state: FailureState) -> frozenset[str]:
             motion = verifier.verify_if_moving(state.joint_states())
@@ -306,7 +306,7 @@ class EveryMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier = cached_verifier(structure)
+        verifier = get_verifier(structure)
         scanned = sorted({*np.flatnonzero(structure.judged), *verifier.rigid_regions.joints})
         roles = {joint.part: joint.role for joint in structure.joints}
         parts = np.array([structure.joints[number].part for number in scanned])

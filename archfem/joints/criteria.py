@@ -251,7 +251,7 @@ def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> NDArray[np.float64
     return sliding_ratio(normal, e, criteria.coefficients(friction), criteria.cohesions(cohesion))
 
 
-def failed_joints(joints: xr.Dataset) -> xr.DataArray:
+def find_failed_joints(joints: xr.Dataset) -> xr.DataArray:
     """Return whether each joint hinges, slides or is open."""
     hinge = joints["hinge"]
     slides, is_open = (

@@ -427,7 +427,7 @@ class BlocksWithFill:
             if self.fill is not None and isinstance(action, BodyForce):
                 block, foot, weight = self._columns
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                total += self._generalised_sum(self._place[block], foot, pull)
+                total += self._sum_forces(self._place[block], foot, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
                 if self._place[number] < 0:
@@ -447,7 +447,7 @@ class BlocksWithFill:
         assert self.fill is not None
         block, points, part = self._profile.fan(point, self.fill)
         forces = part[:, None] * np.array(load.force)
-        return self._generalised_sum(self._place[block], points, forces)
+        return self._sum_forces(self._place[block], points, forces)
 
     def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
         """Warn where a fill without cohesion would slide before the stones become a mechanism."""
@@ -471,7 +471,7 @@ class BlocksWithFill:
             return np.zeros(3 * len(self.rigid_regions.structure.free))
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.least, self.whole.width)
-        return self._generalised_sum(contacts.block, points, forces)
+        return self._sum_forces(contacts.block, points, forces)
 
     def passive_forces(self) -> sparse.csr_matrix:
         """Return the generalised forces of each contact's pressure range (3 n_free, n)."""
@@ -479,7 +479,7 @@ class BlocksWithFill:
             return sparse.csr_matrix((3 * len(self.rigid_regions.structure.free), 0))
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
-        return sparse.csr_matrix(self._generalised_forces(contacts.block, points, forces).T)
+        return sparse.csr_matrix(self._apply_forces(contacts.block, points, forces).T)
 
     def pressure_dataset(self, share: Array) -> xr.Dataset | None:
         """Return the pressures of the fill over contact, or None where there is none."""
@@ -504,7 +504,7 @@ class BlocksWithFill:
             },
         )
 
-    def _generalised_forces(
+    def _apply_forces(
         self, block: NDArray[np.intp], points: Array, forces: Array
     ) -> sparse.csr_matrix:
         """Return the generalised forces of forces at points of the stones (n, 3 n_free)."""
@@ -519,9 +519,9 @@ class BlocksWithFill:
         shape = (len(block), 3 * len(structure.free))
         return sparse.csr_matrix((entries[rows].ravel(), (rows.repeat(3), columns.ravel())), shape)
 
-    def _generalised_sum(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
+    def _sum_forces(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
         """Return the sum of those generalised forces (3 n_free,)."""
-        return np.asarray(self._generalised_forces(block, points, forces).sum(axis=0)).ravel()
+        return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
 
 
 def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:

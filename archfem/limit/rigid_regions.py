@@ -28,7 +28,7 @@ class RigidRegions:
 def find_rigid_regions(structure: Structure) -> RigidRegions:
     """Remove the yielding bodies, and the blocks that do not stand on fixed ground without them."""
     everything = set(range(len(structure.blocks)))
-    blocks = _supported_blocks(structure, everything - set(find_yielding_blocks(structure)))
+    blocks = _find_supported_blocks(structure, everything - set(find_yielding_blocks(structure)))
     # A structure of nothing but yielding bodies is taken as rigid.
     if not set(blocks) & set(structure.free):
         return take_all_rigid(structure)
@@ -59,7 +59,7 @@ def _select_blocks(structure: Structure, blocks: tuple[int, ...]) -> RigidRegion
     return RigidRegions(selected, blocks, joints, len(structure.blocks))
 
 
-def _supported_blocks(structure: Structure, blocks: set[int]) -> tuple[int, ...]:
+def _find_supported_blocks(structure: Structure, blocks: set[int]) -> tuple[int, ...]:
     """Return those of some blocks that are joined to a fixed one through others of them."""
     supported = {number for number in blocks if structure.blocks[number].fixed}
     pairs = [set(joint.blocks) for joint in structure.joints if blocks >= set(joint.blocks)]

@@ -162,12 +162,12 @@ class Block:
         """
         if self.centre is None:
             return self.points
-        if pieces not in self._drawn:
-            self._drawn[pieces] = np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
-        return self._drawn[pieces]
+        if pieces not in self._outlines:
+            self._outlines[pieces] = np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+        return self._outlines[pieces]
 
     @cached_property
-    def _drawn(self) -> dict[int, Array]:
+    def _outlines(self) -> dict[int, Array]:
         """Cached outlines by number of chords of an arc."""
         return {}
 

@@ -56,7 +56,7 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     check_integer(layers, "layers of the fill")
     soil = set(find_yielding_blocks(structure))
     rings = {n for n in structure.free if structure.blocks[n].role == "ring"} - soil
-    first = _supported_blocks(structure, set(range(len(structure.blocks))) - soil - rings)
+    first = _find_supported_blocks(structure, set(range(len(structure.blocks))) - soil - rings)
     last = set(structure.free) - soil - rings - first
     stages = [
         ("piers and walls", first & set(structure.free), False),
@@ -76,7 +76,7 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     return tuple(result)
 
 
-def _supported_blocks(structure: Structure, blocks: set[int]) -> set[int]:
+def _find_supported_blocks(structure: Structure, blocks: set[int]) -> set[int]:
     """Return the blocks of a set that are connected within the set to a fixed one."""
     held = {number for number in blocks if structure.blocks[number].fixed}
     pairs = [set(joint.blocks) for joint in structure.joints if blocks >= set(joint.blocks)]

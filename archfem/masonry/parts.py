@@ -66,13 +66,13 @@ def assign_roles(
 ) -> tuple[AnyMember, ...]:
     """Return blocks or joints with the roles of their parts, derived where none is given."""
     # a role given for one member holds for its part; without any, the name of the part decides
-    given = _given_roles((*members, *others))
+    given = _collect_roles((*members, *others))
     open_parts = dict.fromkeys(each.part for each in members if each.part not in given)
     roles = given | {part: infer_role(part) for part in open_parts}
     return tuple(each if each.role else replace(each, role=roles[each.part]) for each in members)
 
 
-def _given_roles(members: Sequence[Member]) -> dict[str, str]:
+def _collect_roles(members: Sequence[Member]) -> dict[str, str]:
     """Collect the roles that members state for their parts."""
     first: dict[str, Member] = {}
     for each in members:

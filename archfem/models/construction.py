@@ -73,7 +73,7 @@ class PartialStructure(LinearBlockModel):
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the tangent of what stands; held coordinates have a stiffness of their own."""
         active, free = self._active_points, self._free
-        pairs = active[self.operator.law.coupled_pairs[0]]
+        pairs = active[self.operator.law.coupling_pairs[0]]
         parts = [pairs, active, *([pairs] if self.operator.slides else [])]
         joints = np.where(np.concatenate(parts), stiffness, 0.0)
         matrix = super().assemble_tangent(block_factor, joints)
@@ -100,7 +100,7 @@ class PartialStructure(LinearBlockModel):
         gaps, shear = joints.effective_gaps(q), joints.trial_shear(q)
         stored = gaps * joints.law.forces(gaps) + shear**2 / joints.points.shear_spring
         if joints.bonds is not None:
-            stored = stored + 2.0 * joints.bonds.stored_energy(gaps)
+            stored = stored + 2.0 * joints.bonds.energy_of_pull(gaps)
         in_blocks = 0.5 * float(q @ (self.block_stiffness @ q))
         return in_blocks + 0.5 * float(np.sum(stored[active]))
 

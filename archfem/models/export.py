@@ -31,7 +31,7 @@ class Solids:
     model: Model
 
     @cached_property
-    def _fixed(self) -> list[tuple[int, Array]]:
+    def _supports(self) -> list[tuple[int, Array]]:
         """Numbers and outlines of the fixed blocks."""
         blocks = enumerate(self.model.structure.blocks)
         return [(number, block.drawn()) for number, block in blocks if block.fixed]
@@ -39,12 +39,12 @@ class Solids:
     @cached_property
     def places(self) -> Array:
         """Points as built: those of the cells, then those of fixed blocks (m, 2) [m]."""
-        return np.concatenate([self.model.cells.places, *(points for _, points in self._fixed)])
+        return np.concatenate([self.model.cells.places, *(points for _, points in self._supports)])
 
     @cached_property
     def block(self) -> NDArray[np.intp]:
         """Block of each point (m,)."""
-        fixed = [np.full(len(points), number) for number, points in self._fixed]
+        fixed = [np.full(len(points), number) for number, points in self._supports]
         return np.concatenate([self.model.cells.block, *fixed]).astype(np.intp)
 
     @cached_property
@@ -52,7 +52,7 @@ class Solids:
         """Corner points of each polygon: the cells, then one for each fixed block."""
         polygons = [np.asarray(cell, dtype=np.intp) for cell in self.model.cells.polygons]
         start = len(self.model.cells.places)
-        for _, points in self._fixed:
+        for _, points in self._supports:
             polygons.append(np.arange(start, start + len(points)))
             start += len(points)
         return polygons
@@ -72,7 +72,7 @@ class Solids:
         centroids = [block.centroid for block in self.model.structure.blocks]
         fixed = [
             rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]
-            for number, points in self._fixed
+            for number, points in self._supports
         ]
         return np.concatenate([self.model.cells.displacement(q), *fixed])
 

@@ -115,7 +115,7 @@ class LinearBlockModel(Model):
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth, without slip."""
-        return self.assemble_tangent(1.0, self.operator.closed_stiffness())
+        return self.assemble_tangent(1.0, self.operator.elastic_stiffness())
 
     def energy(self, q: Array) -> float:
         """Return the potential energy of blocks and joints without further slip [J]."""

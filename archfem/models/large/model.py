@@ -197,21 +197,21 @@ class LargeDisplacementModel(Model):
         """Return the generalised forces of an action; point loads keep their direction (n,)."""
         if isinstance(action, BodyForce) or q is None:
             return self.small.load(action)
-        return self._loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
+        return self._find_loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
 
     def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `load` by the coordinates (n, n)."""
         if isinstance(action, BodyForce):
             return super().load_rate(action, q)
-        return self._loaded_point(action).force_rate(q, np.array(action.force), self.size)
+        return self._find_loaded_point(action).force_rate(q, np.array(action.force), self.size)
 
     def work(self, action: Action, q: Array) -> float:
         """Return the work of an action since before anything moved [J]."""
         if isinstance(action, BodyForce):
             return super().work(action, q)
-        return float(self._loaded_point(action).displacement(q) @ np.array(action.force))
+        return float(self._find_loaded_point(action).displacement(q) @ np.array(action.force))
 
-    def _loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
+    def _find_loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
         """Return the point at which a point load acts."""
         if action in self._points:
             return self._points[action]
