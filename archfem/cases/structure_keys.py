@@ -18,17 +18,7 @@ from archfem.errors import InvalidInput
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.construction import Stage, resolve_stages, usual_stages
 from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
-from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.shapes.bridges import arcade, bridge, buttressed_arch
-from archfem.masonry.shapes.rings import (
-    arch_along,
-    arch_on_piers,
-    circular_arch,
-    column,
-    elliptical_arch,
-    flat_arch,
-    pointed_arch,
-)
+from archfem.masonry.shapes import bridge_parts, bridges, rings
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
 
@@ -60,13 +50,18 @@ JOINTED_FILL_KEYS = {"law": str, "piece_size": "m", "friction_angle": "degree", 
 DEAD_LOAD_KEYS = {"stages": str, "layers": int, "stage": [dict]}
 STAGE_KEYS = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
 
-_SHAPE_FUNCTIONS = (
-    *(circular_arch, pointed_arch, elliptical_arch, flat_arch, arch_along, buttressed_arch),
-    *(arcade, column, arch_on_piers, bridge),
+_SHAPES = (
+    *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
+    *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
+    *(rings.arch_on_piers, bridges.bridge),
 )
-SHAPES = {shape.__name__: shape for shape in _SHAPE_FUNCTIONS} | {"outlines": surveyed}
+SHAPE_FUNCTIONS = {shape.__name__: shape for shape in _SHAPES} | {"outlines": surveyed}
 # Parts of a bridge of which there may be several, from left to right, each under its name.
-NAMED_PARTS = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+NAMED_PARTS = {
+    "arches": bridge_parts.Arch,
+    "piers": bridge_parts.Pier,
+    "sidewalls": bridge_parts.Sidewall,
+}
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -94,8 +89,8 @@ def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure of a case."""
     table = settings.get("structure", {})
-    name = check_choice(table.get("shape"), SHAPES, "structure.shape")
-    keys = {**_keys_of(SHAPES[name]), "shape": str, "fill": dict}
+    name = check_choice(table.get("shape"), SHAPE_FUNCTIONS, "structure.shape")
+    keys = {**_keys_of(SHAPE_FUNCTIONS[name]), "shape": str, "fill": dict}
     if name == "arcade":  # one number of voussoirs for each of its arches
         keys["voussoirs"] = [int]
     elif name == "outlines":
@@ -115,7 +110,7 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     elif name == "outlines":
         values = _outline_arguments(values, settings, folder)
     section = f"structure of shape {name!r}"
-    structure = _call(SHAPES[name], section, material=stone, contact=contact, **values)
+    structure = _call(SHAPE_FUNCTIONS[name], section, material=stone, contact=contact, **values)
     return _divide_fill(structure, fill)
 
 
@@ -147,13 +142,13 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
         if key in parts:
             parts[key] = _named_parts(part, parts[key], f"structure.{key}")
     if "backfill" in parts:
-        fill = check_table(parts["backfill"], _keys_of(Backfill), "structure.backfill")
+        fill = check_table(parts["backfill"], _keys_of(bridge_parts.Backfill), "structure.backfill")
         fill["material"] = _material(settings, fill.pop("material", "backfill"))
         fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
-        parts["backfill"] = _call(Backfill, "structure.backfill", **fill)
+        parts["backfill"] = _call(bridge_parts.Backfill, "structure.backfill", **fill)
     if "paving" in parts:
-        paving = check_table(parts["paving"], _keys_of(Paving), "structure.paving")
-        parts["paving"] = _call(Paving, "structure.paving", **paving)
+        paving = check_table(parts["paving"], _keys_of(bridge_parts.Paving), "structure.paving")
+        parts["paving"] = _call(bridge_parts.Paving, "structure.paving", **paving)
     return parts
 
 

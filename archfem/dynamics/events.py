@@ -392,9 +392,6 @@ def _as_condition(mechanism: object) -> frozenset[str]:
 
 def _check_kinds(kinds: Any) -> None:
     """Refuse unknown classes of mechanisms."""
-    if (
-        not isinstance(kinds, list | tuple)
-        or not kinds
-        or not all(kind in MECHANISM_KINDS for kind in kinds)
-    ):
+    known = isinstance(kinds, list | tuple) and all(kind in MECHANISM_KINDS for kind in kinds)
+    if not known or not kinds:
         raise InvalidInput(f"kinds = {kinds!r}: give some of {MECHANISM_KINDS}, as a tuple")

@@ -110,7 +110,7 @@ def mean_closing_rate(
 def contact_fraction_rate(
     start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Return the derivative of `contact_fraction` by a parameter, given those of both gaps [1/m]."""
+    """Return the derivative of `contact_fraction` by a parameter, from those of both gaps [1/m]."""
     fraction, changes = contact_fraction(start, end), is_closed(start) != is_closed(end)
     total = np.where(changes, abs(start) + abs(end), np.inf)  # no derivative without a change
     by_start, by_end = (np.where(is_closed(gap), 1.0 - fraction, fraction) for gap in (start, end))

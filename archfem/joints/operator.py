@@ -20,7 +20,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.bonds import Bonds, dilatancy_opening
-from archfem.joints.contact_law import Facets, Law, clip_to_friction, is_closed
+from archfem.joints.contact_law import Facets, Law, clip_to_friction
 from archfem.joints.quadrature import JointPoints
 from archfem.joints.sparsity import Pattern
 

@@ -223,10 +223,6 @@ class Block:
         return self._measures[2]
 
 
-# Depth of an overlap by round-off, relative to the size of all outlines
-OVERLAP_TOLERANCE = 1e-6
-
-
 def check_simple(outline: Array, name: str) -> None:
     """Refuse an outline that crosses or touches itself."""
     import shapely
@@ -248,7 +244,8 @@ def check_overlaps(
     """Refuse outlines that are the same or overlap."""
     import shapely
 
-    near = OVERLAP_TOLERANCE * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    # overlaps of less depth, relative to the size of all outlines, are round-off
+    near = 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
     polygons = np.array([shapely.Polygon(points) for points in outlines])
     a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
     still = np.zeros(len(polygons), dtype=bool) if fixed is None else np.array(fixed, dtype=bool)

@@ -34,9 +34,6 @@ ROLE_WORDS = {
     | {"ballast", "deck", "pavement", "paver", "paving", "road"},
 }
 
-# Roles in messages
-ROLE_PHRASES = {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}
-
 logger = logging.getLogger("archfem")
 
 
@@ -110,7 +107,7 @@ def infer_role(part: str) -> str:
             'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or of '
             "their layer in [structure.layers]",
             part,
-            ROLE_PHRASES[role],
+            {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}[role],
             why,
         )
     return role

@@ -120,9 +120,6 @@ class Solids:
         return (first + fraction[:, None] * (second - first)).reshape(-1, 4, 2)
 
 
-# VTK's cell types of triangles and quadrilaterals, by number of corners; other polygons have 7
-VTK_CELL_TYPES = {3: 5, 4: 9}
-
 # VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
 VTK_NUMBER_TYPES = {
     "f": ("Float64", "<f8"),
@@ -141,10 +138,12 @@ def write_vtu(
 ) -> None:
     """Write polygons with data of their points and cells."""
     sizes = [len(polygon) for polygon in polygons]
+    # VTK's types by the number of corners: triangles, quadrilaterals, other polygons
+    types = [{3: 5, 4: 9}.get(size, 7) for size in sizes]
     cells: dict[str, NDArray[Any]] = {
         "connectivity": np.concatenate(polygons).astype(np.int64),
         "offsets": np.cumsum(sizes, dtype=np.int64),
-        "types": np.array([VTK_CELL_TYPES.get(size, 7) for size in sizes], dtype=np.uint8),
+        "types": np.array(types, dtype=np.uint8),
     }
     lines = [
         '<?xml version="1.0"?>',

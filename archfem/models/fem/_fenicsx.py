@@ -38,13 +38,12 @@ try:
 except ImportError:
     from dolfinx.io import gmsh as _gmsh_io  # type: ignore[attr-defined, no-redef]
 
-COMM = MPI.COMM_SELF
 Numbers = NDArray[np.int32]
 
 
 def import_gmsh_mesh(model: Any) -> tuple[Any, Any, Any]:
     """Return the current gmsh model as a plane mesh, its cell tags and its facet tags."""
-    grid, cells, facets = _gmsh_io.model_to_mesh(model, COMM, 0, gdim=2)[:3]
+    grid, cells, facets = _gmsh_io.model_to_mesh(model, MPI.COMM_SELF, 0, gdim=2)[:3]
     return grid, cells, facets
 
 
@@ -90,7 +89,7 @@ def renumber_space(space: Any, numbers: Numbers, count: int) -> Any:
     old = space.dofmap
     dofmap = cpp.fem.DofMap(
         old.dof_layout,
-        dolfinx.common.IndexMap(COMM, count),
+        dolfinx.common.IndexMap(MPI.COMM_SELF, count),
         old.index_map_bs,
         cpp.graph.AdjacencyList_int32(np.ascontiguousarray(numbers, dtype=np.int32)),
         old.index_map_bs,
