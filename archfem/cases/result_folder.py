@@ -165,8 +165,9 @@ def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> lis
     }
     if "fall_pose" in history.dataset:
         figures["fall.png"] = draw_fall(history)
-    files = write_motion(run.motion, folder) if case.suite is not None else []
-    files += [save(figure, folder / name) for name, figure in figures.items()]
+    if case.suite is not None:
+        figures = {"motion.png": draw_motion(run.motion)} | figures
+    files = [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
@@ -193,11 +194,6 @@ def _critical_instant(run: History) -> xr.Dataset:
 def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> list[Path]:
     """Draw the spectra of a suite beside its target."""
     return [save(draw_suite(suite, target), folder / "spectra.png")]
-
-
-def write_motion(motion: Motion, folder: Path) -> list[Path]:
-    """Draw a motion as applied, with its integrals."""
-    return [save(draw_motion(motion), folder / "motion.png")]
 
 
 def write_pairs(

@@ -256,6 +256,7 @@ class FillProfile:
         weights = np.array([block.material.unit_weight for block in self.structure.blocks])
         return np.asarray(weights[self.slices.block])
 
+    @cached_property
     def columns(self) -> tuple[NDArray[np.intp], Array, Array]:
         """Return stone, foot and weight of every column of fill (n,), (n, 2) [m], (n,) [N]."""
         cut, rests = self.slices, ~self.stones[self.slices.block]
@@ -384,11 +385,6 @@ class BlocksWithFill:
         return FillProfile(self.whole, self._place >= 0)
 
     @cached_property
-    def _columns(self) -> tuple[NDArray[np.intp], Array, Array]:
-        """Stone, foot and weight of every column of fill."""
-        return self._profile.columns()
-
-    @cached_property
     def contacts(self) -> FillContacts:
         """Pieces of the stones' faces on which the fill presses."""
         soil, normals = set(find_yielding_blocks(self.whole)), self.whole.normals
@@ -425,7 +421,7 @@ class BlocksWithFill:
         for action in actions:
             # a body force acts on the fill too, and so on the stone at the foot of each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, foot, weight = self._columns
+                block, foot, weight = self._profile.columns
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
                 total += self._sum_forces(self._place[block], foot, pull)
             if self.fill is not None and isinstance(action, PointLoad):

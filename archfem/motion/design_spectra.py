@@ -6,9 +6,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_fields, check_number, check_unmasked, short_repr
+from archfem._validation import check_fields, check_number, check_unmasked
 from archfem.errors import InvalidInput
-from archfem.motion.response_spectra import check_oscillators
+from archfem.motion.response_spectra import as_periods, check_oscillators
 from archfem.units import STANDARD_GRAVITY
 
 # No code has a larger spectral acceleration [g]: the unit must be wrong.
@@ -300,10 +300,7 @@ class TableSpectrum:
 
 def validate_periods(periods: float | Array, longest: float) -> Array:
     """Return periods as an array, refused where a spectrum is not defined."""
-    try:
-        natural = np.asarray(periods, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+    natural = as_periods(periods)
     check_oscillators(natural, 0.05)
     if np.any(natural > longest):
         raise InvalidInput(

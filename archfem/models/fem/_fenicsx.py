@@ -30,7 +30,6 @@ if "dolfinx" not in sys.modules:
         sys.setdlopenflags = _setdlopenflags
 
 import dolfinx.fem.petsc  # noqa: E402
-import ufl  # noqa: E402
 from dolfinx import cpp, fem  # noqa: E402
 
 try:
@@ -106,17 +105,6 @@ def renumber_space(space: Any, numbers: Numbers, count: int) -> Any:
     new = fem.FunctionSpace(space.mesh, space.ufl_element(), inner)
     new.original = space  # its compiled element must outlive this copy
     return new
-
-
-def jump_measure(grid: Any, facets: Any, rule: str, degree: int) -> Any:
-    """Return the measure over tagged interior facets with a quadrature rule of a degree."""
-    metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
-    return ufl.Measure("dS", domain=grid, subdomain_data=facets, metadata=metadata)
-
-
-def cell_measure(grid: Any, cells: Any) -> Any:
-    """Return the measure over tagged cells."""
-    return ufl.Measure("dx", domain=grid, subdomain_data=cells)
 
 
 def constant(grid: Any, value: Any) -> Any:

@@ -222,7 +222,7 @@ class Forms:
         of_block = np.array([materials.index(block.material) for block in structure.blocks])
         cells = np.arange(len(mesh.blocks), dtype=np.int32)
         tags = _fenicsx.tag_entities(mesh.grid, 2, cells, of_block[mesh.blocks])
-        dx = _fenicsx.cell_measure(mesh.grid, tags)
+        dx = ufl.Measure("dx", domain=mesh.grid, subdomain_data=tags)
         return [(material, dx(k)) for k, material in enumerate(materials)]
 
     @cached_property

@@ -154,7 +154,9 @@ class JointFacets:
         count = self._colour_count
         numbers = of_joint[self.joint] * count + self.colours
         tags = _fenicsx.tag_entities(grid, 1, self.numbers, numbers)
-        dS = _fenicsx.jump_measure(grid, tags, *self._scheme)
+        rule, degree = self._scheme
+        metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
+        dS = ufl.Measure("dS", domain=grid, subdomain_data=tags, metadata=metadata)
         return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
 
     @property
