@@ -40,10 +40,7 @@ SUITE_KEYS = {
 TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
     "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
     "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
-    "NTC-2018": (
-        Ntc2018,
-        {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
-    ),
+    "NTC-2018": (Ntc2018, {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"}),
     "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
     "EC8-2024": (
         Eurocode2024,

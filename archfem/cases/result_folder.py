@@ -211,10 +211,7 @@ def write_pairs(
 
 def write_modes(modes: Modes, text: str, folder: Path) -> list[Path]:
     """Write the table of modes, and draw their shapes."""
-    return [
-        _write_text(text, folder / "modes.txt"),
-        save(draw_modes(modes), folder / "modes.png"),
-    ]
+    return [_write_text(text, folder / "modes.txt"), save(draw_modes(modes), folder / "modes.png")]
 
 
 def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:

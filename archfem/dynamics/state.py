@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +103,7 @@ class Batch:
         if steps == len(self.times):
             return self
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        arrays = {key: v[:steps] for key, v in values.items() if isinstance(v, np.ndarray)}
+        arrays: Any = {key: v[:steps] for key, v in values.items() if isinstance(v, np.ndarray)}
         return replace(self, **arrays)
 
 

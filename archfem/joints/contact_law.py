@@ -88,15 +88,13 @@ def shear_over_step(start: Any, change: Any, lag: Any, limit: Any) -> tuple[Any,
     return clip_to_friction(mean + lag * change, limit), first + change - excess
 
 
-def is_closed(opening: NDArray[np.float64]) -> NDArray[np.bool_]:
+def is_closed(opening: Array) -> NDArray[np.bool_]:
     """Return where the normal spring acts."""
     # a joint that just touches is closed: the tangent of the unloaded structure would be singular
     return opening <= 0.0
 
 
-def mean_closing_rate(
-    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
-) -> NDArray[np.float64]:
+def mean_closing_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
     """Return the derivative of `mean_closing` by a parameter, given those of both gaps [-]."""
     fraction = contact_fraction(start, end)
     # the fraction is 0 / 0 where both gaps just touch
@@ -107,9 +105,7 @@ def mean_closing_rate(
     return rates[0] * by_start + rates[1] * by_end
 
 
-def contact_fraction_rate(
-    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
-) -> NDArray[np.float64]:
+def contact_fraction_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
     """Return the derivative of `contact_fraction` by a parameter, from those of both gaps [1/m]."""
     fraction, changes = contact_fraction(start, end), is_closed(start) != is_closed(end)
     total = np.where(changes, abs(start) + abs(end), np.inf)  # no derivative without a change

@@ -160,7 +160,7 @@ class JointPoints:
     def selected(self, rows: Numbers, weight: Array) -> "JointPoints":
         """Return some of the points with other weights."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        of_points = {key: v[rows] for key, v in values.items() if isinstance(v, np.ndarray)}
+        of_points: Any = {key: v[rows] for key, v in values.items() if isinstance(v, np.ndarray)}
         return replace(self, **of_points | {"weight": weight})
 
     @property

@@ -291,7 +291,5 @@ def _widest_group(
     enough = [group for group in groups if total(group) >= failures and kind(group) in kinds]
     # among groups of one class the one with most failures
     return max(
-        enough,
-        key=lambda group: (MECHANISM_KINDS.index(kind(group)), total(group)),
-        default=None,
+        enough, key=lambda group: (MECHANISM_KINDS.index(kind(group)), total(group)), default=None
     )

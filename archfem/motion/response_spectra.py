@@ -104,11 +104,7 @@ def _find_parabola_peak(row: Array) -> tuple[float, float]:
 
 
 def response_spectrum(
-    motion: Motion,
-    periods: float | Array,
-    damping: float = 0.05,
-    *,
-    component: str = "horizontal",
+    motion: Motion, periods: float | Array, damping: float = 0.05, *, component: str = "horizontal"
 ) -> Array:
     """Return the pseudo-acceleration spectrum of one component: ω² times the largest displacement.
 

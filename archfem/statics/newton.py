@@ -18,13 +18,7 @@ from archfem._optional import require_package
 from archfem._typing import Array
 from archfem._validation import check_number, check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.statics.newton_iteration import (
-    Equations,
-    NewtonEngine,
-    Residual,
-    ScipyNewton,
-    Tangent,
-)
+from archfem.statics.newton_iteration import Equations, NewtonEngine, Residual, ScipyNewton, Tangent
 
 # Residual, relative to the load, above which it cannot be round-off [-]
 MAX_ROUND_OFF_RESIDUAL = 1e-7

@@ -43,7 +43,7 @@ class ReportData:
         return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
 
     def read_result(self, text: str, figure: str, caption: str, missing: TextBlock) -> list[Any]:
-        """Return the table and picture of a command in the folder, or a note if they are missing."""
+        """Return table and picture of a command in the folder, or a note if they are missing."""
         lines = self.read_text(text)
         if lines is None:
             return [missing]

@@ -233,11 +233,7 @@ class StoneworkBuilder:
         return self._stack_courses(below, sides, levels, part)
 
     def _stack_courses(
-        self,
-        below: int,
-        sides: tuple[float, float],
-        levels: tuple[float, float],
-        part: Courses,
+        self, below: int, sides: tuple[float, float], levels: tuple[float, float], part: Courses
     ) -> int:
         """Build courses on a block, between two levels; return the number of the top one."""
         low, high = levels

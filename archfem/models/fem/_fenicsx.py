@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._petsc import PETSc
+from archfem._typing import Array
 
 # The form compiler reports each call of the C compiler on the root logger.
 logging.getLogger().addFilter(lambda record: "distutils" not in record.pathname)
@@ -122,10 +123,10 @@ def assemble_matrix(form: Any) -> sparse.csr_matrix:
     return assembled
 
 
-def assemble_vector(form: Any) -> NDArray[np.float64]:
+def assemble_vector(form: Any) -> Array:
     """Assemble a linear form."""
     vector = fem.petsc.assemble_vector(form)
-    values: NDArray[np.float64] = vector.array.copy()
+    values: Array = vector.array.copy()
     vector.destroy()
     return values
 

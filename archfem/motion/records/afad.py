@@ -5,12 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 40  # lines, at most
 _DIRECTION_PATTERN = r"[NSEWUD]-[NSEWUD]"

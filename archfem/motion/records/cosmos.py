@@ -3,12 +3,7 @@
 import re
 from enum import IntEnum
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    Channel,
-    RecordText,
-    find_column_width,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText, find_column_width
 
 _BLOCK_PATTERN = rf"^\s*({COUNT_PATTERN})\s+acceleration\s+pts\b(.*)$"
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
