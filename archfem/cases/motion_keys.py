@@ -173,7 +173,7 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
 
 def _build_vertical(source: str | Table, folder: Path) -> Motion:
     """Return the vertical motion of a file, of samples, or synthetic with a peak of its own."""
-    settings = {"file": source} if isinstance(source, str) else source
+    settings: Table = {"file": source} if isinstance(source, str) else source
     if "synthetic" in settings:
         # The vertical component of a synthetic motion: ratio 1 gives it the PGA of the table.
         return Motion.synthetic(**settings["synthetic"], vertical_ratio=1.0)

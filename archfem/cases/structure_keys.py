@@ -17,7 +17,7 @@ from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_tab
 from archfem.errors import InvalidInput
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.construction import Stage, resolve_stages, usual_stages
-from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
 from archfem.masonry.shapes import bridge_parts, bridges, rings
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
@@ -140,7 +140,7 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
     parts = dict(values)
     for key, part in NAMED_PARTS.items():
         if key in parts:
-            parts[key] = _named_parts(part, parts[key], f"structure.{key}")
+            parts[key] = _build_parts(part, parts[key], f"structure.{key}")
     if "backfill" in parts:
         fill = check_table(parts["backfill"], _keys_of(bridge_parts.Backfill), "structure.backfill")
         fill["material"] = _material(settings, fill.pop("material", "backfill"))
@@ -168,12 +168,12 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     contacts = check_table(pairs, dict.fromkeys(pairs, str), "structure.contacts")
     drawn["contacts"] = {pair: _contact(settings, name) for pair, name in contacts.items()}
     # Layers name their materials in the drawing, so that all materials are passed.
-    names = {*MATERIALS, *settings.get("materials", {})}
+    names = {*MATERIAL_PRESETS, *settings.get("materials", {})}
     drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
     return drawn
 
 
-def _named_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
+def _build_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
     """Return parts of one kind: common keys of the table, and a subtable for each part."""
     subtables = {name: value for name, value in table.items() if isinstance(value, dict)}
     if not subtables:
@@ -200,15 +200,15 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
 
 def _material(settings: Table, name: str) -> Material:
     """Return a material: a preset, or described or changed by a table of the case."""
-    return _described(settings, "materials", name, MATERIALS, Material)
+    return _resolve_preset(settings, "materials", name, MATERIAL_PRESETS, Material)
 
 
 def _contact(settings: Table, name: str) -> Contact:
     """Return a contact: a preset, or described or changed by a table of the case."""
-    return _described(settings, "contacts", name, CONTACTS, Contact)
+    return _resolve_preset(settings, "contacts", name, CONTACT_PRESETS, Contact)
 
 
-def _described(
+def _resolve_preset(
     settings: Table, section: str, name: str, presets: Table, cls: Callable[..., Described]
 ) -> Described:
     """Return a named preset with the changes of its table, or the object of the table alone."""

@@ -316,7 +316,7 @@ class EveryMechanism:
         met: set[str] = set()
 
         def moves(state: FailureState) -> bool:
-            pattern = (state.side, state.slides, state.apart, state.sense)
+            pattern: Any = (state.side, state.slides, state.apart, state.sense)
             # the closed loops of blocks decide most patterns without a linear programme
             freedoms = joint_freedoms(*(values[columns] for values in pattern))
             if not verifier.loop_check.permits_motion(freedoms):

@@ -46,6 +46,7 @@ class PartialStructure(LinearBlockModel):
         other = self.copy_with(
             standing=self.standing | new, centred=self.centred | (new & centring)
         )
+        # points that begin to act are closed and without slip in the present displacement
         begin = other._active_points & ~self._active_points
         gaps = np.stack([self.operator.openings(q), self.operator.slips(q)])
         initial = np.zeros_like(gaps) if self.initial_gaps is None else self.initial_gaps

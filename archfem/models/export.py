@@ -69,6 +69,7 @@ class Solids:
         """Return σ_xx, σ_yy and σ_xy of every polygon (p, 3) [Pa]; None where blocks are rigid."""
         if self.model.cells.stress is None:
             return None
+        # fixed blocks do not deform: they have no stress
         stress = np.full((len(self.cells.polygons), 3), np.nan)
         stress[: len(self.model.cells.polygons)] = (self.model.cells.stress @ q).reshape(-1, 3)
         return stress

@@ -59,6 +59,7 @@ class LinearBlockModel(Model):
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced: joints have gaps and slips at q = 0."""
         offset = self.initial_gaps
+        # gaps of moved supports add to those of construction
         if motion.any():
             gaps = block_motion_gaps(self.structure, self.operator.points, motion)
             offset = gaps if offset is None else gaps + offset
@@ -135,6 +136,7 @@ class LinearBlockStep:
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""
+        # mean over the step, shifted by the lag of damping: linear in time
         start, lag = self.joints.start, self.joints.damping_lag
         of_blocks = self.model.block_stiffness @ ((0.5 - lag) * start + (0.5 + lag) * q)
         return np.asarray(of_blocks) + self.joints.force(q)

@@ -46,6 +46,7 @@ class LinearObserver(Observer):
     @cached_property
     def _end_rows(self) -> sparse.csr_matrix:
         """Matrix from coordinates to displacements of the joint ends (4 n_joints, n)."""
+        # an end is midway between its two blocks, and supports do not depend on the coordinates
         fixed = sparse.csr_matrix((2, self.matrix.shape[1]))
         rows = [
             sum(
@@ -88,7 +89,7 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     of_blocks = sparse.kron(mean, sparse.identity(2)) @ cells.shape_functions
     return LinearObserver(
         sparse.vstack([of_faces, of_blocks], "csr"),
-        np.concatenate([face_offset, np.zeros(2 * blocks)]),
+        np.concatenate([face_offset, np.zeros(2 * blocks)]),  # blocks are read from zero on
         len(structure.joints),
         structure,
         cells,

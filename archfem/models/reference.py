@@ -181,6 +181,7 @@ class MonolithicModel(Model):
 
     def spread(self, q: Array) -> Array:
         """Return displacements of all nodes, those of fixed blocks included (2 m,) [m]."""
+        # one workspace: each call overwrites what the last one returned
         self._displacement[self.free] = q
         return self._displacement
 

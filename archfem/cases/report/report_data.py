@@ -44,6 +44,7 @@ class ReportData:
 
     def read_result(self, text: str, figure: str, caption: str, missing: TextBlock) -> list[Any]:
         """Return table and picture of a command in the folder, or a note if they are missing."""
+        # a report shows what other commands left in the folder, and computes nothing itself
         lines = self.read_text(text)
         if lines is None:
             return [missing]
