@@ -291,7 +291,10 @@ def _solve_collapse(
     if isinstance(live, Settlement):
         support = np.zeros((len(stones.rigid_regions.blocks), 3))
         support[stones.rigid_regions.blocks.index(live.place(structure))] = live.motion
-        programme, scale = _settlement_programme(dead, support), dead.blocks.force_unit
+        # the programme of least work on the motion of the supports
+        intrados, extrados, slip = dead.blocks.gaps(support)
+        programme = replace(dead, force_cost=np.concatenate([intrados, extrados, -slip]))
+        scale = dead.blocks.force_unit
         bounded, unbounded = Outcome.SETTLES, Outcome.LOCKS
     else:
         programme, scale = dead.with_load_factor(stones.load(list_loads(live))), -1.0
@@ -317,12 +320,6 @@ def _solve_collapse(
     if friction == "coulomb":
         warn_sliding(result.sliding, result.sliding_names, result.factor)
     return result
-
-
-def _settlement_programme(dead: Programme, support: Array) -> Programme:
-    """Return the programme of least work on a motion of the supports."""
-    intrados, extrados, slip = dead.blocks.gaps(support)
-    return replace(dead, force_cost=np.concatenate([intrados, extrados, -slip]))
 
 
 def _without_forces(optimum: Optimum) -> Optimum:

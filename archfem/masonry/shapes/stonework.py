@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import cos
+from typing import Any
 
 import numpy as np
 
@@ -185,19 +186,11 @@ class StoneworkBuilder:
         self.joints.append(Joint(pair, *ends, self.contact, name, part.name, part.role))
 
     def _add_stone(
-        self,
-        outline: Sequence[Point],
-        words: str,
-        part: Courses,
-        *,
-        fixed: bool = False,
-        structured: bool = False,
+        self, outline: Sequence[Point], words: str, part: Courses, **options: Any
     ) -> int:
         """Add a block of a pier or sidewall and return its number."""
         name = f"{part.name}, {words}"
-        return self.add(
-            outline, name, part=part.name, role=part.role, fixed=fixed, structured=structured
-        )
+        return self.add(outline, name, part=part.name, role=part.role, **options)
 
     def _build_pier(self, pier: Pier, left: Face, right: Face) -> int:
         """Build a pier under two springings; return the number of its skewback."""
