@@ -1,6 +1,7 @@
 """Every benchmark script starts: each runs with `--quick`, which takes its smallest scene."""
 
 import importlib
+import logging
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -14,7 +15,9 @@ SCRIPTS = Path(__file__).parent / "benchmarks"
 OUTDATED = {"drift_and_equality", "suite_of_records", "study_kills"}
 
 NAMES = sorted(
-    path.stem for path in SCRIPTS.glob("*.py") if "def main(arguments" in path.read_text("utf-8") and path.stem not in OUTDATED
+    path.stem
+    for path in SCRIPTS.glob("*.py")
+    if "def main(arguments" in path.read_text("utf-8") and path.stem not in OUTDATED
 )
 """Scripts with a command line of their own."""
 
@@ -34,8 +37,19 @@ def scripts():
             del sys.modules[name]
 
 
+@pytest.fixture
+def logging_levels():
+    """Restore the logging levels that a script sets for its process."""
+    logger, disabled = logging.getLogger("archfem"), logging.root.manager.disable
+    level = logger.level
+    yield
+    logger.setLevel(level)
+    logging.disable(disabled)
+
+
+@pytest.mark.usefixtures("scripts", "logging_levels")
 @pytest.mark.parametrize("name", NAMES)
-def test_benchmark_starts(name, scripts, capsys, monkeypatch, tmp_path):
+def test_benchmark_starts(name, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     if name in FIRST and find_spec("openseespy"):
         command = [sys.executable, str(SCRIPTS / f"{name}.py"), "--quick"]

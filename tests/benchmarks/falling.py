@@ -28,9 +28,9 @@ def run_archfem(arch: af.Structure, steps: int) -> tuple[np.ndarray, float]:
     # A negligible acceleration keeps the run from ending when all blocks are at rest.
     ground = af.Motion(np.full(steps + 1, 1e-9), DT)
     start = af.dynamics.LooseBlocks.as_built(arch)
-    falling.last(start, 2.0 * DT, ground)  # compiles
+    falling.final_frame(start, 2.0 * DT, ground)  # compiles
     watch = stopwatch()
-    end = falling.last(start, steps * DT, ground)
+    end = falling.final_frame(start, steps * DT, ground)
     return end.poses[:, :2], 1e3 * watch()[0] / steps
 
 

@@ -79,7 +79,7 @@ def run_rigid_blocks(motion: af.Motion) -> tuple[tuple[str, float, float], float
         af.dynamics.RigidBlockSimulation(arch, dt=RIGID, level=-100.0),
         af.dynamics.LooseBlocks.as_built(arch),
     )
-    falling.last(start, 10.0 * RIGID, motion)  # compiles
+    falling.final_frame(start, 10.0 * RIGID, motion)  # compiles
     watch = stopwatch()
     frames = list(falling.frames(start, motion.duration, motion, spacing=0.005))
     spent = watch()[1]

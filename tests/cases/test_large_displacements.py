@@ -40,7 +40,7 @@ def test_displacements_reach_the_model(path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ("model.fidelity=monolithic", "the rung 'monolithic' does not know: use 'full'"),
+        ("model.fidelity=monolithic", "do not exist with fidelity 'monolithic': use 'full'"),
         ("model.displacements=far", "displacements 'far' are not known"),
         ("analysis.scheme=newmark", r"does not keep the energy of blocks that turn far.*Conserv"),
         ("model.quadrature=exact", None),

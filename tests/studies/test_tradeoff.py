@@ -23,7 +23,7 @@ def case(monkeypatch):
         monkeypatch.setattr(f"{module}.reference_settings", lambda structure: REFERENCES)
     monkeypatch.setattr(
         "archfem.studies.convergence.candidate_settings",
-        lambda structure: candidate_settings(structure, **GIVEN, steps=STEPS),
+        lambda structure: candidate_settings(structure, *GIVEN.values(), STEPS),
     )
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
     motion = {"synthetic": {"duration": 0.5, "pga": 2.0, "seed": 1}}
@@ -51,7 +51,7 @@ def test_a_case_is_compared_as_its_structure_is(case, tmp_path):
 
 def test_settings_that_ran_are_not_run_again(case, tmp_path, monkeypatch):
     first = case_accuracy(case, tmp_path)
-    monkeypatch.setattr("archfem.studies.convergence.timed", None)
+    monkeypatch.setattr("archfem.studies.convergence.time_run", None)
     again = case_accuracy(case, tmp_path)
     assert again == first
 

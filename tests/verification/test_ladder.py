@@ -184,7 +184,7 @@ def test_rungs_may_differ_from_block_to_block(ring):
     assert off < 0.003
     with pytest.raises(af.InvalidInput, match="no blocks or parts"):
         af.build(ring, fidelity={"voussoir 99": "full"})
-    with pytest.raises(af.InvalidInput, match=r"rungs \['soft'\] are not known"):
+    with pytest.raises(af.InvalidInput, match=r"fidelities \['soft'\] are not known"):
         af.build(ring, fidelity={"rest": "soft"})
 
 
