@@ -38,8 +38,8 @@ CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 
 KERNEL_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
 
-# Compiles a kernel that Python calls, and stores it on disk. Kernels that only kernels call are part
-# of the callers' code: a file for each would cost the generation of machine code once more.
+# Compiles a kernel that Python calls, and stores it on disk. Kernels that only kernels call are
+# part of the callers' code: a file for each would cost the generation of machine code once more.
 entry: Any = numba.njit(**KERNEL_OPTIONS, cache=True)
 
 # Compiles a function that allocates no arrays.
