@@ -1,7 +1,7 @@
 """Linear algebra on one thread, so that results are equal bit for bit on any machine.
 
 The threads of a BLAS split a sum among themselves, and the rounding depends on their number. Where
-a joint is about to open, the last bit decides. Problems are small: one thread is also the fastest.
+a joint is about to open, the last bit decides. Problems are small, so one thread is also fastest.
 """
 
 import sys

@@ -177,7 +177,7 @@ def matches_annotation(value: Any, hint: Any) -> bool:
         return any(matches_annotation(value, each) for each in inner)
     if origin is Literal:
         return value in inner
-    if origin is _CALLABLE:
+    if origin is Callable:
         return callable(value)
     if origin is np.ndarray:
         return _is_array(value)
@@ -194,11 +194,6 @@ def _split_annotation(hint: Hashable) -> tuple[Any, tuple[Any, ...]]:
     return get_origin(hint), get_args(hint)
 
 
-_CALLABLE = get_origin(Callable[[], None])
-_MAPPINGS = (Mapping, dict)
-_MISSING = object()
-
-
 def _is_instance(value: Any, kind: Any) -> bool:
     """Return whether a value is an instance of a class or protocol, or a valid number."""
     if kind is float:  # the function itself checks for NaN and infinity
@@ -210,11 +205,9 @@ def _is_instance(value: Any, kind: Any) -> bool:
     if kind is Any or not isinstance(kind, type):
         return True
     if getattr(kind, "_is_protocol", False):
-        members = [name for name in vars(kind) if not name.startswith("_")]
+        members, missing = [name for name in vars(kind) if not name.startswith("_")], object()
         # properties are not evaluated, which may be expensive
-        return all(
-            inspect.getattr_static(value, name, _MISSING) is not _MISSING for name in members
-        )
+        return all(inspect.getattr_static(value, name, missing) is not missing for name in members)
     return isinstance(value, kind)
 
 
@@ -250,9 +243,9 @@ def _describe(hint: Any) -> str:
         return f"one of {inner}"
     if origin is np.ndarray:
         return "an array of finite numbers"
-    if origin is _CALLABLE:
+    if origin is Callable:
         return "a function"
-    if isinstance(origin, type) and issubclass(origin, Iterable) and origin not in _MAPPINGS:
+    if isinstance(origin, type) and issubclass(origin, Iterable) and origin not in (Mapping, dict):
         items = [_describe(each) for each in inner if each is not ...]
         return f"a row of {', '.join(items)}"
     if hint in (None, NoneType):

@@ -20,14 +20,11 @@ G = 9.81
 # Standard gravity, the unit g of accelerograms and spectra [m/s²]
 STANDARD_GRAVITY = 9.80665
 
-# Units that pint takes for dimensionless numbers
-ANGLE_UNITS = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
-
-_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
-_RAISED = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
+_POWER_PATTERN = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
+_SUPERSCRIPT_PATTERN = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
 
 # Degrees, read without loading the registry of units, which is slow
-_DEGREES = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+_DEGREES_PATTERN = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
 
 
 @cache
@@ -84,7 +81,7 @@ def in_degrees(value: Any, key: str) -> float:
     Raises:
         InvalidInput: it is no angle, text without a unit, or a bare number up to 2π.
     """
-    if isinstance(value, str) and (plain := _DEGREES.fullmatch(value.strip())):
+    if isinstance(value, str) and (plain := _DEGREES_PATTERN.fullmatch(value.strip())):
         return float(plain[1])
     if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
         raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
@@ -104,9 +101,13 @@ def _check_text(text: str, unit: str, key: str) -> None:
             f"{key} = {short_repr(text)} is no quantity, for it has {len(text)} letters: write a "
             f"number in {unit}"
         )
-    powers = [match[1] for match in _POWER.finditer(text)]
+    powers = [match[1] for match in _POWER_PATTERN.finditer(text)]
     # no unit of mechanics has a power above 12
-    if _RAISED.search(text) or None in powers or prod(int(power) for power in powers) > 12:
+    if (
+        _SUPERSCRIPT_PATTERN.search(text)
+        or None in powers
+        or prod(int(power) for power in powers) > 12
+    ):
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 
@@ -122,7 +123,9 @@ def _convert(text: str, unit: str, key: str) -> float:
         text = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", text))
     try:
         quantity = registry.Quantity(text)
-        if unit == "1" and ANGLE_UNITS & {name for name, _ in quantity.unit_items()}:
+        # pint takes angles for pure numbers
+        angles = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
+        if unit == "1" and angles & {name for name, _ in quantity.unit_items()}:
             angle = float(quantity.to("radian").magnitude)
             raise InvalidInput(
                 f"{key} = {text!r} is an angle, and this must be a pure number: a coefficient of "

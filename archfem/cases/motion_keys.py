@@ -40,10 +40,7 @@ SUITE_KEYS = {
 TARGET_SPECTRA: Mapping[str, tuple[Callable[..., DesignSpectrum], Table]] = {
     "TBEC-2018": (Tbec2018, {"ss": "1", "s1": "1", "site": str}),
     "EC8": (Eurocode8, {"ag": "1", "ground": str, "type": int}),
-    "NTC-2018": (
-        Ntc2018,
-        {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"},
-    ),
+    "NTC-2018": (Ntc2018, {"ag": "1", "f0": "1", "tc_star": "s", "site": str, "topography": "1"}),
     "ASCE-7-22": (Asce2022, {"sds": "1", "sd1": "1", "tl": "s"}),
     "EC8-2024": (
         Eurocode2024,
@@ -176,7 +173,7 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
 
 def _build_vertical(source: str | Table, folder: Path) -> Motion:
     """Return the vertical motion of a file, of samples, or synthetic with a peak of its own."""
-    settings = {"file": source} if isinstance(source, str) else source
+    settings: Table = {"file": source} if isinstance(source, str) else source
     if "synthetic" in settings:
         # The vertical component of a synthetic motion: ratio 1 gives it the PGA of the table.
         return Motion.synthetic(**settings["synthetic"], vertical_ratio=1.0)

@@ -166,8 +166,9 @@ def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> lis
     }
     if "fall_pose" in history.dataset:
         figures["fall.png"] = draw_fall(history)
-    files = write_motion(run.motion, folder) if case.suite is not None else []
-    files += [save(figure, folder / name) for name, figure in figures.items()]
+    if case.suite is not None:
+        figures = {"motion.png": draw_motion(run.motion)} | figures
+    files = [save(figure, folder / name) for name, figure in figures.items()]
     if case.output.get("animation", False):
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import
 
@@ -196,11 +197,6 @@ def write_suite(suite: Suite, target: DesignSpectrum | None, folder: Path) -> li
     return [save(draw_suite(suite, target), folder / "spectra.png")]
 
 
-def write_motion(motion: Motion, folder: Path) -> list[Path]:
-    """Draw a motion as applied, with its integrals."""
-    return [save(draw_motion(motion), folder / "motion.png")]
-
-
 def write_pairs(
     runs: Mapping[str, History], at_rest: DeadLoadResult, text: str, folder: Path
 ) -> list[Path]:
@@ -219,10 +215,7 @@ def write_pairs(
 
 def write_modes(modes: Modes, text: str, folder: Path) -> list[Path]:
     """Write the table of modes, and draw their shapes."""
-    return [
-        _write_text(text, folder / "modes.txt"),
-        save(draw_modes(modes), folder / "modes.png"),
-    ]
+    return [_write_text(text, folder / "modes.txt"), save(draw_modes(modes), folder / "modes.png")]
 
 
 def write_accuracy(accuracy: Accuracy, text: str, folder: Path) -> list[Path]:

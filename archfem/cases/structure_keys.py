@@ -17,18 +17,8 @@ from archfem.cases.toml_file import NumberOrWord, Table, check_choice, check_tab
 from archfem.errors import InvalidInput
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.construction import Stage, resolve_stages, usual_stages
-from archfem.masonry.materials import CONTACTS, MATERIALS, Contact, Material
-from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
-from archfem.masonry.shapes.bridges import arcade, bridge, buttressed_arch
-from archfem.masonry.shapes.rings import (
-    arch_along,
-    arch_on_piers,
-    circular_arch,
-    column,
-    elliptical_arch,
-    flat_arch,
-    pointed_arch,
-)
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
+from archfem.masonry.shapes import bridge_parts, bridges, rings
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.outlines import Layer, surveyed
 
@@ -60,13 +50,18 @@ JOINTED_FILL_KEYS = {"law": str, "piece_size": "m", "friction_angle": "degree", 
 DEAD_LOAD_KEYS = {"stages": str, "layers": int, "stage": [dict]}
 STAGE_KEYS = {"name": str, "blocks": [(int, str)], "centring": bool, "strike": bool}
 
-_SHAPE_FUNCTIONS = (
-    *(circular_arch, pointed_arch, elliptical_arch, flat_arch, arch_along, buttressed_arch),
-    *(arcade, column, arch_on_piers, bridge),
+_SHAPES = (
+    *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
+    *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
+    *(rings.arch_on_piers, bridges.bridge),
 )
-SHAPES = {shape.__name__: shape for shape in _SHAPE_FUNCTIONS} | {"outlines": surveyed}
+SHAPE_FUNCTIONS = {shape.__name__: shape for shape in _SHAPES} | {"outlines": surveyed}
 # Parts of a bridge of which there may be several, from left to right, each under its name.
-NAMED_PARTS = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+NAMED_PARTS = {
+    "arches": bridge_parts.Arch,
+    "piers": bridge_parts.Pier,
+    "sidewalls": bridge_parts.Sidewall,
+}
 
 _recent_structures: OrderedDict[str, Structure] = OrderedDict()
 
@@ -94,8 +89,8 @@ def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure of a case."""
     table = settings.get("structure", {})
-    name = check_choice(table.get("shape"), SHAPES, "structure.shape")
-    keys = {**_keys_of(SHAPES[name]), "shape": str, "fill": dict}
+    name = check_choice(table.get("shape"), SHAPE_FUNCTIONS, "structure.shape")
+    keys = {**_keys_of(SHAPE_FUNCTIONS[name]), "shape": str, "fill": dict}
     if name == "arcade":  # one number of voussoirs for each of its arches
         keys["voussoirs"] = [int]
     elif name == "outlines":
@@ -115,7 +110,7 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     elif name == "outlines":
         values = _outline_arguments(values, settings, folder)
     section = f"structure of shape {name!r}"
-    structure = _call(SHAPES[name], section, material=stone, contact=contact, **values)
+    structure = _call(SHAPE_FUNCTIONS[name], section, material=stone, contact=contact, **values)
     return _divide_fill(structure, fill)
 
 
@@ -145,15 +140,15 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
     parts = dict(values)
     for key, part in NAMED_PARTS.items():
         if key in parts:
-            parts[key] = _named_parts(part, parts[key], f"structure.{key}")
+            parts[key] = _build_parts(part, parts[key], f"structure.{key}")
     if "backfill" in parts:
-        fill = check_table(parts["backfill"], _keys_of(Backfill), "structure.backfill")
+        fill = check_table(parts["backfill"], _keys_of(bridge_parts.Backfill), "structure.backfill")
         fill["material"] = _material(settings, fill.pop("material", "backfill"))
         fill["contact"] = _contact(settings, fill.pop("contact", "soil to stone"))
-        parts["backfill"] = _call(Backfill, "structure.backfill", **fill)
+        parts["backfill"] = _call(bridge_parts.Backfill, "structure.backfill", **fill)
     if "paving" in parts:
-        paving = check_table(parts["paving"], _keys_of(Paving), "structure.paving")
-        parts["paving"] = _call(Paving, "structure.paving", **paving)
+        paving = check_table(parts["paving"], _keys_of(bridge_parts.Paving), "structure.paving")
+        parts["paving"] = _call(bridge_parts.Paving, "structure.paving", **paving)
     return parts
 
 
@@ -173,12 +168,12 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
     contacts = check_table(pairs, dict.fromkeys(pairs, str), "structure.contacts")
     drawn["contacts"] = {pair: _contact(settings, name) for pair, name in contacts.items()}
     # Layers name their materials in the drawing, so that all materials are passed.
-    names = {*MATERIALS, *settings.get("materials", {})}
+    names = {*MATERIAL_PRESETS, *settings.get("materials", {})}
     drawn["materials"] = {name: _material(settings, name) for name in sorted(names)}
     return drawn
 
 
-def _named_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
+def _build_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
     """Return parts of one kind: common keys of the table, and a subtable for each part."""
     subtables = {name: value for name, value in table.items() if isinstance(value, dict)}
     if not subtables:
@@ -205,15 +200,15 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
 
 def _material(settings: Table, name: str) -> Material:
     """Return a material: a preset, or described or changed by a table of the case."""
-    return _described(settings, "materials", name, MATERIALS, Material)
+    return _resolve_preset(settings, "materials", name, MATERIAL_PRESETS, Material)
 
 
 def _contact(settings: Table, name: str) -> Contact:
     """Return a contact: a preset, or described or changed by a table of the case."""
-    return _described(settings, "contacts", name, CONTACTS, Contact)
+    return _resolve_preset(settings, "contacts", name, CONTACT_PRESETS, Contact)
 
 
-def _described(
+def _resolve_preset(
     settings: Table, section: str, name: str, presets: Table, cls: Callable[..., Described]
 ) -> Described:
     """Return a named preset with the changes of its table, or the object of the table alone."""

@@ -32,9 +32,9 @@ _DEEP_KEY = re.compile(
 )
 _DEEP_VALUE = re.compile(rf"(?:[\[{{]\s*+(?:{_KEY_PART}\s*+=\s*+)?+){{{MAX_TABLE_DEPTH}}}")
 # A path and a value on both sides of an equals sign that is not in quotes.
-_CHANGE = re.compile(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", re.DOTALL)
+_CHANGE_PATTERN = re.compile(r"""((?:[^"'=]|"[^"]*"|'[^']*')+)=(.*)""", re.DOTALL)
 # A dot between names that is not in quotes.
-_DOT = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")
+_DOT_PATTERN = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def remove_key(settings: dict[str, Any], path: str) -> None:
 
 def apply_change(settings: dict[str, Any], text: str) -> None:
     """Set one value from "section.key=value", read as TOML, or else as a word."""
-    match = _CHANGE.fullmatch(text)
+    match = _CHANGE_PATTERN.fullmatch(text)
     if not match or not match[1].strip():
         raise InvalidInput(f"'{text}' is not a change: write section.key=value")
     path, word = match.groups()
@@ -158,7 +158,7 @@ def set_value(settings: dict[str, Any], path: str, value: Any) -> None:
 
 def split_key_path(path: str) -> list[str]:
     """Split "section.key" into the names of the tables and the key."""
-    names = [name.strip() for name in _DOT.split(path)]
+    names = [name.strip() for name in _DOT_PATTERN.split(path)]
     names = [name[1:-1] if re.fullmatch(r"""".*"|'.*'""", name) else name for name in names]
     if not all(names) or any(mark in name for name in names for mark in "\"'"):
         raise InvalidInput(

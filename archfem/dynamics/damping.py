@@ -282,7 +282,7 @@ class _RockingBlock:
         swing = sqrt(2.0 * self.tilt * inertia / (weight * self.breadth / 2.0))
         end = (2.0 * impacts + 0.5) * swing
         equation = Equation(model, Motion(np.zeros(2), end), damping)
-        start = equation.at_rest(self.tilted(weight), memory=dead.model.memory)
+        start = equation.at_rest(self.tilt_coordinates(weight), memory=dead.model.memory)
         angle, energy = [self.tilt], [equation.energy(start)]
         for batch in stepper_for("auto", equation).batches(start, dt, end):
             angle += [-batch.state(k).q[2] for k in range(len(batch.times))]
@@ -291,8 +291,8 @@ class _RockingBlock:
         above = np.array(energy)[:, :2].sum(axis=1) - rest[:2].sum()
         return _restitution_from_energies(np.array(angle), above, impacts)
 
-    def tilted(self, weight: float) -> Array:
-        """Return coordinates of the block tilted to the right about an edge with its weight."""
+    def tilt_coordinates(self, weight: float) -> Array:
+        """Return the coordinates of the block on its right edge, which carries its weight."""
         # a compressed strip s at the edge: k_n tilt s²/2 is the weight
         strip = sqrt(2.0 * weight / (self.contact.normal_stiffness * self.tilt))
         lift = self.tilt * (self.breadth / 2.0 - strip)

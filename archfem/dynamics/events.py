@@ -36,7 +36,7 @@ from archfem.limit.mechanism_count import (
     counted_mechanisms,
     matching_definitions,
 )
-from archfem.limit.mechanism_kinematics import cached_verifier, joint_freedoms
+from archfem.limit.mechanism_kinematics import get_verifier, joint_freedoms
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.structure import Structure, join_joint_names
 
@@ -216,7 +216,7 @@ class CountedMechanism:
         """
         if self.over == "record":
             return _monitor_record(structure, criteria)
-        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
+        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
 
         def count(joints: xr.Dataset) -> Mechanism | None:
             return counted_mechanism(joints, kinds=self.kinds)
@@ -273,7 +273,7 @@ class MovingMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier, unbroken = cached_verifier(structure), DurationCounter(criteria.duration)
+        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
 
         def moves(state: FailureState) -> frozenset[str]:
             motion = verifier.verify_if_moving(state.joint_states())
@@ -322,7 +322,7 @@ class EveryMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier = cached_verifier(structure)
+        verifier = get_verifier(structure)
         scanned = sorted({*np.flatnonzero(structure.judged), *verifier.rigid_regions.joints})
         roles = {joint.part: joint.role for joint in structure.joints}
         parts = np.array([structure.joints[number].part for number in scanned])
@@ -333,7 +333,7 @@ class EveryMechanism:
         ever_failed = RecordCounter(structure, criteria)
 
         def moves(state: FailureState) -> bool:
-            pattern = (state.side, state.slides, state.apart, state.sense)
+            pattern: Any = (state.side, state.slides, state.apart, state.sense)
             # the closed loops of blocks decide most patterns without a linear programme
             freedoms = joint_freedoms(*(values[columns] for values in pattern))
             if not verifier.loop_check.permits_motion(freedoms):
@@ -463,9 +463,6 @@ def _as_condition(mechanism: object) -> frozenset[str]:
 
 def _check_kinds(kinds: Any) -> None:
     """Refuse unknown classes of mechanisms."""
-    if (
-        not isinstance(kinds, list | tuple)
-        or not kinds
-        or not all(kind in MECHANISM_KINDS for kind in kinds)
-    ):
+    known = isinstance(kinds, list | tuple) and all(kind in MECHANISM_KINDS for kind in kinds)
+    if not known or not kinds:
         raise InvalidInput(f"kinds = {kinds!r}: give some of {MECHANISM_KINDS}, as a tuple")

@@ -40,11 +40,13 @@ def write_vtk(model: Model, run: xr.Dataset, path: str | Path) -> Path:
     joints = [np.arange(4 * k, 4 * k + 4) for k in range(len(model.structure.joints))]
     for number, frame in enumerate(frames(solids, run)):
         files = [folder / f"{part}_{number:05d}.vtu" for part in ("blocks", "joints")]
-        data: dict[str, NDArray[Any]] = {"block": solids.owner.astype(np.int64)}
+        data: dict[str, NDArray[Any]] = {"block": solids.cells.owner.astype(np.int64)}
         if frame.stress is not None:
             data |= dict(zip(STRESS_COMPONENTS, frame.stress.T, strict=True))
         moved = frame.displacement
-        write_vtu(files[0], solids.places, solids.polygons, {"displacement": moved}, data)
+        write_vtu(
+            files[0], solids.cells.places, solids.cells.polygons, {"displacement": moved}, data
+        )
         gaps = solids.joint_faces(moved).reshape(-1, 2)
         corners = solids.corners.reshape(-1, 2)
         write_vtu(files[1], corners, joints, {"displacement": gaps}, _joint_data(run, frame.time))
@@ -58,11 +60,11 @@ def write_xdmf(model: Model, run: xr.Dataset, path: str | Path) -> Path:
     """Write the fields of a run as XDMF: a text file, and an HDF5 file of all numbers."""
     path = _check_suffix(path, ".xdmf")
     solids, numbers = Solids(model), path.with_suffix(".h5")
-    mixed = np.concatenate([[*_xdmf_cell_type(len(cell)), *cell] for cell in solids.polygons])
+    mixed = np.concatenate([[*_xdmf_cell_type(len(cell)), *cell] for cell in solids.cells.polygons])
     data = {
-        "points": (("point", "axis"), solids.places),
+        "points": (("point", "axis"), solids.cells.places),
         "cells": (("entry",), mixed.astype(np.int64)),
-        "block": (("cell",), solids.owner.astype(np.int64)),
+        "block": (("cell",), solids.cells.owner.astype(np.int64)),
     }
     series = list(frames(solids, run))
     for number, frame in enumerate(series):
@@ -92,10 +94,10 @@ def frames(solids: Solids, run: xr.Dataset) -> Iterator[FieldFrame]:
         return
     # loose blocks are rigid: points turn about the centroids, and stresses are zero
     blocks = solids.model.structure.blocks
-    arm = solids.places - np.array([block.centroid for block in blocks])[solids.block]
-    stress = None if solids.model.cells.stress is None else np.zeros((len(solids.owner), 3))
+    arm = solids.cells.places - np.array([block.centroid for block in blocks])[solids.cells.block]
+    stress = None if solids.model.cells.stress is None else np.zeros((len(solids.cells.owner), 3))
     for time, poses in zip(run["fall_time"].values, run["fall_pose"].values, strict=True):
-        pose = poses[solids.block]
+        pose = poses[solids.cells.block]
         c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
         turned = np.column_stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]])
         yield FieldFrame(float(time), pose[:, :2] + turned - arm, stress)
@@ -129,7 +131,7 @@ def _xdmf_cell_type(size: int) -> tuple[int, ...]:
 
 def _xdmf_text(solids: Solids, series: list[FieldFrame], entries: int, file: str) -> str:
     """Return the XML text that describes the arrays of the HDF5 file."""
-    points, cells = len(solids.places), len(solids.polygons)
+    points, cells = len(solids.cells.places), len(solids.cells.polygons)
 
     def item(name: str, shape: str, kind: str = "Float") -> str:
         return (

@@ -258,10 +258,7 @@ def _fall_dataset(
             "fall_pose": (("fall_frame", "block", "pose"), poses, attributes),
             "fall_ground": (("fall_frame", "axis"), motion.at(times), ground),
         },
-        {
-            "fall_time": ("fall_frame", times, {"units": "s"}),
-            "pose": ["x", "y", "turn"],
-        },
+        {"fall_time": ("fall_frame", times, {"units": "s"}), "pose": ["x", "y", "turn"]},
         {
             "handover_strain": released.strain_energy,
             "handover_kinetic": np.array([released.kinetic_before, released.kinetic_after]),

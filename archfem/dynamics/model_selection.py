@@ -55,12 +55,7 @@ class Level(NamedTuple):
 # 0.005 and 0.001
 MODEL_LEVELS = (
     Level(
-        (
-            ("rigid", (1, 1)),
-            ("faces", (2, 2)),
-            ("faces", (4, 4)),
-            ("condensed", (4, 4)),
-        ),
+        (("rigid", (1, 1)), ("faces", (2, 2)), ("faces", (4, 4)), ("condensed", (4, 4))),
         ("condensed", (8, 8)),
     ),
     Level((("faces", (8, 8)), ("condensed", (8, 8))), ("condensed", (12, 12))),

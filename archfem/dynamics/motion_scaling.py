@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, sqrt
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -19,6 +20,7 @@ from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import (
     Ending,
+    History,
     first_mechanisms,
     partial_history,
 )
@@ -197,23 +199,21 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
 
     def run_scaled(scale: float) -> ScaledRun:
         scaled = motion.scaled(scale)
-        try:
-            run = time_history(
-                model,
-                scaled,
-                start=start,
-                damping=damping,
-                dt=dt,
-                until=EveryMechanism(),
-                criteria=criteria,
-                method=method if isinstance(method, str) else method(scaled),
-            )
-        except DidNotConverge as error:
-            run = partial_history(error)
+        solver = method if isinstance(method, str) else method(scaled)
+        options = {"until": EveryMechanism(), "criteria": criteria, "method": solver}
+        run = _run_as_far(model, scaled, start=start, damping=damping, dt=dt, **options)
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome)
 
     definitions = (*applicable_definitions(model.structure, criteria), "verified")
     return search_scales(run_scaled, definitions, precision, _admissible_range(between, motion))
+
+
+def _run_as_far(model: Model, motion: Motion, **options: Any) -> History:
+    """Return the history of a run, up to a step that has no equilibrium."""
+    try:
+        return time_history(model, motion, **options)
+    except DidNotConverge as error:
+        return partial_history(error)
 
 
 def _valid_search(precision: float, between: tuple[float, float]) -> bool:
@@ -390,10 +390,7 @@ def collapse_scale(
     begin = start or dead_load(model)
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
-        try:
-            run = time_history(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
-        except DidNotConverge as error:
-            run = partial_history(error)
+        run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         return ScaledRun(scale, {}, run.ending, run.outcome, run.fall)
 
     limits = _admissible_range(between, motion)

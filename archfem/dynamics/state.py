@@ -1,7 +1,8 @@
 """States, steps and batches of steps, exchanged between solvers and the recorder of a run."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,15 +102,9 @@ class Batch:
         """
         if steps == len(self.times):
             return self
-        return replace(
-            self,
-            times=self.times[:steps],
-            resultants=self.resultants[:steps],
-            iterations=self.iterations[:steps],
-            smallest_step=self.smallest_step[:steps],
-            energy=self.energy[:steps],
-            readings=None if self.readings is None else self.readings[:steps],
-        )
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        arrays: Any = {key: v[:steps] for key, v in values.items() if isinstance(v, np.ndarray)}
+        return replace(self, **arrays)
 
 
 @dataclass(frozen=True, eq=False)

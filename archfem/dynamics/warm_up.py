@@ -34,9 +34,8 @@ COMPILED_VARIANTS = (
     "newton, Newmark",
 )
 
-# Ground motion of a few time steps [s]
-_DT = 0.005
-_SHORT_MOTION = Motion(np.full(5, 0.1), _DT)
+# Ground motion of a few time steps
+_SHORT_MOTION = Motion(np.full(5, 0.1), 0.005)
 
 
 def compile_all(processes: int | None = None) -> Iterator[tuple[str, float]]:
@@ -62,7 +61,9 @@ def compile_variant(variant: str) -> None:
     model = build(arch, Discretisation("rigid"))
     damping = StiffnessDamping(0.05, 9.0)
     for each in (Conserving(),) if scheme == "Conserving" else (Newmark(), HHT(-0.1)):
-        time_history(model, _SHORT_MOTION, dt=_DT, method=method, scheme=each, damping=damping)
+        time_history(
+            model, _SHORT_MOTION, dt=_SHORT_MOTION.dt, method=method, scheme=each, damping=damping
+        )
 
 
 def _compile_large_displacements(max_half_width: int) -> None:
@@ -71,6 +72,6 @@ def _compile_large_displacements(max_half_width: int) -> None:
     model = build(block, Discretisation("rigid", displacements="large"))
     equation = Equation(model, _SHORT_MOTION, StiffnessDamping(0.05, 9.0))
     stepper = Stepper(equation, NewtonSolver(equation, max_half_width))
-    run = time_history(model, _SHORT_MOTION, dt=_DT, method=stepper)
+    run = time_history(model, _SHORT_MOTION, dt=_SHORT_MOTION.dt, method=stepper)
     end = last_state(run)
     simulate_fall(model, end, end, _SHORT_MOTION)

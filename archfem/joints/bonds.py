@@ -62,17 +62,17 @@ class Bonds:
         bonded = np.where(self.intact, np.maximum(lowered, 0.0), 0.0)
         return np.where(self._strength > 0.0, bonded, points.cohesion)
 
-    def stored_energy(self, gaps: Array) -> Array:
+    def energy_of_pull(self, gaps: Array) -> Array:
         """Return the energy of the pull at each point, from shifted gaps (p,) [J]."""
         return self.pull * (gaps + 0.5 * self.stretch)
 
-    def exceeded(self, gaps: Array) -> NDArray[np.bool_]:
+    def find_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
         """Return which bonds are pulled beyond their strength, from shifted gaps (p,)."""
         return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * self.stretch)
 
     def most_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
         """Return the bonds beyond their strength at the largest gap of each joint (p,)."""
-        exceeded, joint = self.exceeded(gaps), self.law.points.joint
+        exceeded, joint = self.find_exceeded(gaps), self.law.points.joint
         largest = np.zeros(self.law.points.joint_count)
         np.maximum.at(largest, joint, np.where(exceeded, gaps, 0.0))
         # points with gaps equal but for round-off break together
@@ -94,7 +94,7 @@ class Bonds:
 
 def normal_forces(law: Law, gaps: Array) -> Array:
     """Return the normal forces at the points of joints closed all over (p,) [N]."""
-    first, second = law.coupled_pairs
+    first, second = law.coupling_pairs
     forces = np.zeros_like(gaps)
     np.add.at(forces, first, law.stiffness(np.full(len(gaps), -1.0)) * gaps[second])
     return forces

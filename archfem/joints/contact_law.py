@@ -61,7 +61,7 @@ def clip_to_friction(trial: Any, limit: Any) -> Any:
     return trial - friction_excess(trial, limit)
 
 
-def closed_fraction(start: Any, end: Any) -> Any:
+def contact_fraction(start: Any, end: Any) -> Any:
     """Return the fraction of a step for which a joint is closed, gap linear in time [-]."""
     return -(negative_part(start) + negative_part(end)) / (
         abs(start) + abs(end) + ZERO_DIVISION_GUARD
@@ -70,7 +70,7 @@ def closed_fraction(start: Any, end: Any) -> Any:
 
 def mean_closing(start: Any, end: Any) -> Any:
     """Return the mean of <g>_- over a step [m]."""
-    return 0.5 * (negative_part(start) + negative_part(end)) * closed_fraction(start, end)
+    return 0.5 * (negative_part(start) + negative_part(end)) * contact_fraction(start, end)
 
 
 def shear_over_step(start: Any, change: Any, lag: Any, limit: Any) -> tuple[Any, Any]:
@@ -88,17 +88,15 @@ def shear_over_step(start: Any, change: Any, lag: Any, limit: Any) -> tuple[Any,
     return clip_to_friction(mean + lag * change, limit), first + change - excess
 
 
-def is_closed(opening: NDArray[np.float64]) -> NDArray[np.bool_]:
+def is_closed(opening: Array) -> NDArray[np.bool_]:
     """Return where the normal spring acts."""
     # a joint that just touches is closed: the tangent of the unloaded structure would be singular
     return opening <= 0.0
 
 
-def mean_closing_rate(
-    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
-) -> NDArray[np.float64]:
+def mean_closing_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
     """Return the derivative of `mean_closing` by a parameter, given those of both gaps [-]."""
-    fraction = closed_fraction(start, end)
+    fraction = contact_fraction(start, end)
     # the fraction is 0 / 0 where both gaps just touch
     fraction = np.where(is_closed(start) & is_closed(end), 1.0, fraction)
     square = 0.5 * fraction**2
@@ -107,11 +105,9 @@ def mean_closing_rate(
     return rates[0] * by_start + rates[1] * by_end
 
 
-def closed_fraction_rate(
-    start: NDArray[np.float64], end: NDArray[np.float64], rates: tuple[float, float]
-) -> NDArray[np.float64]:
-    """Return the derivative of `closed_fraction` by a parameter, given those of both gaps [1/m]."""
-    fraction, changes = closed_fraction(start, end), is_closed(start) != is_closed(end)
+def contact_fraction_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
+    """Return the derivative of `contact_fraction` by a parameter, from those of both gaps [1/m]."""
+    fraction, changes = contact_fraction(start, end), is_closed(start) != is_closed(end)
     total = np.where(changes, abs(start) + abs(end), np.inf)  # no derivative without a change
     by_start, by_end = (np.where(is_closed(gap), 1.0 - fraction, fraction) for gap in (start, end))
     return -(rates[0] * by_start + rates[1] * by_end) / total
@@ -124,7 +120,7 @@ class Springs:
     points: JointPoints
 
     @property
-    def coupled_pairs(self) -> tuple[Numbers, Numbers]:
+    def coupling_pairs(self) -> tuple[Numbers, Numbers]:
         """Pairs of points whose forces and openings are coupled: each point with itself."""
         number = np.arange(len(self.points.offset))
         return number, number
@@ -139,20 +135,20 @@ class Springs:
         return normal_traction(opening, self._spring)
 
     def stiffness(self, opening: Array) -> Array:
-        """Return the derivative of `forces` for each of `coupled_pairs` (p,) [N/m]."""
+        """Return the derivative of `forces` for each of `coupling_pairs` (p,) [N/m]."""
         return np.where(is_closed(opening), self._spring, 0.0)
 
-    def closed_area(self, opening: Array) -> Array:
+    def contact_area(self, opening: Array) -> Array:
         """Return the area on which each point is closed (p,) [m²]."""
         return np.where(is_closed(opening), self.points.weight, 0.0)
 
-    def closed_area_rate(self, opening: Array) -> Array:
-        """Return the derivative of `closed_area` for each of `coupled_pairs` (p,) [m]."""
+    def contact_area_rate(self, opening: Array) -> Array:
+        """Return the derivative of `contact_area` for each of `coupling_pairs` (p,) [m]."""
         return np.zeros_like(opening)
 
     def step_means(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Return the means over a step of `forces` and `closed_area`, each (p,) [N, m²]."""
-        area = self.points.weight * closed_fraction(start, end)
+        """Return the means over a step of `forces` and `contact_area`, each (p,) [N, m²]."""
+        area = self.points.weight * contact_fraction(start, end)
         return self._spring * mean_closing(start, end), area
 
     def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
@@ -161,7 +157,7 @@ class Springs:
 
     def mean_area_rate(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean area by a parameter (p,) [m]."""
-        return self.points.weight * closed_fraction_rate(start, end, rates)
+        return self.points.weight * contact_fraction_rate(start, end, rates)
 
 
 # Gauss's three points on the unit interval, and their weights
@@ -188,7 +184,7 @@ class Facets:
     points: JointPoints  # both ends of each facet, one facet after the other
 
     @property
-    def coupled_pairs(self) -> tuple[Numbers, Numbers]:
+    def coupling_pairs(self) -> tuple[Numbers, Numbers]:
         """Pairs of points whose forces and openings are coupled: the ends of a facet."""
         a = np.arange(0, len(self.points.offset), 2)
         b = a + 1
@@ -204,7 +200,7 @@ class Facets:
         """Stiffness of each facet (f,) [N/m]."""
         return self._area * self.points.normal_stiffness[0::2]
 
-    def _closed_part(self, opening: Array) -> tuple[Array, Array]:
+    def _find_closed_part(self, opening: Array) -> tuple[Array, Array]:
         """Return the ends of the closed part of each facet of unit length (f,)."""
         a, b = opening[0::2], opening[1::2]
         zero = _zero_crossing(a, b)
@@ -215,7 +211,7 @@ class Facets:
 
     def _moments(self, opening: Array) -> tuple[Array, Array, Array]:
         """Return ∫_c φ_i φ_j over a facet of unit length, for (1, 1), (1, 2) and (2, 2)."""
-        start, end = self._closed_part(opening)
+        start, end = self._find_closed_part(opening)
         squares, cubes = (end**2 - start**2) / 2.0, (end**3 - start**3) / 3.0
         return (end - start) - 2.0 * squares + cubes, squares - cubes, cubes
 
@@ -228,18 +224,18 @@ class Facets:
         )
 
     def stiffness(self, opening: Array) -> Array:
-        """Return the derivative of `forces` for each of `coupled_pairs` (2 p,) [N/m]."""
+        """Return the derivative of `forces` for each of `coupling_pairs` (2 p,) [N/m]."""
         first, mixed, second = self._moments(opening)
         return np.concatenate([self._spring * k for k in (first, mixed, mixed, second)])
 
-    def closed_area(self, opening: Array) -> Array:
+    def contact_area(self, opening: Array) -> Array:
         """Return the closed area of the facets, distributed to their ends by φ (p,) [m²]."""
-        start, end = self._closed_part(opening)
+        start, end = self._find_closed_part(opening)
         second = (end**2 - start**2) / 2.0
         return _interleave(self._area * (end - start - second), self._area * second)
 
-    def closed_area_rate(self, opening: Array) -> Array:
-        """Return the derivative of `closed_area` for each of `coupled_pairs` (2 p,) [m]."""
+    def contact_area_rate(self, opening: Array) -> Array:
+        """Return the derivative of `contact_area` for each of `coupling_pairs` (2 p,) [m]."""
         a, b = opening[0::2], opening[1::2]
         partly, zero = is_closed(a) != is_closed(b), _zero_crossing(a, b)
         # the zero z = a / (a - b) ends the closed part, or begins it; φ at z divides the area
@@ -250,11 +246,11 @@ class Facets:
         return np.concatenate([sign * part for part in parts])
 
     def step_means(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Return the means over a step of `forces` and `closed_area`, each (p,) [N, m²]."""
+        """Return the means over a step of `forces` and `contact_area`, each (p,) [N, m²]."""
         (before, after), weights = self._integration(start, end)
         closing, fraction = (
             [np.sum(weight * values, axis=(0, 1)) for weight in weights]
-            for values in (mean_closing(before, after), closed_fraction(before, after))
+            for values in (mean_closing(before, after), contact_fraction(before, after))
         )
         return (
             _interleave(*(self._spring * each for each in closing)),
@@ -269,7 +265,9 @@ class Facets:
     def mean_area_rate(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean area by a parameter (2 p,) [m]."""
         (before, after), weights = self._integration(start, end)
-        return _integrate_products(weights, self._area * closed_fraction_rate(before, after, rates))
+        return _integrate_products(
+            weights, self._area * contact_fraction_rate(before, after, rates)
+        )
 
     def _integration(
         self, start: Array, end: Array

@@ -150,11 +150,8 @@ def merge_criteria(criteria: Criteria | None, **single: Any) -> Criteria | None:
 
 
 def sliding_ratio(
-    normal: NDArray[np.float64],
-    eccentricity: NDArray[np.float64],
-    coefficients: NDArray[np.float64],
-    cohesions: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    normal: Array, eccentricity: Array, coefficients: Array, cohesions: Array
+) -> Array:
     """Return |V| / N at which joints slide, μ + c A / N; undefined (NaN) where they are open."""
     # Plane faces without tension are closed over 3 (1/2 - |e|) of the depth, at most all of it.
     # That is exact for exact joints between such faces; where faces bend, or points represent parts
@@ -167,10 +164,7 @@ def sliding_ratio(
 
 
 def judge_joints(
-    eccentricity: NDArray[np.float64],
-    friction: NDArray[np.float64],
-    limits: NDArray[np.float64],
-    hinge: float,
+    eccentricity: Array, friction: Array, limits: Array, hinge: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which joints hinge, and which slide; open ones, with undefined e, do neither."""
     # the margin is well above the round-off of programmes and equilibria (1e-9)
@@ -179,9 +173,9 @@ def judge_joints(
 
 def failure_flags(
     dims: tuple[Hashable, ...],
-    normal: NDArray[np.float64],
-    ratios: tuple[NDArray[np.float64], NDArray[np.float64]],
-    limits: NDArray[np.float64],
+    normal: Array,
+    ratios: tuple[Array, Array],
+    limits: Array,
     hinge: float,
 ) -> dict[str, tuple[Any, ...]]:
     """Return flags of failure, as variables of a dataset.
@@ -210,9 +204,7 @@ def failure_flags(
     }
 
 
-def tension_margin(
-    normal: NDArray[np.float64], tension: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def tension_margin(normal: Array, tension: Array) -> Array:
     """Return normal forces, but their magnitude in joints with a bond, which are not open [N]."""
     return np.where(tension > 0.0, np.abs(normal), normal)
 
@@ -238,7 +230,7 @@ def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> 
     return result
 
 
-def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> NDArray[np.float64]:
+def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> Array:
     """Return |V| / N at which joints slide, as by `sliding_ratio` (…, n_joints) [-]."""
     normal, e = (
         joints[name].transpose(..., "joint", missing_dims="ignore").values
@@ -251,7 +243,7 @@ def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> NDArray[np.float64
     return sliding_ratio(normal, e, criteria.coefficients(friction), criteria.cohesions(cohesion))
 
 
-def failed_joints(joints: xr.Dataset) -> xr.DataArray:
+def find_failed_joints(joints: xr.Dataset) -> xr.DataArray:
     """Return whether each joint hinges, slides or is open."""
     hinge = joints["hinge"]
     slides, is_open = (

@@ -20,7 +20,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.bonds import Bonds, dilatancy_opening
-from archfem.joints.contact_law import Facets, Law, clip_to_friction, is_closed
+from archfem.joints.contact_law import Facets, Law, clip_to_friction
 from archfem.joints.quadrature import JointPoints
 from archfem.joints.sparsity import Pattern
 
@@ -62,7 +62,7 @@ class JointOperator:
         return bool(self.points.slides.any())
 
     @cached_property
-    def transposed(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def force_matrices(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Matrices from normal and shear forces at the points to generalised forces (n, p)."""
         return self.opening.T.tocsr(), self.slip.T.tocsr()
 
@@ -100,7 +100,7 @@ class JointOperator:
             normal: normal forces, positive where they pull (p,) [N].
             shear: shear forces (p,) [N].
         """
-        return self.transposed[0] @ normal + self.transposed[1] @ shear
+        return self.force_matrices[0] @ normal + self.force_matrices[1] @ shear
 
     def sum_resultants(self, normal: Array, shear: Array) -> Array:
         """Return N, V, M of every joint from forces at the points (n_joints, 3) [N, N, N m].
@@ -199,12 +199,12 @@ class JointOperator:
             The limit, 0 where a point never slides.
         """
         slides, points = self.points.slides, self.points
-        limit = self._shifted_cohesion * closed
+        limit = self._effective_cohesion * closed
         limit[slides] -= points.friction[slides] * normal[slides]
         return np.where(slides, limit, 0.0)
 
     @property
-    def _shifted_cohesion(self) -> Array:
+    def _effective_cohesion(self) -> Array:
         """Cohesion beside the effective gaps (p,) [Pa]."""
         return self.points.cohesion if self.bonds is None else self.bonds.cohesion
 
@@ -225,7 +225,7 @@ class JointOperator:
         gaps, shear = self.effective_gaps(q), self.trial_shear(q)
         normal = self.law.forces(gaps)
         if self.slides:
-            limit = self.coulomb_limit(normal, self.law.closed_area(gaps))
+            limit = self.coulomb_limit(normal, self.law.contact_area(gaps))
             shear = np.where(self.points.slides, clip_to_friction(shear, limit), shear)
         return self.add_bond_pull(normal), shear
 
@@ -268,7 +268,7 @@ class JointOperator:
 
     def _bond_energy(self, gaps: Array) -> float:
         """Return the energy of the bonds' pull, from effective gaps [J]."""
-        return 0.0 if self.bonds is None else float(self.bonds.stored_energy(gaps).sum())
+        return 0.0 if self.bonds is None else float(self.bonds.energy_of_pull(gaps).sum())
 
     def updated_memory(self, q: Array) -> Array:
         """Return the memory once the joints are at rest at q, as `memory`.
@@ -281,12 +281,12 @@ class JointOperator:
         """
         excess = self.trial_shear(q) - self.point_forces(q)[1]
         if self.bonds is None:
-            return self.updated_slip(excess)
+            return self.add_slip(excess)
         gaps = self.effective_gaps(q)
-        limit = self.coulomb_limit(self.law.forces(gaps), self.law.closed_area(gaps))
-        return self.updated_bond_memory(self.bonds.most_exceeded(gaps), excess, limit)
+        limit = self.coulomb_limit(self.law.forces(gaps), self.law.contact_area(gaps))
+        return self.add_breakage(self.bonds.most_exceeded(gaps), excess, limit)
 
-    def updated_slip(self, excess: Array) -> Array:
+    def add_slip(self, excess: Array) -> Array:
         """Return the irreversible slip of each point at the end of a step (p,) [m].
 
         Args:
@@ -295,7 +295,7 @@ class JointOperator:
         slip = np.where(self.points.slides, excess / self.points.shear_spring, 0.0)
         return self._slip_memory + slip
 
-    def updated_bond_memory(self, exceeded: Flags, excess: Array, limit: Array) -> Array:
+    def add_breakage(self, exceeded: Flags, excess: Array, limit: Array) -> Array:
         """Return the memory of joints with bonds at the end of a step, as `memory` (2 p,).
 
         Args:
@@ -306,15 +306,7 @@ class JointOperator:
         assert self.bonds is not None
         sliding = np.where(self.points.slides, excess, 0.0)
         broken = self.bonds.broken_after(exceeded, sliding, limit)
-        return np.concatenate([self.updated_slip(excess), broken])
-
-    def closed_points(self, q: Array) -> Flags:
-        """Return which points are closed (p,).
-
-        Args:
-            q: coordinates (n,).
-        """
-        return is_closed(self.effective_gaps(q))
+        return np.concatenate([self.add_slip(excess), broken])
 
     def stiffness(self, q: Array) -> Array:
         """Return the point stiffnesses on which the tangent depends, for `tangent_map` (m,) [N/m].
@@ -331,7 +323,7 @@ class JointOperator:
         if not self.slides:
             return np.concatenate([across, points.shear_spring])
         normal, shear = self.law.forces(gaps), self.trial_shear(q)
-        closed = self.law.closed_area(gaps)
+        closed = self.law.contact_area(gaps)
         limit = (1.0 + SLIP_LIMIT_TOLERANCE) * self.coulomb_limit(normal, closed)
         slides = points.slides & ((np.abs(shear) > limit) | (closed == 0.0))
         sign = np.where(slides, np.sign(shear), 0.0)
@@ -339,7 +331,7 @@ class JointOperator:
         # its joints would be free, though it holds as soon as it moves back. Open points have none.
         residual = np.where(limit > 0.0, 1e-9, 0.0)
         along = np.where(slides, residual, 1.0) * points.shear_spring
-        coupled = self.friction_coupling(across, self.law.closed_area_rate(gaps), sign)
+        coupled = self.friction_coupling(across, self.law.contact_area_rate(gaps), sign)
         return np.concatenate([across, along, coupled])
 
     def friction_coupling(self, across: Array, closed: Array, rate: Array) -> Array:
@@ -353,18 +345,18 @@ class JointOperator:
         Returns:
             Derivatives (m,) [N/m].
         """
-        row = self.law.coupled_pairs[0]
+        row = self.law.coupling_pairs[0]
         friction = np.where(self.points.slides, self.points.friction, 0.0)[row]
-        return rate[row] * (self._shifted_cohesion[row] * closed - friction * across)
+        return rate[row] * (self._effective_cohesion[row] * closed - friction * across)
 
     def linear_forces(self, stiffness: Array, gaps: Array) -> tuple[Array, Array]:
         """Return normal and shear forces at the points from point stiffnesses, each (p,) [N].
 
         Args:
-            stiffness: as by `stiffness` or `closed_stiffness` (m,) [N/m].
+            stiffness: as by `stiffness` or `elastic_stiffness` (m,) [N/m].
             gaps: opening and slip at the points (2, p) [m].
         """
-        first, second = self.law.coupled_pairs
+        first, second = self.law.coupling_pairs
         across, along, coupled = np.split(stiffness, [len(first), len(first) + len(gaps[0])])
         normal, shear = np.zeros_like(gaps[0]), along * gaps[1]
         np.add.at(normal, first, across * gaps[0][second])
@@ -372,15 +364,15 @@ class JointOperator:
             np.add.at(shear, first, coupled * gaps[0][second])
         return normal, shear
 
-    def closed_forces(self, gaps: Array) -> tuple[Array, Array]:
+    def elastic_forces(self, gaps: Array) -> tuple[Array, Array]:
         """Return normal and shear forces with all joints closed and no slip, each (p,) [N].
 
         Args:
             gaps: opening and slip at the points (2, p) [m].
         """
-        return self.linear_forces(self.closed_stiffness(), gaps)
+        return self.linear_forces(self.elastic_stiffness(), gaps)
 
-    def closed_stiffness(self) -> Array:
+    def elastic_stiffness(self) -> Array:
         """Return the point stiffnesses with all joints closed and no slip (m,) [N/m]."""
         across = self.law.stiffness(np.full(len(self.points.offset), -1.0))
         parts = [across, self.points.shear_spring]
@@ -392,7 +384,7 @@ class JointOperator:
         Args:
             pattern: sparsity pattern of the tangent.
         """
-        first, second = self.law.coupled_pairs
+        first, second = self.law.coupling_pairs
         maps = [
             pattern.outer_product_map(self.opening[first], self.opening[second]),
             pattern.outer_product_map(self.slip, self.slip),
@@ -404,7 +396,7 @@ class JointOperator:
     def coupling_pattern(self) -> sparse.csr_matrix:
         """Return a matrix with an entry wherever the tangent may have one (n, n)."""
         # products of ones: no entries cancel
-        first, second = self.law.coupled_pairs
+        first, second = self.law.coupling_pairs
         opening, slip = _ones(self.opening), _ones(self.slip)
         pattern = opening[first].T @ opening[second] + slip.T @ slip
         if self.slides:

@@ -1,6 +1,6 @@
 """Quadrature of the tractions along a joint: rules on facets, and the points on all joints."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -159,18 +159,9 @@ class JointPoints:
 
     def selected(self, rows: Numbers, weight: Array) -> "JointPoints":
         """Return some of the points with other weights."""
-        return JointPoints(
-            self.joint[rows],
-            self.offset[rows],
-            weight,
-            self.normal_stiffness[rows],
-            self.shear_stiffness[rows],
-            self.friction[rows],
-            self.cohesion[rows],
-            self.joint_count,
-            None if self.dilatancy is None else self.dilatancy[rows],
-            None if self.tension is None else self.tension[rows],
-        )
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        of_points: Any = {key: v[rows] for key, v in values.items() if isinstance(v, np.ndarray)}
+        return replace(self, **of_points | {"weight": weight})
 
     @property
     def is_plain(self) -> bool:

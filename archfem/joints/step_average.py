@@ -86,9 +86,9 @@ class StepForces:
         operator, (_, _, limit, last) = self.operator, self._means(q)
         excess = operator.trial_shear(q) - last
         if operator.bonds is None:
-            return operator.updated_slip(excess)
-        exceeded = operator.bonds.exceeded(operator.effective_gaps(q, self.end_opening))
-        return operator.updated_bond_memory(exceeded, excess, limit)
+            return operator.add_slip(excess)
+        exceeded = operator.bonds.find_exceeded(operator.effective_gaps(q, self.end_opening))
+        return operator.add_breakage(exceeded, excess, limit)
 
     def with_dilatancy(self, q: Array) -> "StepForces":
         """Return the step with the dilatancy opening due to the slip on the way to q."""

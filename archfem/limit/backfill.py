@@ -256,6 +256,7 @@ class FillProfile:
         weights = np.array([block.material.unit_weight for block in self.structure.blocks])
         return np.asarray(weights[self.slices.block])
 
+    @cached_property
     def columns(self) -> tuple[NDArray[np.intp], Array, Array]:
         """Return stone, foot and weight of every column of fill (n,), (n, 2) [m], (n,) [N]."""
         cut, rests = self.slices, ~self.stones[self.slices.block]
@@ -384,11 +385,6 @@ class BlocksWithFill:
         return FillProfile(self.whole, self._place >= 0)
 
     @cached_property
-    def _columns(self) -> tuple[NDArray[np.intp], Array, Array]:
-        """Stone, foot and weight of every column of fill."""
-        return self._profile.columns()
-
-    @cached_property
     def contacts(self) -> FillContacts:
         """Pieces of the stones' faces on which the fill presses."""
         soil, normals = set(find_yielding_blocks(self.whole)), self.whole.normals
@@ -425,9 +421,9 @@ class BlocksWithFill:
         for action in actions:
             # a body force acts on the fill too, and so on the stone at the foot of each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, foot, weight = self._columns
+                block, foot, weight = self._profile.columns
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                total += self._generalised_sum(self._place[block], foot, pull)
+                total += self._sum_forces(self._place[block], foot, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
                 if self._place[number] < 0:
@@ -447,7 +443,7 @@ class BlocksWithFill:
         assert self.fill is not None
         block, points, part = self._profile.fan(point, self.fill)
         forces = part[:, None] * np.array(load.force)
-        return self._generalised_sum(self._place[block], points, forces)
+        return self._sum_forces(self._place[block], points, forces)
 
     def warn_of_sliding_fill(self, actions: Sequence[BodyForce | PointLoad], factor: float) -> None:
         """Warn where a fill without cohesion would slide before the stones become a mechanism."""
@@ -471,7 +467,7 @@ class BlocksWithFill:
             return np.zeros(3 * len(self.rigid_regions.structure.free))
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.least, self.whole.width)
-        return self._generalised_sum(contacts.block, points, forces)
+        return self._sum_forces(contacts.block, points, forces)
 
     def passive_forces(self) -> sparse.csr_matrix:
         """Return the generalised forces of each contact's pressure range (3 n_free, n)."""
@@ -479,7 +475,7 @@ class BlocksWithFill:
             return sparse.csr_matrix((3 * len(self.rigid_regions.structure.free), 0))
         contacts = self.contacts
         points, forces = contacts.thrust(contacts.most - contacts.least, self.whole.width)
-        return sparse.csr_matrix(self._generalised_forces(contacts.block, points, forces).T)
+        return sparse.csr_matrix(self._apply_forces(contacts.block, points, forces).T)
 
     def pressure_dataset(self, share: Array) -> xr.Dataset | None:
         """Return the pressures of the fill over contact, or None where there is none."""
@@ -504,7 +500,7 @@ class BlocksWithFill:
             },
         )
 
-    def _generalised_forces(
+    def _apply_forces(
         self, block: NDArray[np.intp], points: Array, forces: Array
     ) -> sparse.csr_matrix:
         """Return the generalised forces of forces at points of the stones (n, 3 n_free)."""
@@ -519,9 +515,9 @@ class BlocksWithFill:
         shape = (len(block), 3 * len(structure.free))
         return sparse.csr_matrix((entries[rows].ravel(), (rows.repeat(3), columns.ravel())), shape)
 
-    def _generalised_sum(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
+    def _sum_forces(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
         """Return the sum of those generalised forces (3 n_free,)."""
-        return np.asarray(self._generalised_forces(block, points, forces).sum(axis=0)).ravel()
+        return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
 
 
 def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:

@@ -259,7 +259,7 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     check_type(structure, Structure, "structure", "give that whose joints these are")
     check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     check_instant(structure, joints)
-    fractions = closed_fractions(structure, joints["N"].values, joints["M"].values)
+    fractions = contact_fractions(structure, joints["N"].values, joints["M"].values)
     reduced = (
         replace(
             joint, contact=replace(joint.contact, cohesion=joint.contact.cohesion * float(part))
@@ -269,7 +269,7 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
     return replace(structure, joints=tuple(reduced))
 
 
-def closed_fractions(structure: Structure, normal: Array, moment: Array) -> Array:
+def contact_fractions(structure: Structure, normal: Array, moment: Array) -> Array:
     """Return the closed part of each joint, by a linear pressure; 0 without any (n_joints,)."""
     pressed = normal > 0.0
     eccentricity = np.abs(moment) / np.where(pressed, normal, 1.0) / structure.depths
@@ -291,7 +291,10 @@ def _solve_collapse(
     if isinstance(live, Settlement):
         support = np.zeros((len(stones.rigid_regions.blocks), 3))
         support[stones.rigid_regions.blocks.index(live.place(structure))] = live.motion
-        programme, scale = _settlement_programme(dead, support), dead.blocks.force_unit
+        # the programme of least work on the motion of the supports
+        intrados, extrados, slip = dead.blocks.gaps(support)
+        programme = replace(dead, force_cost=np.concatenate([intrados, extrados, -slip]))
+        scale = dead.blocks.force_unit
         bounded, unbounded = Outcome.SETTLES, Outcome.LOCKS
     else:
         programme, scale = dead.with_load_factor(stones.load(list_loads(live))), -1.0
@@ -317,12 +320,6 @@ def _solve_collapse(
     if friction == "coulomb":
         warn_sliding(result.sliding_names, result.factor)
     return result
-
-
-def _settlement_programme(dead: Programme, support: Array) -> Programme:
-    """Return the programme of least work on a motion of the supports."""
-    intrados, extrados, slip = dead.blocks.gaps(support)
-    return replace(dead, force_cost=np.concatenate([intrados, extrados, -slip]))
 
 
 def _without_forces(optimum: Optimum) -> Optimum:
@@ -412,7 +409,7 @@ def warn_cohesion(
 ) -> None:
     """Warn of failing joints whose shear exceeds the strength of their closed part."""
     normal, shear, moment = (joints[key].values for key in "NVM")
-    strength = structure.cohesion * closed_fractions(structure, normal, moment)
+    strength = structure.cohesion * contact_fractions(structure, normal, moment)
     slides = np.isfinite(structure.friction)
     strength[slides] += structure.friction[slides] * normal[slides]
     limit = (1.0 + tolerance) * strength + tolerance * structure.cohesion

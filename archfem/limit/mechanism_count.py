@@ -16,7 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
-    failed_joints,
+    find_failed_joints,
     find_lasting,
     part_roles,
     step_lengths,
@@ -249,7 +249,7 @@ def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
     begin = int(start[0])
     in_mechanism = np.flatnonzero(joints["joint"].isin(list(found.joints)).values)
     after = with_failure_flags(joints).isel(joint=in_mechanism, time=slice(begin, None))
-    all_failed = failed_joints(after).all("joint").values
+    all_failed = find_failed_joints(after).all("joint").values
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())
     opening = float(after["opening"][:count].max()) if "opening" in after else None
@@ -258,7 +258,7 @@ def episode(joints: xr.Dataset, found: Mechanism) -> Episode:
 
 def has_counted_mechanism(joints: xr.Dataset) -> xr.DataArray:
     """Return whether enough joints for a mechanism by count have failed at each instant."""
-    return failed_joints(assessed_joints(joints)).sum("joint") >= Criteria.of(joints).failures
+    return find_failed_joints(assessed_joints(joints)).sum("joint") >= Criteria.of(joints).failures
 
 
 def matching_definitions(
@@ -279,7 +279,7 @@ def matching_definitions(
 
 def _flags_over_time(joints: xr.Dataset) -> xr.DataArray:
     """Return failure flags over time and joint; a static state has one instant, NaN."""
-    flags = failed_joints(joints)
+    flags = find_failed_joints(joints)
     if "time" not in flags.coords:
         flags = flags.assign_coords(time=np.nan)
     if "time" not in flags.dims:
@@ -335,7 +335,5 @@ def _widest_group(
     enough = [group for group in groups if total(group) >= failures and kind(group) in kinds]
     # among groups of one class the one with most failures
     return max(
-        enough,
-        key=lambda group: (MECHANISM_KINDS.index(kind(group)), total(group)),
-        default=None,
+        enough, key=lambda group: (MECHANISM_KINDS.index(kind(group)), total(group)), default=None
     )

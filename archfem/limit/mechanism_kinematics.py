@@ -114,7 +114,7 @@ def verified_mechanism(
     check_type(structure, Structure, "structure", "give that whose joints these are")
     check_type(joints, xr.Dataset, "joints", "give those of an instant, e.g. dead.joints")
     joints = with_failure_flags(joints, merge_criteria(criteria, hinge=limit))
-    return cached_verifier(structure).verify(joints)
+    return get_verifier(structure).verify(joints)
 
 
 def first_verified_mechanism(
@@ -133,7 +133,7 @@ def first_verified_mechanism(
     Returns:
         The motion and its class at that instant; None where no ring and no pier ever moves.
     """
-    verifier, joints = cached_verifier(structure), with_failure_flags(joints, criteria)
+    verifier, joints = get_verifier(structure), with_failure_flags(joints, criteria)
     freedoms = verifier.freedoms(joints)
     # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
     moves: dict[bytes, bool] = {}
@@ -266,7 +266,7 @@ def joint_freedoms(
 
 
 @lru_cache(maxsize=8)
-def cached_verifier(structure: Structure) -> Verifier:
+def get_verifier(structure: Structure) -> Verifier:
     """Return the verifier of a structure, the same for structures that are equal."""
     return Verifier(structure)
 
@@ -306,7 +306,7 @@ class LoopCheck:
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
 
     @cached_property
-    def required_joints(self) -> NDArray[np.bool_]:
+    def loop_joints(self) -> NDArray[np.bool_]:
         """Joints on a path from the ground to each block of the parts (n_joints,)."""
         # A block whose path neither opens nor slips anywhere does not move. Weights make paths
         # avoid joints between blocks of other parts, whose own motion does not count.
@@ -337,7 +337,7 @@ class LoopCheck:
         sense = np.concatenate([np.sign(freedoms[freedoms != 0.0]), -np.ones(len(either))])
         columns = self.stresses[rows].T * sense
         # some required joint must move: any one-way gap, or a two-way slip in one of its senses
-        required = np.tile(self.required_joints, 3)
+        required = np.tile(self.loop_joints, 3)
         gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
         gaps += [
             side * sense * (rows == slip) for slip in either[required[either]] for side in (1, -1)

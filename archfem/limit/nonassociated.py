@@ -98,7 +98,7 @@ def _alternate(
         mechanism = replace(programme, limits=shear_limits(programme, resistance)).solve()
         if mechanism is None:
             return None
-        slips = slip_magnitudes(programme, mechanism.multipliers)
+        slips = np.abs(mechanism_gaps(programme, mechanism.multipliers).reshape(3, -1)[2])
         state = _minimise_gap(restricted, factor * slips)
     except DidNotConverge:  # round-off left no state
         return None
@@ -157,11 +157,6 @@ def mechanism_gaps(programme: Programme, multipliers: Array) -> Array:
     return gaps if programme.force_cost is None else gaps + programme.force_cost
 
 
-def slip_magnitudes(programme: Programme, multipliers: Array) -> Array:
-    """Return the magnitudes of the slips of a mechanism (n_joints,)."""
-    return np.abs(mechanism_gaps(programme, multipliers).reshape(3, -1)[2])
-
-
 def normal_forces(forces: Array) -> Array:
     """Return the normal force of each joint (n_joints,) [mean block weights]."""
     return forces.reshape(3, -1)[:2].sum(axis=0)
@@ -214,14 +209,15 @@ def search_nonassociated(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
     """Search the weakest state whose joints slide without opening, from many starts downwards."""
-    starts = _search_starts(programme, start)
+    # the number of starts falls with the joints squared
+    joints = len(programme.blocks.structure.depths)
+    number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
+    starts = starting_forces(programme, start, number, 0)
     solutions = [
         iterate for forces in starts if (iterate := find_solution(programme, forces)) is not None
     ]
     normal = np.array([normal_forces(forces) for forces in starts])
-    smallest = normal.reshape(-1, len(programme.blocks.structure.depths)).min(
-        axis=0, initial=np.inf
-    )
+    smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
     associated = -np.inf if start is None else start.value
     bound = max(associated, _bound_objective(programme, smallest))
     limits = scale * associated, scale * bound
@@ -259,13 +255,6 @@ def starting_forces(
     """Return the forces of the associated optimum and of a number of random vertices."""
     forces = _random_vertices(programme, start, number, np.random.default_rng(seed))
     return forces if start is None else [start.forces, *forces]
-
-
-def _search_starts(programme: Programme, start: Optimum | None) -> list[Array]:
-    """Return the starts of the full search: their number falls with the joints squared."""
-    joints = len(programme.blocks.structure.depths)
-    number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
-    return starting_forces(programme, start, number, 0)
 
 
 def _random_vertices(

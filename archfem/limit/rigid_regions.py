@@ -6,7 +6,7 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, find_supported_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,11 @@ class RigidRegions:
 def find_rigid_regions(structure: Structure) -> RigidRegions:
     """Remove the yielding bodies, and the blocks that do not stand on fixed ground without them."""
     everything = set(range(len(structure.blocks)))
-    blocks = _supported_blocks(structure, everything - set(find_yielding_blocks(structure)))
+    blocks = find_supported_blocks(structure, everything - set(find_yielding_blocks(structure)))
     # A structure of nothing but yielding bodies is taken as rigid.
-    if not set(blocks) & set(structure.free):
+    if not blocks & set(structure.free):
         return take_all_rigid(structure)
-    return _select_blocks(structure, blocks)
+    return _select_blocks(structure, tuple(sorted(blocks)))
 
 
 def take_all_rigid(structure: Structure) -> RigidRegions:
@@ -57,13 +57,3 @@ def _select_blocks(structure: Structure, blocks: tuple[int, ...]) -> RigidRegion
         ),
     )
     return RigidRegions(selected, blocks, joints, len(structure.blocks))
-
-
-def _supported_blocks(structure: Structure, blocks: set[int]) -> tuple[int, ...]:
-    """Return those of some blocks that are joined to a fixed one through others of them."""
-    supported = {number for number in blocks if structure.blocks[number].fixed}
-    pairs = [set(joint.blocks) for joint in structure.joints if blocks >= set(joint.blocks)]
-    # breadth-first search from the supports
-    while reached := {n for pair in pairs if pair & supported for n in pair} - supported:
-        supported |= reached
-    return tuple(sorted(supported))

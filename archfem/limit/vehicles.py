@@ -154,13 +154,12 @@ def _axles_on_structure(
     """Return the axles that stand on the structure, from left to right."""
     sense = 1.0 if direction == "right" else -1.0
     axles = sorted((position + sense * ahead, weight) for weight, ahead in vehicle.tolist())
-    return tuple(PointLoad(x, (0.0, -weight)) for x, weight in axles if _has_block(structure, x))
-
-
-def _has_block(structure: Structure, x: float) -> bool:
-    """Return whether a block that moves lies below or above x."""
-    return any(
-        np.ptp(np.sign(structure.blocks[number].points[:, 0] - x)) > 0 for number in structure.free
+    # blocks below or above an axle have corners on both sides of it
+    corners = [structure.blocks[number].points[:, 0] for number in structure.free]
+    return tuple(
+        PointLoad(x, (0.0, -weight))
+        for x, weight in axles
+        if any(np.ptp(np.sign(places - x)) > 0 for places in corners)
     )
 
 

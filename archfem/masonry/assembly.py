@@ -65,7 +65,9 @@ def assembled(
         if {a, b} not in joined:
             owner = _select_owner(blocks[a], blocks[b], ends, directions)
             part = owner.part
-            joint = _create_joint((a, b), ends, of(blocks[a], blocks[b]), owner)
+            (x0, y0), (x1, y1) = ends.tolist()
+            law = of(blocks[a], blocks[b])
+            joint = Joint((a, b), (x0, y0), (x1, y1), law, "", part, owner.role)  # named below
             if part in directions and part not in numbered and directions[part].separates(ends):
                 across[part].append(joint)
             else:
@@ -182,12 +184,6 @@ def _select_owner(a: Block, b: Block, line: Array, directions: Mapping[str, Dire
             if block.role == "ring" or (other.role == "other" and below):
                 return block
     return min((b, a), key=lambda block: rank[block.role])
-
-
-def _create_joint(pair: tuple[int, int], ends: Array, contact: Contact, owner: Block) -> Joint:
-    """Create a joint of its owner's part, without a name."""
-    (x0, y0), (x1, y1) = ends.tolist()
-    return Joint(pair, (x0, y0), (x1, y1), contact, "", owner.part, owner.role)
 
 
 def _order_joints(

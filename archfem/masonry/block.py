@@ -175,12 +175,12 @@ class Block:
         """
         if self.centre is None:
             return self.points
-        if pieces not in self._drawn:
-            self._drawn[pieces] = np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
-        return self._drawn[pieces]
+        if pieces not in self._outlines:
+            self._outlines[pieces] = np.concatenate([self.arc(0, pieces), self.arc(2, pieces)])
+        return self._outlines[pieces]
 
     @cached_property
-    def _drawn(self) -> dict[int, Array]:
+    def _outlines(self) -> dict[int, Array]:
         """Cached outlines by number of chords of an arc."""
         return {}
 
@@ -236,10 +236,6 @@ class Block:
         return self._measures[2]
 
 
-# Depth of an overlap by round-off, relative to the size of all outlines
-OVERLAP_TOLERANCE = 1e-6
-
-
 def check_simple(outline: Array, name: str) -> None:
     """Refuse an outline that crosses or touches itself."""
     import shapely
@@ -261,7 +257,8 @@ def check_overlaps(
     """Refuse outlines that are the same or overlap."""
     import shapely
 
-    near = OVERLAP_TOLERANCE * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
+    # overlaps of less depth, relative to the size of all outlines, are round-off
+    near = 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0)))
     polygons = np.array([shapely.Polygon(points) for points in outlines])
     a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
     still = np.zeros(len(polygons), dtype=bool) if fixed is None else np.array(fixed, dtype=bool)

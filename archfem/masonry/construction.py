@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from archfem._validation import check_integer, check_type
 from archfem.errors import InvalidInput
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, suggest_name
+from archfem.masonry.structure import Structure, find_supported_blocks, suggest_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
     check_integer(layers, "layers of the fill")
     soil = set(find_yielding_blocks(structure))
     rings = {n for n in structure.free if structure.blocks[n].role == "ring"} - soil
-    first = _supported_blocks(structure, set(range(len(structure.blocks))) - soil - rings)
+    first = find_supported_blocks(structure, set(range(len(structure.blocks))) - soil - rings)
     last = set(structure.free) - soil - rings - first
     stages = [
         ("piers and walls", first & set(structure.free), False),
@@ -74,15 +74,6 @@ def usual_stages(structure: Structure, layers: int = 4) -> tuple[Stage, ...]:
         if centring and blocks:
             result.append(Stage(strike=True, name="centring struck"))
     return tuple(result)
-
-
-def _supported_blocks(structure: Structure, blocks: set[int]) -> set[int]:
-    """Return the blocks of a set that are connected within the set to a fixed one."""
-    held = {number for number in blocks if structure.blocks[number].fixed}
-    pairs = [set(joint.blocks) for joint in structure.joints if blocks >= set(joint.blocks)]
-    while reached := {number for pair in pairs if pair & held for number in pair} - held:
-        held |= reached
-    return held
 
 
 def _divide_into_layers(

@@ -169,7 +169,7 @@ STONE_TO_STONE = Contact(1.48e9, 0.30e9, 0.60, "stone to stone")
 SOIL_TO_STONE = Contact(0.30e9, 0.24e9, 0.60, "soil to stone")
 
 # Named presets, Table 2 of Demirel and Aldemir (2021)
-MATERIALS = {material.name: material for material in (STONE, BACKFILL)}
+MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}
 
 # Named presets, Table 2 of Demirel and Aldemir (2021); the table gives no μ for soil
-CONTACTS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}
+CONTACT_PRESETS = {contact.name: contact for contact in (STONE_TO_STONE, SOIL_TO_STONE)}

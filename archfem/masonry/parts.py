@@ -34,9 +34,6 @@ ROLE_WORDS = {
     | {"ballast", "deck", "pavement", "paver", "paving", "road"},
 }
 
-# Roles in messages
-ROLE_PHRASES = {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}
-
 logger = logging.getLogger("archfem")
 
 
@@ -66,13 +63,13 @@ def assign_roles(
 ) -> tuple[AnyMember, ...]:
     """Return blocks or joints with the roles of their parts, derived where none is given."""
     # a role given for one member holds for its part; without any, the name of the part decides
-    given = _given_roles((*members, *others))
+    given = _collect_roles((*members, *others))
     open_parts = dict.fromkeys(each.part for each in members if each.part not in given)
     roles = given | {part: infer_role(part) for part in open_parts}
     return tuple(each if each.role else replace(each, role=roles[each.part]) for each in members)
 
 
-def _given_roles(members: Sequence[Member]) -> dict[str, str]:
+def _collect_roles(members: Sequence[Member]) -> dict[str, str]:
     """Collect the roles that members state for their parts."""
     first: dict[str, Member] = {}
     for each in members:
@@ -110,7 +107,7 @@ def infer_role(part: str) -> str:
             'Block(role="ring"), or in a survey role = "ring" as a property of its outlines or of '
             "their layer in [structure.layers]",
             part,
-            ROLE_PHRASES[role],
+            {"ring": "a ring", "pier": "a pier", "other": "neither ring nor pier"}[role],
             why,
         )
     return role

@@ -52,24 +52,18 @@ def suggest_name(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
 
 def join_names(names: Sequence[str], comma: str = ", ") -> str:
     """Join names to a list, shortened in the middle where it is long."""
-    return (
-        comma.join(names)
-        if len(names) <= MAX_LISTED_NAMES
-        else _shorten_list(names, comma.join, comma)
-    )
+    return _shorten_list(names, comma.join, comma)
 
 
 def join_joint_names(names: Sequence[str]) -> str:
     """Join names of joints, as in "north pier, base; main arch, joints 0, 5 and 11"."""
-    return (
-        _group_by_stem(names)
-        if len(names) <= MAX_LISTED_NAMES
-        else _shorten_list(names, _group_by_stem, "; ")
-    )
+    return _shorten_list(names, _group_by_stem, "; ")
 
 
 def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
-    """Join both ends of a list and state its length."""
+    """Join a list; of a long one both ends, with its length."""
+    if len(names) <= MAX_LISTED_NAMES:
+        return put(names)
     half = MAX_LISTED_NAMES // 2
     return f"{put(names[:half])}{comma}…{comma}{put(names[-half:])} ({len(names)} in all)"
 
@@ -279,10 +273,7 @@ class Structure(ResultDisplay):
 
     def _check_support(self) -> None:
         """Check that every block is connected, through others, to a fixed one."""
-        held = {number for number, block in enumerate(self.blocks) if block.fixed}
-        pairs = [set(joint.blocks) for joint in self.joints]
-        while reached := {b for pair in pairs if pair & held for b in pair} - held:
-            held |= reached
+        held = find_supported_blocks(self, range(len(self.blocks)))
         loose = [block.name for number, block in enumerate(self.blocks) if number not in held]
         if loose:
             raise InvalidStructure(
@@ -352,6 +343,17 @@ class Structure(ResultDisplay):
             InvalidInput: there is no such block; the nearest name is suggested.
         """
         return find_number("block", [each.name for each in self.blocks], block)
+
+
+def find_supported_blocks(structure: Structure, blocks: Iterable[int]) -> set[int]:
+    """Return those of some blocks that are joined to a fixed one through others of them."""
+    among = set(blocks)
+    supported = {number for number in among if structure.blocks[number].fixed}
+    pairs = [set(joint.blocks) for joint in structure.joints if among >= set(joint.blocks)]
+    # breadth-first search from the supports
+    while reached := {n for pair in pairs if pair & supported for n in pair} - supported:
+        supported |= reached
+    return supported
 
 
 def rigid_motion_matrix(points: Array, centroid: Array) -> Array:

@@ -39,13 +39,13 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     if settings.fidelity == "rigid":
         return build_rigid_model(structure, settings.through, settings.rule)
     # imported here: rigid models do not need DOLFINx
-    from archfem.models.fem.mesh import cached_mesh, read_mesh
+    from archfem.models.fem.mesh import get_mesh, read_mesh
     from archfem.models.fem.space import build_broken_space
     from archfem.models.full import build_full_model
     from archfem.models.reference import MonolithicModel
 
     if settings.file is None:
-        mesh = cached_mesh(structure, settings)
+        mesh = get_mesh(structure, settings)
     else:
         mesh = read_mesh(structure, settings.file)
     space = build_broken_space(mesh, settings.degree)

@@ -21,6 +21,7 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.joints.contact_law import Facets
+from archfem.joints.operator import JointOperator
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.linear_blocks import LinearBlockModel
 
@@ -28,9 +29,12 @@ Numbers = NDArray[np.intp]
 
 
 def project_model(
-    model: LinearBlockModel, basis: sparse.csr_matrix, fidelity: str
+    model: LinearBlockModel,
+    basis: sparse.csr_matrix,
+    fidelity: str,
+    operator: JointOperator | None = None,
 ) -> LinearBlockModel:
-    """Return a model in the coordinates of a basis."""
+    """Return a model in the coordinates of a basis; its joints may be others."""
     cells, transposed = model.cells, basis.T.tocsr()
     return LinearBlockModel(
         model.structure,
@@ -38,7 +42,7 @@ def project_model(
         mass=transposed @ (model.mass @ basis),
         block_stiffness=transposed @ (model.block_stiffness @ basis),
         mass_influence=basis.T @ model.mass_influence,
-        operator=model.operator.projected(basis),
+        operator=(operator or model.operator).projected(basis),
         cells=replace(
             cells,
             shape_functions=cells.shape_functions @ basis,
@@ -66,7 +70,7 @@ def condense_blocks(
         order.append(_dofs(nodes))
     stacked = sparse.block_diag(bases, format="csr")
     basis = stacked[np.argsort(np.concatenate(order))]
-    return project_model(_merge_plane_facets(model, plane), basis, fidelity)
+    return project_model(model, basis, fidelity, _merge_plane_facets(model, plane))
 
 
 def _has_bending_faces(structure: Structure, number: int) -> bool:
@@ -156,14 +160,14 @@ def _condense_inner_nodes(
     return basis.tocsr()
 
 
-def _merge_plane_facets(model: LinearBlockModel, plane: set[int]) -> LinearBlockModel:
-    """Return a model with one exact facet on each joint without slip between plane faces."""
+def _merge_plane_facets(model: LinearBlockModel, plane: set[int]) -> JointOperator:
+    """Return the joints with one exact facet on each without slip between plane faces."""
     # each end of a facet slides separately and has a bond of its own: joints that can slide, or are
     # bonded, need several
     if not isinstance(model.operator.law, Facets):
-        return model
+        return model.operator
     merged = [
         set(joint.blocks) <= plane and not joint.contact.slides and joint.contact.tension == 0.0
         for joint in model.structure.joints
     ]
-    return model.with_operator(model.operator.with_plane_joints(merged))
+    return model.operator.with_plane_joints(merged)

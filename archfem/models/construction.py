@@ -1,7 +1,6 @@
 """Partly built structures: blocks that are not there yet, and blocks on centring."""
 
 from collections.abc import Iterable
-from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +41,12 @@ class PartialStructure(LinearBlockModel):
         self, blocks: Iterable[int], q: Array, *, centring: bool = False
     ) -> "PartialStructure":
         """Return the model with further blocks, placed on the structure displaced by q."""
-        other = copy(self)
         new = np.zeros_like(self.standing)
         new[list(blocks)] = True
-        other.standing = self.standing | new
-        other.centred = self.centred | (new & centring)
+        other = self.copy_with(
+            standing=self.standing | new, centred=self.centred | (new & centring)
+        )
+        # points that begin to act are closed and without slip in the present displacement
         begin = other._active_points & ~self._active_points
         gaps = np.stack([self.operator.openings(q), self.operator.slips(q)])
         initial = np.zeros_like(gaps) if self.initial_gaps is None else self.initial_gaps
@@ -54,10 +54,7 @@ class PartialStructure(LinearBlockModel):
 
     def struck(self) -> "PartialStructure":
         """Return the model without its centring."""
-        other = copy(self)
-        other.centred = np.zeros_like(self.centred)
-        other._last = None
-        return other
+        return self.copy_with(centred=np.zeros_like(self.centred), _last=None)
 
     def finished(self) -> LinearBlockModel:
         """Return the model of all blocks with these initial gaps and this memory."""
@@ -77,7 +74,7 @@ class PartialStructure(LinearBlockModel):
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
         """Return the tangent of what stands; held coordinates have a stiffness of their own."""
         active, free = self._active_points, self._free
-        pairs = active[self.operator.law.coupled_pairs[0]]
+        pairs = active[self.operator.law.coupling_pairs[0]]
         parts = [pairs, active, *([pairs] if self.operator.slides else [])]
         joints = np.where(np.concatenate(parts), stiffness, 0.0)
         matrix = super().assemble_tangent(block_factor, joints)
@@ -104,7 +101,7 @@ class PartialStructure(LinearBlockModel):
         gaps, shear = joints.effective_gaps(q), joints.trial_shear(q)
         stored = gaps * joints.law.forces(gaps) + shear**2 / joints.points.shear_spring
         if joints.bonds is not None:
-            stored = stored + 2.0 * joints.bonds.stored_energy(gaps)
+            stored = stored + 2.0 * joints.bonds.energy_of_pull(gaps)
         in_blocks = 0.5 * float(q @ (self.block_stiffness @ q))
         return in_blocks + 0.5 * float(np.sum(stored[active]))
 

@@ -9,6 +9,7 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -21,7 +22,7 @@ from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.masonry.survey.drawings import write_dxf
-from archfem.models.model import Model, check_coordinate_count
+from archfem.models.model import Cells, Model, check_coordinate_count
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,36 +32,24 @@ class Solids:
     model: Model
 
     @cached_property
-    def _fixed(self) -> list[tuple[int, Array]]:
+    def _supports(self) -> list[tuple[int, Array]]:
         """Numbers and outlines of the fixed blocks."""
         blocks = enumerate(self.model.structure.blocks)
         return [(number, block.drawn()) for number, block in blocks if block.fixed]
 
     @cached_property
-    def places(self) -> Array:
-        """Points as built: those of the cells, then those of fixed blocks (m, 2) [m]."""
-        return np.concatenate([self.model.cells.places, *(points for _, points in self._fixed)])
-
-    @cached_property
-    def block(self) -> NDArray[np.intp]:
-        """Block of each point (m,)."""
-        fixed = [np.full(len(points), number) for number, points in self._fixed]
-        return np.concatenate([self.model.cells.block, *fixed]).astype(np.intp)
-
-    @cached_property
-    def polygons(self) -> list[NDArray[np.intp]]:
-        """Corner points of each polygon: the cells, then one for each fixed block."""
-        polygons = [np.asarray(cell, dtype=np.intp) for cell in self.model.cells.polygons]
-        start = len(self.model.cells.places)
-        for _, points in self._fixed:
-            polygons.append(np.arange(start, start + len(points)))
-            start += len(points)
-        return polygons
-
-    @cached_property
-    def owner(self) -> NDArray[np.intp]:
-        """Block of each polygon (p,)."""
-        return self.block[[polygon[0] for polygon in self.polygons]]
+    def cells(self) -> Cells:
+        """Polygons of all blocks as built: the cells, then one for each fixed block."""
+        cells = self.model.cells
+        outlines = [points for _, points in self._supports]
+        ends = np.cumsum([len(cells.places), *map(len, outlines)])
+        fixed = [np.full(len(points), number) for number, points in self._supports]
+        return Cells(
+            np.concatenate([cells.places, *outlines]),
+            np.concatenate([cells.block, *fixed]).astype(np.intp),
+            (*map(np.asarray, cells.polygons), *(np.arange(a, b) for a, b in pairwise(ends))),
+            cells.shape_functions,
+        )
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (m, 2) [m]."""
@@ -68,7 +57,7 @@ class Solids:
         centroids = [block.centroid for block in self.model.structure.blocks]
         fixed = [
             rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]
-            for number, points in self._fixed
+            for number, points in self._supports
         ]
         return np.concatenate([self.model.cells.displacement(q), *fixed])
 
@@ -76,7 +65,8 @@ class Solids:
         """Return σ_xx, σ_yy and σ_xy of every polygon (p, 3) [Pa]; None where blocks are rigid."""
         if self.model.cells.stress is None:
             return None
-        stress = np.full((len(self.polygons), 3), np.nan)
+        # fixed blocks do not deform: they have no stress
+        stress = np.full((len(self.cells.polygons), 3), np.nan)
         stress[: len(self.model.cells.polygons)] = (self.model.cells.stress @ q).reshape(-1, 3)
         return stress
 
@@ -89,22 +79,14 @@ class Solids:
     @cached_property
     def _anchors(self) -> tuple[NDArray[np.intp], Array]:
         """Ends of the polygon edge nearest to each corner (4 j, 2), and place on it (4 j,)."""
-        edges = np.concatenate([np.column_stack([c, np.roll(c, -1)]) for c in self.polygons])
-        owner = self.block[edges[:, 0]]
         joints = self.model.structure.joints
         blocks = np.repeat([n for joint in joints for n in (joint.lower, joint.higher)], 2)
-        anchors, fractions = [], []
-        for number, point in zip(blocks, self.corners.reshape(-1, 2), strict=True):
-            of_block = edges[owner == number]
-            start = self.places[of_block[:, 0]]
-            step = np.diff(self.places[of_block], axis=1)[:, 0]
-            fraction = np.sum((point - start) * step, axis=1) / np.sum(step * step, axis=1)
-            fraction = np.clip(fraction, 0.0, 1.0)
-            away = np.linalg.norm(start + fraction[:, None] * step - point, axis=1)
-            nearest = int(np.argmin(away))
-            anchors.append(of_block[nearest])
-            fractions.append(fraction[nearest])
-        return np.array(anchors), np.array(fractions)
+        nearest = [
+            self.cells.nearest_edge(number, point)[:2]
+            for number, point in zip(blocks, self.corners.reshape(-1, 2), strict=True)
+        ]
+        edges, fractions = zip(*nearest, strict=True)
+        return np.array(edges), np.array(fractions)
 
     def joint_faces(self, displacement: Array) -> Array:
         """Return the displacements of both faces of each joint, from those of all points.
@@ -115,9 +97,6 @@ class Solids:
         first, second = displacement[edges[:, 0]], displacement[edges[:, 1]]
         return (first + fraction[:, None] * (second - first)).reshape(-1, 4, 2)
 
-
-# VTK's cell types of triangles and quadrilaterals, by number of corners; other polygons have 7
-VTK_CELL_TYPES = {3: 5, 4: 9}
 
 # VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
 VTK_NUMBER_TYPES = {
@@ -137,10 +116,12 @@ def write_vtu(
 ) -> None:
     """Write polygons with data of their points and cells."""
     sizes = [len(polygon) for polygon in polygons]
+    # VTK's types by the number of corners: triangles, quadrilaterals, other polygons
+    types = [{3: 5, 4: 9}.get(size, 7) for size in sizes]
     cells: dict[str, NDArray[Any]] = {
         "connectivity": np.concatenate(polygons).astype(np.int64),
         "offsets": np.cumsum(sizes, dtype=np.int64),
-        "types": np.array([VTK_CELL_TYPES.get(size, 7) for size in sizes], dtype=np.uint8),
+        "types": np.array(types, dtype=np.uint8),
     }
     lines = [
         '<?xml version="1.0"?>',
@@ -186,9 +167,7 @@ def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
 
 def _array(name: str, values: NDArray[Any]) -> str:
     """Return an array as XML: the number of bytes and the bytes, base64-encoded."""
-    kind, number_type = (
-        VTK_NUMBER_TYPES[values.dtype.kind] if values.dtype != np.uint8 else VTK_NUMBER_TYPES["u"]
-    )
+    kind, number_type = VTK_NUMBER_TYPES[values.dtype.kind]
     data = np.ascontiguousarray(values, dtype=number_type).tobytes()
     size = np.array([len(data)], dtype="<u8").tobytes()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
@@ -223,13 +202,15 @@ def write_state(model: Model, q: Array, path: str | Path, *, magnification: floa
     displacement = solids.displacement(np.asarray(q, dtype=float))
     if path.suffix == ".dxf":
         return _write_drawing(solids, displacement, path, magnification)
-    data: dict[str, NDArray[Any]] = {"block": solids.owner.astype(np.int64)}
+    data: dict[str, NDArray[Any]] = {"block": solids.cells.owner.astype(np.int64)}
     stress = solids.stress(q)
     if stress is not None:
         names = ("stress_xx", "stress_yy", "stress_xy")
         data |= dict(zip(names, stress.T, strict=True))
     if path.suffix == ".vtu":
-        write_vtu(path, solids.places, solids.polygons, {"displacement": displacement}, data)
+        write_vtu(
+            path, solids.cells.places, solids.cells.polygons, {"displacement": displacement}, data
+        )
         return path
     return _write_with_meshio(solids, displacement, data, path)
 
@@ -237,10 +218,12 @@ def write_state(model: Model, q: Array, path: str | Path, *, magnification: floa
 def _write_drawing(solids: Solids, displacement: Array, path: Path, magnification: float) -> Path:
     """Write a drawing of the blocks as built and displaced."""
     structure = solids.model.structure
-    places = solids.places + magnification * displacement
+    places = solids.cells.places + magnification * displacement
     outlines: dict[str, list[tuple[str, Array]]] = {}
     for number, block in enumerate(structure.blocks):
-        loop = _trace_outline([cell for cell in solids.polygons if solids.block[cell[0]] == number])
+        loop = _trace_outline(
+            [cell for cell in solids.cells.polygons if solids.cells.block[cell[0]] == number]
+        )
         outlines.setdefault(block.part or "blocks", []).append((block.name, places[loop]))
     drawn = [(block.name, block.drawn()) for block in structure.blocks]
     built = [(name, np.vstack([points, points[:1]])) for name, points in drawn]
@@ -274,13 +257,13 @@ def _write_with_meshio(
         ) from error
     # meshio stores the cells of each type together
     types: dict[str, list[int]] = {}
-    for number, polygon in enumerate(solids.polygons):
+    for number, polygon in enumerate(solids.cells.polygons):
         cell_type = {3: "triangle", 4: "quad"}.get(len(polygon), f"polygon{len(polygon)}")
         types.setdefault(cell_type, []).append(number)
-    cells = [(t, np.array([solids.polygons[k] for k in rows])) for t, rows in types.items()]
+    cells = [(t, np.array([solids.cells.polygons[k] for k in rows])) for t, rows in types.items()]
     cell_data = {name: [values[rows] for rows in types.values()] for name, values in data.items()}
     point_data = {"displacement": _spatial(displacement)}
-    mesh = meshio.Mesh(_spatial(solids.places), cells, point_data, cell_data)
+    mesh = meshio.Mesh(_spatial(solids.cells.places), cells, point_data, cell_data)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         mesh.write(path)

@@ -4,7 +4,6 @@ Internal forces are f(q) = K q + Gᵀ W t(G q), with K the stiffness of the bloc
 of the joints. The joints are the only nonlinearity.
 """
 
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -17,7 +16,7 @@ from archfem.joints.rigid_kinematics import block_motion_gaps
 from archfem.joints.sparsity import Pattern
 from archfem.joints.step_average import StepForces
 from archfem.masonry.structure import Structure
-from archfem.models.model import Cells, Doubt, Model, ModelStep, Observer, Prediction
+from archfem.models.model import Cells, Model, ModelStep, Observer
 from archfem.models.observation import linear_observer
 
 
@@ -48,48 +47,28 @@ class LinearBlockModel(Model):
         self.operator = operator
         self.cells = cells
         self.support_motion = np.zeros((len(structure.blocks), 3))
-        self.initial_gaps: Array | None = None
-        self.prediction: Prediction | None = None
-        self.doubts: tuple[Doubt, ...] = ()
         self._pattern = pattern
         self._joint_tangent = operator.tangent_map(pattern)
         # point stiffnesses and tangent of the last call
         self._last: tuple[Array, sparse.csr_matrix] | None = None
 
-    def with_operator(self, operator: JointOperator) -> "LinearBlockModel":
-        """Return a model of the same blocks with another joint operator."""
-        return LinearBlockModel(
-            self.structure,
-            self.fidelity,
-            mass=self.mass,
-            block_stiffness=self.block_stiffness,
-            mass_influence=self.mass_influence,
-            operator=operator,
-            cells=self.cells,
-        ).with_support_motion(self.support_motion)
-
     def with_joint_law(self, operator: JointOperator) -> Self:
         """Return the model with another law at the same joint points."""
-        other = copy(self)
-        other.operator = operator
-        other._last = None
-        return other
+        return self.copy_with(operator=operator, _last=None)
 
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced: joints have gaps and slips at q = 0."""
         offset = self.initial_gaps
+        # gaps of moved supports add to those of construction
         if motion.any():
             gaps = block_motion_gaps(self.structure, self.operator.points, motion)
             offset = gaps if offset is None else gaps + offset
-        other = self.with_joint_law(replace(self.operator, gap_offset=offset))
-        other.support_motion = motion
-        return other
+        operator = replace(self.operator, gap_offset=offset)
+        return self.copy_with(operator=operator, support_motion=motion, _last=None)
 
     def with_initial_gaps(self, gaps: Array) -> Self:
         """Return the model with gaps and slips of its joints at q = 0, due to construction."""
-        other = copy(self)
-        other.initial_gaps = gaps
-        return other.with_support_motion(self.support_motion)
+        return self.copy_with(initial_gaps=gaps).with_support_motion(self.support_motion)
 
     @property
     def memory(self) -> Array:
@@ -98,9 +77,7 @@ class LinearBlockModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        other = copy(self)
-        other.operator = self.operator.with_memory(memory)
-        return other
+        return self.copy_with(operator=self.operator.with_memory(memory))
 
     def updated_memory(self, q: Array) -> Array:
         """Return the joint memory once the model is at q, as `memory`."""
@@ -139,7 +116,7 @@ class LinearBlockModel(Model):
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth, without slip."""
-        return self.assemble_tangent(1.0, self.operator.closed_stiffness())
+        return self.assemble_tangent(1.0, self.operator.elastic_stiffness())
 
     def energy(self, q: Array) -> float:
         """Return the potential energy of blocks and joints without further slip [J]."""
@@ -159,6 +136,7 @@ class LinearBlockStep:
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""
+        # mean over the step, shifted by the lag of damping: linear in time
         start, lag = self.joints.start, self.joints.damping_lag
         of_blocks = self.model.block_stiffness @ ((0.5 - lag) * start + (0.5 + lag) * q)
         return np.asarray(of_blocks) + self.joints.force(q)

@@ -7,7 +7,7 @@ it through this interface alone, whatever its fidelity and whether displacements
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -291,9 +291,9 @@ class Model(Protocol):
     cells: Cells
     operator: JointOperator | None
     support_motion: Array
-    initial_gaps: Array | None
-    prediction: Prediction | None
-    doubts: tuple[Doubt, ...]
+    initial_gaps: Array | None = None
+    prediction: Prediction | None = None
+    doubts: tuple[Doubt, ...] = ()
 
     def force(self, q: Array) -> Array:
         """Return the internal forces of blocks and joints (n,).
@@ -405,8 +405,12 @@ class Model(Protocol):
         Args:
             prediction: stored as `prediction`.
         """
+        return self.copy_with(prediction=prediction)
+
+    def copy_with(self, **attributes: Any) -> Self:
+        """Return a copy with other attributes; arrays and matrices are shared."""
         other = copy(self)
-        other.prediction = prediction
+        vars(other).update(attributes)
         return other
 
     def small_displacement_model(self) -> "Model":

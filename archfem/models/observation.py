@@ -48,6 +48,7 @@ class LinearObserver(Observer):
     @cached_property
     def _end_rows(self) -> sparse.csr_matrix:
         """Matrix from coordinates to displacements of the joint ends (4 n_joints, n)."""
+        # an end is midway between its two blocks, and supports do not depend on the coordinates
         fixed = sparse.csr_matrix((2, self.matrix.shape[1]))
         rows = [
             sum(
@@ -87,6 +88,7 @@ def _build_observer(model: Model, operator: JointOperator) -> LinearObserver:
     of_corners = cells.shape_functions[np.add.outer(2 * corners, (0, 1)).ravel()]
     return LinearObserver(
         sparse.vstack([of_faces, of_corners], "csr"),
+        # corners are read from zero on
         np.concatenate([face_offset, np.zeros(2 * len(corners))]),
         len(structure.joints),
         cells.block[corners],

@@ -11,7 +11,6 @@ with λ = β/Δt of damping with the time lag β, which also shifts gaps to g + 
 step is limited by μ |<t_n>| + c times the part of it for which the joint is closed.
 """
 
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -32,7 +31,7 @@ from archfem.models.fem.forms import Fields, Forms
 from archfem.models.fem.joint_facets import PointReader
 from archfem.models.fem.space import BrokenSpace
 from archfem.models.full import build_full_model
-from archfem.models.model import Doubt, Model, ModelStep, Observer, Prediction
+from archfem.models.model import Model, ModelStep, Observer
 from archfem.models.observation import linear_observer
 
 
@@ -61,12 +60,13 @@ class StepForms:
     def _lag(self) -> Any:
         return _fenicsx.constant(self.forms.space.mesh.grid, 0.0)
 
-    def _set_step(self, start: StepStart, end: Array) -> None:
+    def set_step(self, start: StepStart, end: Array) -> Self:
         """Set start and end of the step in all forms."""
         self._step[0].x.array[:] = start.displacement
         self._step[1].x.array[:] = end
         self._lag.value = start.damping_lag
         self.forms.facets.set_point_values(start.irreversible_slip)
+        return self
 
     @cached_property
     def _work(self) -> Any:
@@ -78,46 +78,30 @@ class StepForms:
         return forms.block_work(mean, v) + of_joints
 
     @cached_property
-    def _force(self) -> Any:
+    def force(self) -> Any:
+        """Mean of the internal forces (2 m,) [N]."""
         return fem.form(self._work)
 
-    def force(self, start: StepStart, end: Array) -> Array:
-        """Return the mean of the assembled internal forces (2 m,) [N]."""
-        self._set_step(start, end)
-        return _fenicsx.assemble_vector(self._force)
-
     @cached_property
-    def _tangent(self) -> Any:
+    def tangent(self) -> Any:
+        """Derivative of `force` by the displacement at the end [N/m]."""
         return fem.form(ufl.derivative(self._work, self._step[1]))
 
-    def tangent(self, start: StepStart, end: Array) -> sparse.csr_matrix:
-        """Return the assembled derivative of `force` by the displacement at the end [N/m]."""
-        self._set_step(start, end)
-        return _fenicsx.assemble_matrix(self._tangent)
-
     @cached_property
-    def _tractions(self) -> PointReader:
+    def tractions(self) -> PointReader:
+        """Mean tractions and final irreversible slip at joint facet points (3, f, k)."""
         step, lag = self._step, self._lag
         return self.forms.point_reader(
             [[*f.means(step, lag), f.slip_after_step(step, lag)] for f in self.forms.faces]
         )
 
-    def tractions(self, start: StepStart, end: Array) -> Array:
-        """Return mean tractions and final irreversible slip at joint facet points (3, f, k)."""
-        self._set_step(start, end)
-        return self.forms.facets.read(self._tractions)
-
     @cached_property
-    def _dissipation(self) -> Any:
+    def dissipation(self) -> Any:
+        """Energy lost to friction and damping [J]."""
         step, lag, forms = self._step, self._lag, self.forms
         change = step[1] - step[0]
         at_joints = forms.over_joints([faces.dissipation(step, lag) for faces in forms.faces])
         return fem.form(lag * forms.block_work(change, change) + at_joints)
-
-    def dissipation(self, start: StepStart, end: Array) -> float:
-        """Return the energy lost to friction and damping [J]."""
-        self._set_step(start, end)
-        return float(fem.assemble_scalar(self._dissipation))
 
 
 class MonolithicModel(Model):
@@ -126,7 +110,6 @@ class MonolithicModel(Model):
     fidelity = "monolithic"
     large_displacements = False
     operator = None
-    initial_gaps = None
 
     def __init__(self, space: BrokenSpace, rule: Quadrature) -> None:
         linear = build_full_model(space, rule)
@@ -135,11 +118,10 @@ class MonolithicModel(Model):
         self.mass_influence = linear.mass_influence
         self.cells = linear.cells
         self.support_motion = linear.support_motion
-        self.prediction: Prediction | None = None
-        self.doubts: tuple[Doubt, ...] = ()
         self.free = space.free
         self.steps = StepForms(Forms(space, rule))
         self._forms = self.steps.forms
+        self.facets = self._forms.facets
         self._linear = linear
         self._places, self._owner = space.places, space.owner
         self._displacement = np.zeros(2 * len(space.places))  # workspace, of all nodes
@@ -153,10 +135,8 @@ class MonolithicModel(Model):
 
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced: their nodes follow."""
-        other = copy(self)
-        other.support_motion = motion
-        other._displacement = self._support_displacement(motion)
-        return other
+        displacement = self._support_displacement(motion)
+        return self.copy_with(support_motion=motion, _displacement=displacement)
 
     def _support_displacement(self, motion: Array) -> Array:
         """Displacements of all nodes, zero but for those of fixed blocks (2 m,) [m]."""
@@ -180,13 +160,11 @@ class MonolithicModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        other = copy(self)
-        other._memory = memory
-        return other
+        return self.copy_with(_memory=memory)
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
-        return self._forms.facets.gather(self._tractions(q)[2])
+        return self.facets.gather(self._tractions(q)[2])
 
     def begin_step(self, start: Array, damping_lag: float) -> ModelStep:
         """Return a time step from a state with the present joint memory."""
@@ -203,6 +181,7 @@ class MonolithicModel(Model):
 
     def spread(self, q: Array) -> Array:
         """Return displacements of all nodes, those of fixed blocks included (2 m,) [m]."""
+        # one workspace: each call overwrites what the last one returned
         self._displacement[self.free] = q
         return self._displacement
 
@@ -233,7 +212,7 @@ class MonolithicModel(Model):
 
     def resultants(self, q: Array) -> Array:
         """Return N, V, M of every joint, for the whole width (n_joints, 3) [N, N, N m]."""
-        return self._forms.facets.resultants(*self._tractions(q)[:2])
+        return self.facets.resultants(*self._tractions(q)[:2])
 
     def _tractions(self, q: Array) -> Array:
         return self._forms.tractions(self.spread(q), self._memory)
@@ -246,24 +225,28 @@ class MonolithicStep:
     model: MonolithicModel  # with the joint memory at the start
     start: StepStart
 
+    def _forms(self, q: Array) -> StepForms:
+        """Return the forms of the step to q, which the steps of a model share."""
+        return self.model.steps.set_step(self.start, self.model.spread(q))
+
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""
-        return self.model.steps.force(self.start, self.model.spread(q))[self.model.free]
+        return _fenicsx.assemble_vector(self._forms(q).force)[self.model.free]
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `force` (n, n)."""
-        return self.model.of_free(self.model.steps.tangent(self.start, self.model.spread(q)))
+        return self.model.of_free(_fenicsx.assemble_matrix(self._forms(q).tangent))
 
     def _tractions(self, q: Array) -> Array:
-        return self.model.steps.tractions(self.start, self.model.spread(q))
+        return self.model.facets.read(self._forms(q).tractions)
 
     def resultants(self, q: Array) -> Array:
         """Return the means of N, V, M of every joint (n_joints, 3) [N, N, N m]."""
-        return self.model.steps.forms.facets.resultants(*self._tractions(q)[:2])
+        return self.model.facets.resultants(*self._tractions(q)[:2])
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point at the end (p,) [m]."""
-        return self.model.steps.forms.facets.gather(self._tractions(q)[2])
+        return self.model.facets.gather(self._tractions(q)[2])
 
     def with_dilatancy(self, q: Array) -> "MonolithicStep":
         """Return the step itself: the weak forms exclude dilatancy."""
@@ -271,4 +254,4 @@ class MonolithicStep:
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction and damping [J]."""
-        return self.model.steps.dissipation(self.start, self.model.spread(q))
+        return float(fem.assemble_scalar(self._forms(q).dissipation))

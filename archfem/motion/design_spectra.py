@@ -1,14 +1,14 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from archfem._typing import Array
-from archfem._validation import check_fields, check_number, check_unmasked, short_repr
+from archfem._validation import check_fields, check_number, check_unmasked
 from archfem.errors import InvalidInput
-from archfem.motion.response_spectra import check_oscillators
+from archfem.motion.response_spectra import as_periods, check_oscillators
 from archfem.units import STANDARD_GRAVITY
 
 # No code has a larger spectral acceleration [g]: the unit must be wrong.
@@ -84,10 +84,8 @@ class Tbec2018:
     def __post_init__(self) -> None:
         check_number(self.ss, "map value S_S [g]")
         check_number(self.s1, "map value S_1 [g]")
-        if not (
-            0.0 < self.ss <= MAX_SPECTRAL_ACCELERATION
-            and 0.0 < self.s1 <= MAX_SPECTRAL_ACCELERATION
-        ):
+        values = (self.ss, self.s1)
+        if not 0.0 < min(values) <= max(values) <= MAX_SPECTRAL_ACCELERATION:
             raise InvalidInput(f"S_S {self.ss!r}, S_1 {self.s1!r} g: both are between 0 and 10 g")
         check_fields(self)
         if self.site == "ZF":
@@ -98,16 +96,14 @@ class Tbec2018:
     @property
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
-        return self.ss * float(
-            np.interp(self.ss, _SHORT_PERIOD_LEVELS, _SHORT_PERIOD_FACTORS[self.site])
-        )
+        factor = np.interp(self.ss, _SHORT_PERIOD_LEVELS, _SHORT_PERIOD_FACTORS[self.site])
+        return self.ss * float(factor)
 
     @property
     def sd1(self) -> float:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
-        return self.s1 * float(
-            np.interp(self.s1, _LONG_PERIOD_LEVELS, _LONG_PERIOD_FACTORS[self.site])
-        )
+        factor = np.interp(self.s1, _LONG_PERIOD_LEVELS, _LONG_PERIOD_FACTORS[self.site])
+        return self.s1 * float(factor)
 
     def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
@@ -154,10 +150,8 @@ _GROUND_TYPES = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_VERTICAL_RATIOS, _VERTICAL_PERIODS = (
-    {1: 0.90, 2: 0.45},
-    (0.05, 0.15, 1.0),
-)  # a_vg / a_g; T_B, T_C, T_D [s]
+_VERTICAL_RATIOS = {1: 0.90, 2: 0.45}  # a_vg / a_g [-]
+_VERTICAL_PERIODS = (0.05, 0.15, 1.0)  # T_B, T_C, T_D [s]
 
 
 @dataclass(frozen=True)
@@ -191,11 +185,8 @@ class Eurocode8:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if (
-            not 0.0
-            < check_number(self.ag, "design ground acceleration [g]")
-            <= MAX_SPECTRAL_ACCELERATION
-        ):
+        ag = check_number(self.ag, "design ground acceleration [g]")
+        if not 0.0 < ag <= MAX_SPECTRAL_ACCELERATION:
             raise InvalidInput(
                 f"design ground acceleration {self.ag!r} g: expected more than 0, up to "
                 f"{MAX_SPECTRAL_ACCELERATION:g}"
@@ -218,7 +209,7 @@ class Eurocode8:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
         soil, *corners = _GROUND_TYPES[self.type][self.ground]
-        top = 2.5 * self._reduction
+        top = 2.5 * damping_correction(self.damping)
         natural = validate_periods(periods, 4.0)
         return self.ag * soil * top * spectrum_shape(natural, tuple(corners), lowest=1.0 / top)
 
@@ -231,14 +222,9 @@ class Eurocode8:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
-        top = 3.0 * self._reduction
+        top = 3.0 * damping_correction(self.damping)
         shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
         return self.ag * _VERTICAL_RATIOS[self.type] * top * shape
-
-    @property
-    def _reduction(self) -> float:
-        """Damping correction factor η [-]."""
-        return max(float(np.sqrt(10.0 / (5.0 + 100.0 * self.damping))), 0.55)
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,16 +300,18 @@ class TableSpectrum:
 
 def validate_periods(periods: float | Array, longest: float) -> Array:
     """Return periods as an array, refused where a spectrum is not defined."""
-    try:
-        natural = np.asarray(periods, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+    natural = as_periods(periods)
     check_oscillators(natural, 0.05)
     if np.any(natural > longest):
         raise InvalidInput(
             f"period {natural.max():g} s: this spectrum is defined up to {longest:g} s"
         )
     return natural
+
+
+def damping_correction(damping: float) -> float:
+    """Return the damping correction factor η of European codes [-]."""
+    return max(float(np.sqrt(10.0 / (5.0 + 100.0 * damping))), 0.55)
 
 
 def spectrum_shape(periods: Array, corners: tuple[float, ...], *, lowest: float) -> Array:
@@ -418,7 +406,7 @@ class Ntc2018:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
         """
-        top = self._reduction * self.f0
+        top = damping_correction(self.damping) * self.f0
         shape = spectrum_shape(validate_periods(periods, 4.0), self.corners, lowest=1.0 / top)
         return self.ag * self.soil * self.topography * top * shape
 
@@ -431,20 +419,35 @@ class Ntc2018:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where the code gives none.
         """
-        top = self._reduction * self.f0
+        top = damping_correction(self.damping) * self.f0
         shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
         # table 3.2.VI has the periods of Eurocode 8, and S_S = 1
         factor = 1.35 * float(self.ag) ** 1.5 * self.topography
         return factor * top * shape
 
-    @property
-    def _reduction(self) -> float:
-        """Damping correction factor η [-]."""
-        return max(float(np.sqrt(10.0 / (5.0 + 100.0 * self.damping))), 0.55)
+
+class _HorizontalSpectrum:
+    """Base class of codes whose vertical spectrum has to be given by points."""
+
+    code: ClassVar[str]
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Refuse: the vertical spectrum has to be given by points.
+
+        Args:
+            periods: natural periods, of any shape [s].
+
+        Raises:
+            InvalidInput: always.
+        """
+        raise InvalidInput(
+            f"{self.code} is here without its vertical spectrum: give one by points, as a "
+            "TableSpectrum with vertical_values"
+        )
 
 
 @dataclass(frozen=True)
-class Asce2022:
+class Asce2022(_HorizontalSpectrum):
     """Two-period design spectrum of ASCE/SEI 7-22, 5 % damping.
 
     (0.4 + 0.6 T/T_0) S_DS, S_DS from T_0 = 0.2 S_D1/S_DS, S_D1/T from T_S = S_D1/S_DS, S_D1 T_L/T²
@@ -464,6 +467,8 @@ class Asce2022:
     References:
         ASCE/SEI 7-22 (2022), sections 11.4.4 and 11.4.5.2.
     """
+
+    code = "ASCE 7-22"
 
     sds: float
     sd1: float
@@ -490,20 +495,9 @@ class Asce2022:
         corners = (0.2 * end, end, self.tl)
         return self.sds * spectrum_shape(validate_periods(periods, np.inf), corners, lowest=0.4)
 
-    def vertical(self, periods: float | Array) -> Array:
-        """Refuse: the vertical spectrum has to be given by points.
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: always.
-        """
-        raise InvalidInput(_no_vertical_message("ASCE 7-22"))
-
 
 @dataclass(frozen=True)
-class Eurocode2024:
+class Eurocode2024(_HorizontalSpectrum):
     """Horizontal elastic spectrum of EN 1998-1-1:2024 with the recommended values, 5 % damping.
 
     With S_α = F_T F_α S_α,RP and S_β = F_T F_β S_β,RP: S_α/F_A to T_A = 0.02 s, straight to S_α at
@@ -527,6 +521,8 @@ class Eurocode2024:
     References:
         EN 1998-1-1:2024, clause 5.2.2.2.
     """
+
+    code = "Eurocode 8 (2024)"
 
     s_alpha: float
     s_beta: float
@@ -567,25 +563,6 @@ class Eurocode2024:
         beyond = np.maximum(natural + cut, falls)
         level = self.topography * self.f_alpha * self.s_alpha
         return level * shape * (falls / beyond) * np.minimum(1.0, far / beyond)
-
-    def vertical(self, periods: float | Array) -> Array:
-        """Refuse: the vertical spectrum has to be given by points.
-
-        Args:
-            periods: natural periods, of any shape [s].
-
-        Raises:
-            InvalidInput: always.
-        """
-        raise InvalidInput(_no_vertical_message("Eurocode 8 (2024)"))
-
-
-def _no_vertical_message(code: str) -> str:
-    """Return the error of a spectrum without vertical component."""
-    return (
-        f"{code} is here without its vertical spectrum: give one by points, as a TableSpectrum "
-        "with vertical_values"
-    )
 
 
 def _check_positive(value: float, name: str) -> float:

@@ -76,6 +76,14 @@ def interpolate_steps(samples: Array, parts: int) -> Array:
     return np.interp(fine, np.arange(len(samples)), samples)
 
 
+def as_periods(periods: float | Array) -> Array:
+    """Return natural periods as an array of numbers."""
+    try:
+        return np.asarray(periods, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+
+
 def check_oscillators(periods: Array, damping: float) -> None:
     """Refuse negative periods, and damping ratios outside 0 to 1."""
     if not (np.all(np.isfinite(periods)) and np.all(np.asarray(periods) >= 0.0)):
@@ -96,11 +104,7 @@ def _find_parabola_peak(row: Array) -> tuple[float, float]:
 
 
 def response_spectrum(
-    motion: Motion,
-    periods: float | Array,
-    damping: float = 0.05,
-    *,
-    component: str = "horizontal",
+    motion: Motion, periods: float | Array, damping: float = 0.05, *, component: str = "horizontal"
 ) -> Array:
     """Return the pseudo-acceleration spectrum of one component: ω² times the largest displacement.
 
@@ -131,10 +135,7 @@ def response_spectrum(
     """
     check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
     check_unmasked(periods, "periods [s]")
-    try:
-        natural = np.asarray(periods, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"periods {short_repr(periods)} s are no numbers") from error
+    natural = as_periods(periods)
     samples = motion.component(component)
     peaks = find_peak_responses(samples, motion.dt, natural.ravel(), damping)[0]
     spectrum: Array = np.abs(peaks)

@@ -1,16 +1,11 @@
 """Artificial accelerograms: filtered white noise under an intensity envelope."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_integer, check_number, count_pieces
 from archfem.errors import InvalidInput
 from archfem.motion.signal_processing import MAX_SAMPLES, correct_baseline
-
-# Frequency [rad/s] and damping ratio of firm ground; the vertical has higher frequencies (Clough,
-# Penzien, section 28-5).
-_GROUND_FILTERS = {"horizontal": (15.0, 0.6), "vertical": (25.0, 0.6)}
 
 
 def generate_accelerogram(
@@ -53,9 +48,13 @@ def generate_enveloped_noise(
         Clough, Penzien, Dynamics of structures (1993). Jennings, Housner, Tsai, Simulated
         earthquake motions, EERL (1968).
     """
-    ground, damping = _GROUND_FILTERS[component]
+    # frequency [rad/s] and damping ratio of firm ground (Clough, Penzien, section 28-5)
+    ground, damping = (25.0 if component == "vertical" else 15.0), 0.6
     omega = 2.0 * np.pi * np.fft.rfftfreq(2 * count, dt)
-    shape = _kanai_tajimi(omega / ground, damping) * _high_pass(omega / (0.1 * ground), damping)
+    # transfer function of the ground, and a filter that leaves no energy at frequency zero
+    low, high = omega / ground, omega / (0.1 * ground)
+    kanai_tajimi = (1.0 + 2.0j * damping * low) / (1.0 - low**2 + 2.0j * damping * low)
+    shape = kanai_tajimi * (-(high**2) / (1.0 - high**2 + 2.0j * damping * high))
     noise = np.fft.irfft(np.fft.rfft(random.standard_normal(2 * count)) * shape)[:count]
     samples = correct_baseline(noise * intensity_envelope(count), dt)
     return samples / np.abs(samples).max()
@@ -65,13 +64,3 @@ def intensity_envelope(count: int) -> Array:
     """Return the intensity in time (count,) [-]: parabolic rise, plateau of 1, exponential fade."""
     time = np.linspace(0.0, 1.0, count)
     return np.minimum(time / 0.15, 1.0) ** 2 * np.exp(-5.0 * np.maximum(time - 0.5, 0.0))
-
-
-def _kanai_tajimi(ratio: Array, damping: float) -> NDArray[np.complex128]:
-    """Return the transfer function of the ground at frequencies relative to its own."""
-    return (1.0 + 2.0j * damping * ratio) / (1.0 - ratio**2 + 2.0j * damping * ratio)
-
-
-def _high_pass(ratio: Array, damping: float) -> NDArray[np.complex128]:
-    """Return Clough and Penzien's second filter, which leaves no energy at frequency zero."""
-    return -(ratio**2) / (1.0 - ratio**2 + 2.0j * damping * ratio)

@@ -171,12 +171,7 @@ class LoadPath:
         return True
 
     def _solve_step(
-        self,
-        row: Array,
-        target: float,
-        distance: float,
-        share: float,
-        guess: Array | None = None,
+        self, row: Array, target: float, distance: float, share: float, guess: Array | None = None
     ) -> bool:
         """Add the equilibrium with row·(q, λ) = target, once joint memory is stationary."""
         x = np.append(self.states[-1], self.factors[-1]) if guess is None else guess

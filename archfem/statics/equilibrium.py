@@ -281,8 +281,11 @@ def _increment_load(
         target = min(1.0, factor + step)
         model, load = at(target)
         model = model.with_memory(state.model.memory)
+        # blocks follow a motion of the supports to first order
+        motion = model.support_motion - state.model.support_motion
+        guess = linear_predictor(state.model, state.q, motion) if motion.any() else state.q
         try:
-            model, solution = find(solver, model, load, _initial_guess(state, model))
+            model, solution = find(solver, model, load, guess)
         except DidNotConverge as error:
             # the step stays halved for the rest of the load
             step /= 2.0
@@ -296,12 +299,6 @@ def _increment_load(
         state = Equilibrium(model, solution.q, iterations, state.steps + 1)
         factor = target
     return state
-
-
-def _initial_guess(state: Equilibrium, model: Model) -> Array:
-    """Return the coordinates of the last equilibrium, displaced with its supports (n,)."""
-    motion = model.support_motion - state.model.support_motion
-    return linear_predictor(state.model, state.q, motion) if motion.any() else state.q
 
 
 def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[Doubt, ...]:

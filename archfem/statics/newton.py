@@ -18,13 +18,7 @@ from archfem._optional import require_package
 from archfem._typing import Array
 from archfem._validation import check_number, check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.statics.newton_iteration import (
-    Equations,
-    NewtonEngine,
-    Residual,
-    ScipyNewton,
-    Tangent,
-)
+from archfem.statics.newton_iteration import Equations, NewtonEngine, Residual, ScipyNewton, Tangent
 
 # Residual, relative to the load, above which it cannot be round-off [-]
 MAX_ROUND_OFF_RESIDUAL = 1e-7
@@ -34,9 +28,6 @@ MAX_SCIPY_UNKNOWNS = 300
 
 # Line searches in the order tried: along an energy, and down the residual where joints slide
 CONVEX_SEARCHES, SLIDING_SEARCHES = ("basic", "cp"), ("basic", "bt")
-
-# Iterations of each line search; more than a dozen full steps are a cycle of joint statuses
-MAX_SEARCH_ITERATIONS = {"basic": 12, "cp": 60, "bt": 60}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +89,8 @@ class EquilibriumSolver:
         for search in searches:
             light = self._scipy_engine if search == "basic" else None
             engine = self._engine if light is None else light
-            attempt = engine.attempt(equations, start, search, MAX_SEARCH_ITERATIONS[search])
+            # more than a dozen full steps are a cycle of joint statuses
+            attempt = engine.attempt(equations, start, search, 12 if search == "basic" else 60)
             iterations += attempt.iterations
             if not attempt.failure:
                 return Solution(attempt.q, iterations, attempt.residual)

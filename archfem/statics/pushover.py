@@ -34,9 +34,9 @@ STEP_GROWTH = 1.1
 # as about a hinge that moves from joint to joint.
 STAGNATION_STEPS = 40
 
-# Relative load increments of relaxation: the first trial, and the smallest one, to which failed
-# trials are halved. The limit is then accurate to the latter [-].
-RELAXATION_LOAD_STEP, MIN_RELAXATION_LOAD_STEP = 0.05, 0.002
+# Smallest relative load increment of relaxation, to which failed trials are halved: the accuracy of
+# the limit [-]
+MIN_RELAXATION_LOAD_STEP = 0.002
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,7 +271,7 @@ def continue_by_relaxation(path: Path, stop: Stop, criteria: Criteria) -> str | 
     """Load a structure whose joints slide further by relaxation; return the rule that ended it."""
     if not (isinstance(path, LoadPath) and len(path.states) > 1 and sliding_joints(path, criteria)):
         return None
-    farthest, share = stop.displacement * path.model.structure.size, RELAXATION_LOAD_STEP
+    farthest, share = stop.displacement * path.model.structure.size, 0.05  # the first trial
     while share > MIN_RELAXATION_LOAD_STEP:
         if not path.advance_by_relaxation(share * path.factors[-1], farthest):
             share /= 2.0

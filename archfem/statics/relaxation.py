@@ -127,7 +127,7 @@ def _solve_creep_step(
         solution = _solve_with_drag(solver, tresca, load, (start, q), drag, ("basic", "cp"))
         q, iterations = solution.q, iterations + solution.iterations
         opening = joints.effective_gaps(q)
-        limit = joints.coulomb_limit(joints.law.forces(opening), joints.law.closed_area(opening))
+        limit = joints.coulomb_limit(joints.law.forces(opening), joints.law.contact_area(opening))
     return Solution(q, iterations, solution.residual)
 
 
@@ -175,7 +175,7 @@ def is_stationary(model: Model, q: Array, iterations: int) -> bool:
     operator = model.operator
     if iterations > 0 or operator is None or operator.bonds is None:
         return iterations == 0
-    return not operator.bonds.exceeded(operator.effective_gaps(q)).any()
+    return not operator.bonds.find_exceeded(operator.effective_gaps(q)).any()
 
 
 def solve_irreversible(

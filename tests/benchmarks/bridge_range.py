@@ -27,7 +27,7 @@ from timing import table
 
 import archfem as af
 from archfem.dynamics.history import History
-from archfem.joints.criteria import assessed_joints, failed_joints
+from archfem.joints.criteria import assessed_joints, find_failed_joints
 from archfem.limit.mechanism_count import Mechanism, duration_text, episode
 from archfem.models.builder import build
 from archfem.units import mm
@@ -166,7 +166,7 @@ def row(name: str, pair: str, run: History, seconds: float) -> list[object]:
         name,
         pair,
         f"{float(abs(joints['eccentricity']).max()):.3f}",
-        int(failed_joints(joints).sum("joint").max()),
+        int(find_failed_joints(joints).sum("joint").max()),
         f"{widest(run) / mm:.2f}",
         f"{float(abs(joints['slip']).max()) / mm:.2f}",
         f"{float(dataset['residual_displacement'].where(stones, 0.0).max()) / mm:.2f}",

@@ -172,11 +172,11 @@ def test_frames_of_a_fall_turn_blocks_about_their_centroids():
     assert [frame.time for frame in shown] == [1.0, 1.5, 1.52]
     for frame, pose in zip(shown[1:], poses, strict=True):
         for number, block in enumerate(ring.blocks):
-            own = solids.block == number
-            arm = (solids.places[own] - block.centroid) @ [1.0, 1.0j]
+            own = solids.cells.block == number
+            arm = (solids.cells.places[own] - block.centroid) @ [1.0, 1.0j]
             to = arm * np.exp(1j * pose[number, 2]) + block.centroid @ [1.0, 1.0j]
             to += pose[number, :2] @ [1.0, 1.0j]
-            moved = (solids.places[own] + frame.displacement[own]) @ [1.0, 1.0j]
+            moved = (solids.cells.places[own] + frame.displacement[own]) @ [1.0, 1.0j]
             assert moved == pytest.approx(to, abs=1e-12)
         assert frame.stress.shape == shown[0].stress.shape
         assert not frame.stress.any()

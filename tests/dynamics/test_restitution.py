@@ -227,7 +227,7 @@ def test_a_block_on_its_joint_by_closed_forms():
     lag = 2.0 * 0.3 / bounce
     assert block.damping(0.3).stiffness == pytest.approx(lag)
     weight = WEIGHT * BREADTH * HEIGHT
-    x, y, turn = block.tilted(weight)
+    x, y, turn = block.tilt_coordinates(weight)
     ends = y + turn * np.array([-BREADTH / 2.0, BREADTH / 2.0])
     assert x == pytest.approx(-turn * HEIGHT / 2.0)  # no slip at the base
     assert turn == pytest.approx(-block.tilt)

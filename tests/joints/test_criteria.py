@@ -13,7 +13,7 @@ from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
     envelope,
-    failed_joints,
+    find_failed_joints,
     first_time,
     longest_duration,
     sliding_ratio,
@@ -29,7 +29,7 @@ def test_flags(joints):
     assert joints["open"].sum() == 1
     assert joints["judged"].all()
     assert [joints[name].dtype for name in ("hinge", "slide", "open")] == [np.int8, bool, bool]
-    assert failed_joints(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
+    assert find_failed_joints(joints)[2].values.nonzero()[0].tolist() == [3, 7, 11, 14]
 
 
 @pytest.mark.parametrize("share", [1.0 - 1e-9, 1.0, 1.0 + 1e-9])

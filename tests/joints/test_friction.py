@@ -108,7 +108,7 @@ def test_no_point_bears_more_shear_than_friction_holds(rule):
         model, q, _ = places(mixed(rule=rule), seed)
         operator = model.operator
         normal, shear = operator.point_forces(q)
-        closed = operator.law.closed_area(operator.openings(q))
+        closed = operator.law.contact_area(operator.openings(q))
         slides = np.isfinite(operator.points.friction)
         limit = operator.points.cohesion[slides] * closed[slides]
         limit -= operator.points.friction[slides] * normal[slides]

@@ -19,7 +19,7 @@ def test_with_coulombs_limits_forces_are_coulombs(pushed):
     model, q = pushed
     joints = model.operator
     opening = joints.openings(q)
-    own = joints.coulomb_limit(joints.law.forces(opening), joints.law.closed_area(opening))
+    own = joints.coulomb_limit(joints.law.forces(opening), joints.law.contact_area(opening))
     given = TrescaJoints.of(joints, own)
     assert np.any(np.abs(joints.trial_shear(q)) > own)
     assert np.array_equal(given.force(q), joints.force(q))

@@ -50,7 +50,7 @@ def test_joints_that_more_cohesion_holds_than_is_closed_are_told(
 ):
     """Of 10 N of cohesion, 40 % is closed."""
     monkeypatch.setattr(
-        collapse, "closed_fractions", lambda structure, normal, moment: np.full(2, 0.4)
+        collapse, "contact_fractions", lambda structure, normal, moment: np.full(2, 0.4)
     )
     structure = SimpleNamespace(
         cohesion=np.full(2, 10.0),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.joints.contact_law import is_closed
 from archfem.masonry.assembly import assembled
 from archfem.models.fem import _fenicsx
 from archfem.models.fem.joint_facets import JointFacets
@@ -90,7 +91,7 @@ def test_an_instant_is_that_of_the_joint_operator(both):
         assert differ(getattr(slow, name)(q), getattr(full, name)(q)) < SAME, name
     assert differ(slow.tangent(q) @ direction, full.tangent(q) @ direction) < SAME
     slid = full.updated_memory(q) - full.memory
-    status = full.operator.closed_points(q)
+    status = is_closed(full.operator.effective_gaps(q))
     assert 0.2 < status.mean() < 0.8
     assert 0.0 < np.mean(slid[status] != 0.0) < 1.0  # of the closed points some hold
 
@@ -187,5 +188,5 @@ def test_history_in_which_joints_open_and_slide():
         assert differ(slow.dataset[key], full.dataset[key]) < SOLVED
     of_beds = full.joints["friction"].isel(joint=slice(2)).max("time")
     assert of_beds.values == pytest.approx(BED.friction, rel=1e-9)  # all of their points slide
-    open_ = ~rungs()[0].operator.closed_points(full.dataset["last_q"].values)
+    open_ = ~is_closed(rungs()[0].operator.effective_gaps(full.dataset["last_q"].values))
     assert 0.0 < open_.mean() < 1.0

@@ -321,7 +321,7 @@ def test_joints_that_never_stop_are_given_up(found, monkeypatch):
     ("felt", "iterations", "stays"), [(0.1, 0, False), (-0.1, 0, True), (-0.1, 1, False)]
 )
 def test_a_bond_that_is_torn_does_not_last(felt, iterations, stays):
-    bonds = SimpleNamespace(exceeded=lambda gaps: gaps > 0.0)
+    bonds = SimpleNamespace(find_exceeded=lambda gaps: gaps > 0.0)
     joints = SimpleNamespace(bonds=bonds, effective_gaps=lambda q: np.array([-1.0, felt]))
     assert (
         relaxation.is_stationary(SimpleNamespace(operator=joints), np.zeros(2), iterations) is stays

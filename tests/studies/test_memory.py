@@ -153,16 +153,16 @@ def test_cases_differ_where_their_arches_stand_in_another_order():
 
 def test_a_mesh_serves_other_materials_and_no_other_shape():
     pytest.importorskip("dolfinx")
-    from archfem.models.fem.mesh import cached_mesh
+    from archfem.models.fem.mesh import get_mesh
 
     asked = Discretisation("full", (2, 2))
     stiff, soft = (
         af.column(breadth=0.6, heights=[1.0], contact=af.Contact(stiffness, 3e8, 0.6, "joint"))
         for stiffness in (1e9, 2e9)
     )
-    first, again = cached_mesh(stiff, asked), cached_mesh(soft, asked)
+    first, again = get_mesh(stiff, asked), get_mesh(soft, asked)
     assert first.grid is again.grid
     assert again.structure is soft
     wider = af.column(breadth=0.7, heights=[1.0])
-    assert cached_mesh(wider, asked).grid is not first.grid
-    assert cached_mesh(stiff, Discretisation("full", (3, 2))).grid is not first.grid
+    assert get_mesh(wider, asked).grid is not first.grid
+    assert get_mesh(stiff, Discretisation("full", (3, 2))).grid is not first.grid

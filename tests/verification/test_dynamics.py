@@ -10,6 +10,7 @@ from orders import observed_order
 from scipy.linalg import eigh
 
 import archfem as af
+from archfem.joints.contact_law import is_closed
 
 STILL = af.Motion(np.zeros(2), 1.0)
 NEWMARK, CONSERVING = af.dynamics.Newmark(), af.dynamics.Conserving()
@@ -94,7 +95,7 @@ def pushed(model, dead):
     equation = af.dynamics.Equation(model, STILL)
     velocity = np.zeros(model.size)
     velocity[0::3] = 0.05
-    opened = ~model.operator.closed_points(dead.q + 0.01 * velocity)
+    opened = ~is_closed(model.operator.effective_gaps(dead.q + 0.01 * velocity))
     assert opened.any()
     state = replace(equation.at_rest(dead.q, memory=dead.model.memory), velocity=velocity)
     return equation.released(state), 0.5 * velocity @ (model.mass @ velocity)

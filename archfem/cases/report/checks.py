@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from archfem.cases.case import Case
+from archfem.cases.provenance import hash_file
 from archfem.cases.report.report_data import ReportData, missing_note
 from archfem.dynamics.history import History
 from archfem.dynamics.recorder import library_versions
@@ -32,18 +33,14 @@ def build_check_section(data: ReportData) -> Section:
     if not any("predicted_error" in run.dataset.attrs for run in data.runs.values()):
         remedy = 'fidelity = "auto" predicts one.'
         blocks.append(missing_note("a predicted error of the model", remedy))
-    if (text := data.read_text("accuracy.txt")) is not None:
-        caption = "Speed against error over fidelities, meshes and steps."
-        blocks += [TextBlock(text, "lines"), *data.read_figure("accuracy.png", caption)]
-    else:
-        remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
-        blocks.append(missing_note("a comparison of meshes and steps", remedy))
-    if (text := data.read_text("verdict_range.txt")) is not None:
-        caption = "Residual displacement over each property; falls are above the line."
-        blocks += [TextBlock(text, "lines"), *data.read_figure("verdict_range.png", caption)]
-    else:
-        remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
-        blocks.append(missing_note("the range of the verdict", remedy))
+    caption = "Speed against error over fidelities, meshes and steps."
+    remedy = "`archfem accuracy CASE.toml --out FOLDER` adds it to the folder."
+    missing = missing_note("a comparison of meshes and steps", remedy)
+    blocks += data.read_result("accuracy.txt", "accuracy.png", caption, missing)
+    caption = "Residual displacement over each property; falls are above the line."
+    remedy = "`archfem verdict CASE.toml --out FOLDER` adds it to the folder."
+    missing = missing_note("the range of the verdict", remedy)
+    blocks += data.read_result("verdict_range.txt", "verdict_range.png", caption, missing)
     return Section("Predicted error, checks and range of the verdict", blocks)
 
 
@@ -155,7 +152,11 @@ def build_source_section(data: ReportData) -> Section:
     if data.folder is not None:
         files = sorted(path for path in data.folder.rglob("*") if _is_source(path))
         table = [
-            [str(path.relative_to(data.folder)), f"{path.stat().st_size / 1e3:.1f}", _hash(path)]
+            [
+                str(path.relative_to(data.folder)),
+                f"{path.stat().st_size / 1e3:.1f}",
+                hash_file(path)[:16],
+            ]
             for path in files
         ]
         caption = "Files that the report was written from"
@@ -179,12 +180,3 @@ def _is_source(path: Path) -> bool:
     figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy")
     text = path.suffix in (".nc", ".toml", ".txt")
     return path.is_file() and (text or (path.suffix == ".png" and path.stem in figures))
-
-
-def _hash(path: Path) -> str:
-    """Return the first 16 digits of the SHA-256 of a file, read in chunks."""
-    with path.open("rb") as file:
-        digest = sha256()
-        while chunk := file.read(1 << 20):
-            digest.update(chunk)
-    return digest.hexdigest()[:16]

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -40,6 +41,14 @@ class ReportData:
     def motions(self) -> dict[str, Motion]:
         """Ground motions as applied, from the recorded accelerations."""
         return {name: rebuild_motion(run, name) for name, run in self.runs.items()}
+
+    def read_result(self, text: str, figure: str, caption: str, missing: TextBlock) -> list[Any]:
+        """Return table and picture of a command in the folder, or a note if they are missing."""
+        # a report shows what other commands left in the folder, and computes nothing itself
+        lines = self.read_text(text)
+        if lines is None:
+            return [missing]
+        return [TextBlock(lines, "lines"), *self.read_figure(figure, caption)]
 
     def read_text(self, name: str) -> str | None:
         """Return the text of a file of the folder, or None."""

@@ -253,24 +253,21 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
 
 def _build_modes(data: ReportData) -> list[Any]:
     """Build table and shapes of the modes from the files of the folder."""
-    text = data.read_text("modes.txt")
-    if text is None:
-        remedy = "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
-        return [missing_note("modes", remedy)]
+    missing = missing_note(
+        "modes", "`archfem modes CASE.toml --out FOLDER` adds them to the folder."
+    )
     caption = "Shapes of the modes about dead load."
-    return [TextBlock(text, "lines"), *data.read_figure("modes.png", caption)]
+    return data.read_result("modes.txt", "modes.png", caption, missing)
 
 
 def _build_limit(data: ReportData) -> list[Any]:
     """Build text and mechanism of limit analysis from the files of the folder."""
-    text = data.read_text("limit.txt")
-    if text is None:
-        remedy = "A case with a table [limit] includes it."
-        if data.case.limit is not None:
-            remedy = "The case includes it: `archfem run CASE.toml --out FOLDER` finds it."
-        return [missing_note("limit analysis", remedy)]
+    remedy = "A case with a table [limit] includes it."
+    if data.case.limit is not None:
+        remedy = "The case includes it: `archfem run CASE.toml --out FOLDER` finds it."
     caption = "The mechanism of limit analysis, over the structure."
-    return [TextBlock(text, "lines"), *data.read_figure("collapse.png", caption)]
+    missing = missing_note("limit analysis", remedy)
+    return data.read_result("limit.txt", "collapse.png", caption, missing)
 
 
 def build_ground_section(data: ReportData) -> Section:

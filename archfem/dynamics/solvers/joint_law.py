@@ -204,7 +204,7 @@ def joint_law(
         numbers.gain if conserving else 0.0,
         numbers.lag / dt,
         gaps.openings,
-        0.5 * float(np.sum(offset * joints.closed_forces(offset))),
+        0.5 * float(np.sum(offset * joints.elastic_forces(offset))),
         law_points,
         np.zeros(count, POINT_STATE),
         segments,

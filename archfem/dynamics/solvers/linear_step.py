@@ -107,7 +107,7 @@ def joint_rows(equation: Equation, dt: float) -> JointRows:
     law, rows, pairs = joint_law(joints, equation.numbers(dt), dt, equation.conserving)
     shear, weight = joints.shear_resultants(), equation.weight
     if joints.gap_offset is not None:
-        weight = weight - joints.generalised_force(*joints.closed_forces(joints.gap_offset))
+        weight = weight - joints.generalised_force(*joints.elastic_forces(joints.gap_offset))
     # shear of joints that can slide is summed up point by point instead
     return JointRows(rows, shear[:0] if joints.slides else shear, weight, law, pairs)
 

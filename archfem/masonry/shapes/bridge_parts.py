@@ -44,7 +44,7 @@ class Arch:
         """Check the lengths and the embrace."""
         if (self.embrace is None) == (self.rise is None):
             raise InvalidStructure(f"'{self.name}': give either embrace or rise, the other follows")
-        _check_positive(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
+        _check_lengths(self, "span", "thickness", *(["rise"] if self.embrace is None else []))
         if self.embrace is None:
             return
         embrace = in_degrees(self.embrace, f"'{self.name}': embrace")
@@ -60,6 +60,7 @@ class Arch:
         if self.embrace is not None:
             return radians(float(self.embrace)) / 2.0
         assert self.rise is not None
+        # tangent half-angle: the chord from springing to crown makes half the angle with the span
         return 2.0 * atan2(self.rise, self.span / 2.0)
 
     @property
@@ -96,7 +97,7 @@ class Pier:
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_positive(self, "gap", "height", "course")
+        _check_lengths(self, "gap", "height", "course")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,8 +126,8 @@ class Sidewall:
 
     def __post_init__(self) -> None:
         """Check the state and the lengths."""
-        _check_positive(self, "length", "height", "course")
-        _check_not_negative(self, "above", "setback")
+        _check_lengths(self, "length", "height", "course")
+        _check_lengths(self, "above", "setback", zero=True)
         if self.state not in ("free", "retained", "fixed"):
             raise InvalidStructure(
                 f"'{self.name}': state '{self.state}' is unknown: free, retained or fixed"
@@ -157,7 +158,7 @@ class Backfill:
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_not_negative(self, "cover", "erosion", "hump", "spandrels")
+        _check_lengths(self, "cover", "erosion", "hump", "spandrels", zero=True)
 
     def surface(self, left: float, right: float, crown: Point) -> list[Point]:
         """Return points of the surface, from left to right [m].
@@ -168,6 +169,7 @@ class Backfill:
             crown: the highest point of the rings below [m].
         """
         deck = crown[1] + self.cover
+        # The surface falls by 1 in 2 from the hump to the eroded level on both sides.
         low, slope = deck - self.erosion, 2.0 * self.erosion
         reach = crown[0] + np.array([-self.hump - slope, -self.hump, self.hump, self.hump + slope])
         breaks = reach[(reach > left) & (reach < right)] if self.erosion else reach[:0]
@@ -209,26 +211,16 @@ class Paving:
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_positive(self, "thickness", "length")
+        _check_lengths(self, "thickness", "length")
 
 
-def _check_positive(part: Any, *keys: str) -> None:
-    """Check that lengths are positive and below 1000 m."""
+def _check_lengths(part: Any, *keys: str, zero: bool = False) -> None:
+    """Check that lengths are positive, or also zero, and below 1000 m."""
     for key in keys:
         value = getattr(part, key)
         check_type(value, Real, f"'{part.name}': {key} = {short_repr(value)}", "give a length in m")
         value = float(value) if is_number(value) else np.nan
-        if not 0.0 < value < 1e3:
-            raise InvalidStructure(
-                f"'{part.name}': {key} {value:.4g} m is not between 0 and 1000 m"
-            )
-
-
-def _check_not_negative(part: Any, *keys: str) -> None:
-    """Check that lengths are not negative and below 1000 m."""
-    for key in keys:
-        value = getattr(part, key)
-        check_type(value, Real, f"'{part.name}': {key} = {short_repr(value)}", "give a length in m")
-        value = float(value) if is_number(value) else np.nan
-        if not 0.0 <= value < 1e3:
-            raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not from 0 to 1000 m")
+        # NaN fails both comparisons; more than a kilometre is a mistake of units.
+        if not (0.0 < value < 1e3 or (zero and value == 0.0)):
+            words = "from 0 to" if zero else "between 0 and"
+            raise InvalidStructure(f"'{part.name}': {key} {value:.4g} m is not {words} 1000 m")

@@ -62,12 +62,16 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
     builder = StoneworkBuilder(material, contact, chords)
     faces, extrados = builder.build(arches, piers, sidewalls)
     if backfill is not None:
-        bottom = _base_of_fill(faces, list(chain(*extrados)), sidewalls)
+        # from left to right: what the fill rests on outside the springings, and all rings
+        left, right = fill_ledge(faces[0][0], 1.0, sidewalls[:1]), faces[-1][1]
+        right_ledge = fill_ledge(right, -1.0, sidewalls[1:])[::-1]
+        bottom = [*left, *chain(*extrados), *right_ledge]
         top = backfill.surface(bottom[0][0], bottom[-1][0], _highest_crown(faces, extrados))
         _check_cover(bottom, top)
         builder.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
         if paving is not None:
             builder.pave(top, paving)
+    # Before joints are searched: blocks that overlap have wrong ones.
     builder.check()
     soil = contact if backfill is None else backfill.contact
 
@@ -102,20 +106,12 @@ def _check_parts(
         raise InvalidStructure("paving lies on backfill: give backfill too, or no paving")
 
 
-def _base_of_fill(
-    faces: Sequence[tuple[Face, Face]], extrados: Sequence[Point], sidewalls: Sequence[Sidewall]
-) -> list[Point]:
-    """Return the lower boundary of the fill, from left to right."""
-    left, right = faces[0][0], faces[-1][1]
-    after = fill_ledge(right, -1.0, sidewalls[1:])
-    return [*fill_ledge(left, 1.0, sidewalls[:1]), *extrados, *reversed(after)]
-
-
 def _highest_crown(
     faces: Sequence[tuple[Face, Face]], extrados: Sequence[Sequence[Point]]
 ) -> Point:
     """Return the highest crown, midway between its springings; of equal ones the first."""
     levels = [max(y for _, y in points) for points in extrados]
+    # equal crowns differ by round-off
     level = max(levels)
     left, right = next(f for f, y in zip(faces, levels, strict=True) if y > level - 1e-9)
     return 0.5 * (left[0][0] + right[0][0]), level
@@ -178,8 +174,8 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
     """
     return arcade(
         spans=[span],
-        rises=None if rise is None else [rise],
-        embraces=None if embrace is None else [embrace],
+        rises=rise,
+        embraces=embrace,
         heights=height,
         breadths=breadth,
         thicknesses=thickness,
@@ -233,33 +229,22 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
         InvalidStructure: the numbers or lengths do not fit together.
     """
     count = len(check_numbers(spans, "spans [m]"))
+    of_rings = _expand_values(
+        count, thicknesses=thicknesses, voussoirs=voussoirs, rises=rises, embraces=embraces
+    )
     arches = [
         Arch(
             span=span, thickness=thick, voussoirs=stones, rise=rise, embrace=turn, name=f"arch {k}"
         )
-        for k, (span, thick, stones, rise, turn) in enumerate(
-            zip(
-                spans,
-                _expand_values(thicknesses, count, "thicknesses"),
-                _expand_values(voussoirs, count, "voussoirs"),
-                _expand_values(rises, count, "rises"),
-                _expand_values(embraces, count, "embraces"),
-                strict=True,
-            ),
-            1,
-        )
+        for k, (span, thick, stones, rise, turn) in enumerate(zip(spans, *of_rings, strict=True), 1)
     ]
-    sides = [*(arch.reach for arch in arches), 0.0], [0.0, *(arch.reach for arch in arches)]
+    # A pier is flush with the intrados of its rings: half their springing joints stand on it.
+    reach = [0.0, *(arch.reach for arch in arches), 0.0]
+    of_piers = _expand_values(count + 1, breadths=breadths, heights=heights)
     piers = [
         Pier(gap=broad - right - left, height=high, course=course, name=f"pier {k}")
         for k, (broad, high, right, left) in enumerate(
-            zip(
-                _expand_values(breadths, count + 1, "breadths"),
-                _expand_values(heights, count + 1, "heights"),
-                *sides,
-                strict=True,
-            ),
-            1,
+            zip(*of_piers, reach[1:], reach[:-1], strict=True), 1
         )
     ]
     return bridge(
@@ -273,12 +258,14 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     )
 
 
-def _expand_values(values_or_one: object, count: int, name: str) -> list[Any]:
-    """Return a list with one value for each part."""
-    if values_or_one is None or isinstance(values_or_one, float | int | str):
-        return [values_or_one] * count
-    values: list[Any] = list(values_or_one)  # type: ignore[call-overload]
-    values = values * count if len(values) == 1 else values
-    if len(values) != count:
-        raise InvalidStructure(f"{len(values)} {name}: give one for all, or {count}")
-    return values
+def _expand_values(count: int, **values: Any) -> list[list[Any]]:
+    """Return a list of each argument with one value for each part."""
+    rows = []
+    for name, given in values.items():
+        single = given is None or isinstance(given, float | int | str)
+        row = [given] if single else list(given)
+        row = row * count if len(row) == 1 else row
+        if len(row) != count:
+            raise InvalidStructure(f"{len(row)} {name}: give one for all, or {count}")
+        rows.append(row)
+    return rows

@@ -6,7 +6,7 @@ left springing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 
@@ -22,6 +22,77 @@ from archfem.units import G, in_degrees
 
 # Limit for the number of voussoirs, and of chords of each
 MAX_VOUSSOIRS = 10_000
+
+
+# Intrados and extrados of a stone, each from left to right (n, 2) [m]
+Faces = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class RingGeometry:
+    """Division of a ring into stones, and the properties that all its blocks and joints share."""
+
+    thickness: float  # [m]
+    voussoirs: int  # number of stones
+    chords: int  # straight pieces of each face of a stone
+    width: float  # out of plane [m]
+    material: Material
+    contact: Contact
+    gravity: float  # [m/s²]
+
+    def check(self, **lengths: float) -> None:
+        """Check the numbers of stones and chords, the thickness, and further lengths [m]."""
+        check_integer(self.voussoirs, "voussoirs")
+        check_integer(self.chords, "chords")
+        for key, value in {"thickness": self.thickness, **lengths}.items():
+            # A ring of a kilometre is a mistake of units.
+            if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
+                raise InvalidStructure(f"{key} {value:.4g} m is not between 0 and 1000 m")
+
+    def split(self, inner: Array, outer: Array) -> list[Faces]:
+        """Divide points along intrados and extrados, from left to right, into those of stones."""
+        # Neighbours share the points of their joint.
+        ends = [(k * self.chords, (k + 1) * self.chords + 1) for k in range(self.voussoirs)]
+        return [(inner[a:b], outer[a:b]) for a, b in ends]
+
+    def divide(self, section: Callable[[Array], Faces]) -> list[Faces]:
+        """Return the faces of equal stones from a parametrisation of intrados and extrados."""
+        return self.split(*section(np.linspace(0.0, 1.0, self.voussoirs * self.chords + 1)))
+
+    def assemble(
+        self,
+        stones: Sequence[Faces],
+        name: str,
+        centre: Point | None = None,
+        abutment_depth: float | None = None,
+    ) -> Structure:
+        """Assemble stones, from left to right, between two fixed abutments."""
+        sections = [(inner[0], outer[0]) for inner, outer in stones]
+        sections.append((stones[-1][0][-1], stones[-1][1][-1]))
+        faces = [(_as_point(inner), _as_point(outer)) for inner, outer in sections]
+        blocks = [
+            Block(
+                # anticlockwise: along the intrados, and back along the extrados
+                (*map(_as_point, inner), *map(_as_point, outer[::-1])),
+                self.material,
+                f"voussoir {k}",
+                corners=(0, len(inner) - 1, len(inner), len(inner) + len(outer) - 1),
+                part="arch",
+                centre=centre,
+                role="ring",
+            )
+            for k, (inner, outer) in enumerate(stones, 1)
+        ]
+        depth = abutment_depth
+        if depth is None:
+            depth = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
+        left = _build_abutment(faces[0], -1.0, depth, self.material, "left abutment")
+        right = _build_abutment(faces[-1], 1.0, depth, self.material, "right abutment")
+        joints = [
+            Joint((k, k + 1), *face, self.contact, f"joint {k}", "arch", "ring")
+            for k, face in enumerate(faces)
+        ]
+        return Structure((left, *blocks, right), tuple(joints), self.width, self.gravity, name)
 
 
 def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -80,22 +151,16 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     half = radians(embrace) / 2.0
     angles = np.linspace(-half, half, voussoirs * pieces + 1)
     inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
-    faces = [(_point_on_circle(inner, a), _point_on_circle(outer, a)) for a in angles]
+    faces = [
+        np.array([(r * np.sin(angle), r * np.cos(angle)) for angle in angles])
+        for r in (inner, outer)
+    ]
+    # Sectors have their true area and centroid; stones with chords are plain polygons.
     centre = (0.0, 0.0) if chords is None else None
-    stones = [
-        build_voussoir(
-            faces[k * pieces : (k + 1) * pieces + 1], material, f"voussoir {k + 1}", centre
-        )
-        for k in range(voussoirs)
-    ]
+    # Beyond a semicircle the abutments approach each other: they must not meet.
     depth = thickness / 2.0 if half < 0.5 * pi else min(thickness / 2.0, 0.9 * inner * sin(half))
-    left = build_abutment(faces[0], -1.0, depth, material, "left abutment")
-    right = build_abutment(faces[-1], 1.0, depth, material, "right abutment")
-    joints = [
-        Joint((k, k + 1), *faces[k * pieces], contact, f"joint {k}", "arch", "ring")
-        for k in range(voussoirs + 1)
-    ]
-    return Structure((left, *stones, right), tuple(joints), width, gravity, "circular arch")
+    ring = RingGeometry(thickness, voussoirs, pieces, width, material, contact, gravity)
+    return ring.assemble(ring.split(*faces), "circular arch", centre, depth)
 
 
 def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, int]:
@@ -143,20 +208,8 @@ def column(
         raise InvalidStructure(
             f"a column of breadth {breadth} m and heights {list(heights)} m: give lengths above 0"
         )
-    half = breadth / 2.0
-    levels = [-0.2 * min(heights), 0.0, *np.cumsum(heights).tolist()]
-    blocks = [
-        Block(
-            ((-half, top), (-half, low), (half, low), (half, top)),
-            material,
-            f"block {k}" if k else "base",
-            fixed=k == 0,
-            corners=(0, 1, 2, 3),
-            part="column",
-            role="pier",
-        )
-        for k, (low, top) in enumerate(pairwise(levels))
-    ]
+    half, levels = breadth / 2.0, _bed_levels(heights)
+    blocks = _stack_blocks(0.0, breadth, levels, material, "column", ("base", "block"))
     joints = [
         Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
@@ -215,15 +268,24 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
         InvalidStructure: the lengths do not form a ring, or it does not rest on its piers.
     """
     ring = circular_arch(
-        radius=radius, thickness=thickness, embrace=180.0, voussoirs=voussoirs, chords=chords
+        radius=radius,
+        thickness=thickness,
+        embrace=180.0,
+        voussoirs=voussoirs,
+        material=material,
+        chords=chords,
     )
-    courses = _check_pier(pier_breadth, courses, thickness, radius)
-    levels = [0.0, *np.cumsum(courses).tolist()]
-    levels = [level - levels[-1] for level in [-0.2 * min(courses), *levels]]
-    left = _build_pier(-radius, pier_breadth, levels, material, "left pier")
-    right = _build_pier(radius, pier_breadth, levels, material, "right pier")
-    stones = tuple(replace(stone, material=material) for stone in ring.blocks[1:-1])
-    blocks = (*left, *stones, *reversed(right))
+    levels = _bed_levels(_check_pier(pier_breadth, courses, thickness, radius))
+    # The springings are at y = 0, at the level of the centre of the ring.
+    levels = [level - levels[-1] for level in levels]
+    left, right = (
+        _stack_blocks(
+            x, pier_breadth, levels, material, part, (f"{part} foundation", f"{part} course")
+        )
+        for x, part in ((-radius, "left pier"), (radius, "right pier"))
+    )
+    # The top courses of the piers take the place of the abutments.
+    blocks = (*left, *ring.blocks[1:-1], *reversed(right))
     inner = -radius + pier_breadth / 2.0, radius - pier_breadth / 2.0
     outer = -radius - pier_breadth / 2.0, radius + pier_breadth / 2.0
     beds = [((inner[0], y), (outer[0], y), "left pier", "pier") for y in levels[1:-1]]
@@ -236,16 +298,27 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     return Structure(blocks, joints, width, gravity, "arch on piers")
 
 
-def _build_pier(
-    middle: float, breadth: float, levels: Sequence[float], material: Material, part: str
+def _bed_levels(heights: Sequence[float]) -> list[float]:
+    """Return the levels of the beds of courses above y = 0, and of the base of a foundation."""
+    # The depth of the foundation is arbitrary: it does not deform.
+    return [-0.2 * min(heights), 0.0, *np.cumsum(heights).tolist()]
+
+
+def _stack_blocks(
+    middle: float,
+    breadth: float,
+    levels: Sequence[float],
+    material: Material,
+    part: str,
+    names: tuple[str, str],
 ) -> list[Block]:
-    """Build the foundation and the courses between levels, from below."""
+    """Build rectangular blocks between levels, the lowest fixed; names of it and of the others."""
     left, right = middle - breadth / 2.0, middle + breadth / 2.0
     return [
         Block(
             ((left, top), (left, low), (right, low), (right, top)),
             material,
-            f"{part} course {k}" if k else f"{part} foundation",
+            f"{names[1]} {k}" if k else names[0],
             fixed=k == 0,
             corners=(0, 1, 2, 3),
             part=part,
@@ -284,24 +357,7 @@ def _resolve_circle(
     return inner + thickness / 2.0, degrees(2.0 * asin(min(1.0, span / 2.0 / inner)))
 
 
-def _point_on_circle(radius: float, angle: float) -> Point:
-    """Return a point of a circle at an angle from the crown, positive to the right."""
-    return (float(radius * np.sin(angle)), float(radius * np.cos(angle)))
-
-
-def build_voussoir(
-    faces: Sequence[tuple[Point, Point]], material: Material, name: str, centre: Point | None
-) -> Block:
-    """Build a voussoir from its radial sections."""
-    intrados = [face[0] for face in faces]
-    extrados = [face[1] for face in reversed(faces)]
-    n = len(faces)
-    corners = (0, n - 1, n, 2 * n - 1)
-    outline = (*intrados, *extrados)
-    return Block(outline, material, name, corners=corners, part="arch", centre=centre, role="ring")
-
-
-def build_abutment(
+def _build_abutment(
     face: tuple[Point, Point], side: float, depth: float, material: Material, name: str
 ) -> Block:
     """Build the fixed block behind a springing joint."""
@@ -312,10 +368,6 @@ def build_abutment(
     start, end = (near, far) if side > 0 else (far, near)
     outline = tuple((float(x), float(y)) for x, y in (start[0], end[0], end[1], start[1]))
     return Block(outline, material, name, fixed=True, corners=(0, 1, 2, 3), part=name, role="other")
-
-
-# Intrados and extrados of a stone, each from left to right (n, 2) [m]
-Faces = tuple[Array, Array]
 
 
 def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -349,7 +401,8 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     Raises:
         InvalidStructure: the lengths do not form a pointed arch.
     """
-    _check_ring(thickness, voussoirs, chords, span=span, rise=rise)
+    ring = RingGeometry(thickness, voussoirs, chords, width, material, contact, gravity)
+    ring.check(span=span, rise=rise)
     if rise < span / 2.0:
         raise InvalidStructure(
             f"rise {rise:.4g} m is below half the span {span:.4g} m: that is no pointed arch; give "
@@ -357,7 +410,9 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
         )
     radius = (span**2 / 4.0 + rise**2) / span
     centre = radius - span / 2.0
+    # The extrados of both arcs meets above the apex, at a smaller angle than the intrados.
     top, outer_top = atan2(rise, centre), acos(centre / (radius + thickness))
+    # Stones are equally long; an odd number leaves half a keystone at the top of each half.
     turns = np.minimum(2.0 * top / voussoirs * np.arange(voussoirs // 2 + 2), top)
 
     def arc(start: float, end: float, size: float) -> Array:
@@ -368,9 +423,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     for start, end in pairwise(turns[: (voussoirs + 1) // 2 + 1]):
         far = outer_top if end == top else end
         left.append((arc(start, end, radius), arc(start, far, radius + thickness)))
-    return _assemble_ring(
-        _mirror_stones(left, voussoirs), width, material, contact, gravity, "pointed arch"
-    )
+    return ring.assemble(_mirror_stones(left, voussoirs), "pointed arch")
 
 
 def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
@@ -401,20 +454,24 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     Raises:
         InvalidStructure: the lengths do not form an arch.
     """
-    _check_ring(thickness, voussoirs, chords, span=span, rise=rise)
+    ring = RingGeometry(thickness, voussoirs, chords, width, material, contact, gravity)
+    ring.check(span=span, rise=rise)
     half = span / 2.0
     angles = np.linspace(0.0, np.pi, 4001)  # the length of the ellipse is exact to 1e-7
-    distances = _cumulative_length(np.column_stack([-half * np.cos(angles), rise * np.sin(angles)]))
+
+    def points(angle: Array) -> Array:
+        return np.column_stack([-half * np.cos(angle), rise * np.sin(angle)])
+
+    distances = _cumulative_length(points(angles))
 
     def section(share: Array) -> Faces:
+        # The length of an ellipse has no closed form: its inverse is interpolated.
         angle = np.interp(share * distances[-1], distances, angles)
         normal = np.column_stack([-rise * np.cos(angle), half * np.sin(angle)])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        points = np.column_stack([-half * np.cos(angle), rise * np.sin(angle)])
-        return points, points + thickness * normal
+        return points(angle), points(angle) + thickness * normal
 
-    stones = _divide_ring(section, voussoirs, chords)
-    return _assemble_ring(stones, width, material, contact, gravity, "elliptical arch")
+    return ring.assemble(ring.divide(section), "elliptical arch")
 
 
 def flat_arch(
@@ -444,10 +501,12 @@ def flat_arch(
         InvalidInput: the angle looks like radians.
         InvalidStructure: the lengths do not form an arch.
     """
-    _check_ring(thickness, voussoirs, 1, span=span)
+    ring = RingGeometry(thickness, voussoirs, 1, width, material, contact, gravity)
+    ring.check(span=span)
     angle = in_degrees(skewback, "skewback")
     if not 0.0 < angle < 60.0:
         raise InvalidStructure(f"skewback {angle:.4g}° is not between 0° and 60°: try 20°")
+    # All joints meet in one point below, so that the top is the soffit enlarged from there.
     growth = 1.0 + thickness * tan(np.radians(angle)) / (span / 2.0)
 
     def section(share: Array) -> Faces:
@@ -455,8 +514,7 @@ def flat_arch(
         low = np.column_stack([x, np.zeros_like(x)])
         return low, np.column_stack([growth * x, np.full_like(x, thickness)])
 
-    stones = _divide_ring(section, voussoirs, 1)
-    return _assemble_ring(stones, width, material, contact, gravity, "flat arch")
+    return ring.assemble(ring.divide(section), "flat arch")
 
 
 def arch_along(
@@ -488,7 +546,8 @@ def arch_along(
         InvalidStructure: they are fewer than three, two consecutive ones coincide, or the ring
             crosses itself.
     """
-    _check_ring(thickness, voussoirs, chords)
+    ring = RingGeometry(thickness, voussoirs, chords, width, material, contact, gravity)
+    ring.check()
     rows = [
         check_numbers(point, f"intrados[{k}] [m]", 2)
         for k, point in enumerate(check_sequence(intrados, "intrados"))
@@ -498,6 +557,7 @@ def arch_along(
         raise InvalidStructure(
             f"an intrados of {len(points)} points: give at least three, no two alike in a row"
         )
+    # Stones are numbered from the left, whichever way the points are listed.
     points = points if points[0, 0] < points[-1, 0] else points[::-1]
     distances = _cumulative_length(points)
     slope = np.gradient(points, distances, axis=0, edge_order=2)
@@ -509,30 +569,12 @@ def arch_along(
         inner = np.column_stack([x, y])
         return inner, inner + thickness * normal
 
-    stones = _divide_ring(section, voussoirs, chords)
-    return _assemble_ring(stones, width, material, contact, gravity, "arch")
-
-
-def _check_ring(thickness: float, voussoirs: int, chords: int, **lengths: float) -> None:
-    """Check the lengths and numbers of a ring."""
-    check_integer(voussoirs, "voussoirs")
-    check_integer(chords, "chords")
-    for key, value in {"thickness": thickness, **lengths}.items():
-        if not 0.0 < check_number(value, f"{key} [m]") < 1e3:
-            raise InvalidStructure(f"{key} {value:.4g} m is not between 0 and 1000 m")
+    return ring.assemble(ring.divide(section), "arch")
 
 
 def _cumulative_length(points: Array) -> Array:
     """Return the length of a polyline up to each of its points (n,) [m]."""
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-
-
-def _divide_ring(section: Callable[[Array], Faces], voussoirs: int, chords: int) -> list[Faces]:
-    """Return the faces of equal stones from a parametrisation of intrados and extrados."""
-    shares = np.linspace(0.0, 1.0, voussoirs * chords + 1)
-    inner, outer = section(shares)
-    ends = [(k * chords, (k + 1) * chords + 1) for k in range(voussoirs)]
-    return [(inner[a:b], outer[a:b]) for a, b in ends]
 
 
 def _mirror_stones(left: list[Faces], count: int) -> list[Faces]:
@@ -541,43 +583,12 @@ def _mirror_stones(left: list[Faces], count: int) -> list[Faces]:
     def mirror(points: Array) -> Array:
         return points[::-1] * (-1.0, 1.0)
 
+    right = [(mirror(inner), mirror(outer)) for inner, outer in reversed(left)]
     if count % 2 == 0:
-        return [*left, *((mirror(a), mirror(b)) for a, b in reversed(left))]
-    inner, outer = (np.concatenate([half, mirror(half)[1:]]) for half in left[-1])
-    return [*left[:-1], (inner, outer), *((mirror(a), mirror(b)) for a, b in reversed(left[:-1]))]
-
-
-def _assemble_ring(
-    stones: Sequence[Faces],
-    width: float,
-    material: Material,
-    contact: Contact,
-    gravity: float,
-    name: str,
-) -> Structure:
-    """Assemble stones, from left to right, between two fixed abutments."""
-    sections = [(inner[0], outer[0]) for inner, outer in stones]
-    sections.append((stones[-1][0][-1], stones[-1][1][-1]))
-    faces = [(_as_point(inner), _as_point(outer)) for inner, outer in sections]
-    blocks = [
-        Block(
-            (*map(_as_point, inner), *map(_as_point, outer[::-1])),
-            material,
-            f"voussoir {k}",
-            corners=(0, len(inner) - 1, len(inner), len(inner) + len(outer) - 1),
-            part="arch",
-            role="ring",
-        )
-        for k, (inner, outer) in enumerate(stones, 1)
-    ]
-    depth = 0.5 * float(np.linalg.norm(np.subtract(*faces[0])))
-    left = build_abutment(faces[0], -1.0, depth, material, "left abutment")
-    right = build_abutment(faces[-1], 1.0, depth, material, "right abutment")
-    joints = [
-        Joint((k, k + 1), *face, contact, f"joint {k}", "arch", "ring")
-        for k, face in enumerate(faces)
-    ]
-    return Structure((left, *blocks, right), tuple(joints), width, gravity, name)
+        return [*left, *right]
+    # The halves of the keystone share the point at the crown.
+    inner, outer = (np.concatenate([a, b[1:]]) for a, b in zip(left[-1], right[0], strict=True))
+    return [*left[:-1], (inner, outer), *right[1:]]
 
 
 def _as_point(place: Array) -> Point:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import cos
+from typing import Any
 
 import numpy as np
 
@@ -26,12 +27,14 @@ def build_ring(
     ring = circular_arch(
         radius=arch.radius,
         thickness=arch.thickness,
+        # with its unit, so that no small angle is taken for radians
         embrace=f"{np.degrees(2.0 * arch.half):.17g} degree",
         voussoirs=arch.voussoirs,
         material=material,
         contact=contact,
         chords=chords,
     )
+    # from the centre of the circle to the left end of the deck and the springing level
     right, up = left + arch.span / 2.0, -arch.radius * cos(arch.half)
 
     def at(point: Point) -> Point:
@@ -54,16 +57,11 @@ def build_ring(
     return replace(ring, blocks=tuple(blocks), joints=tuple(joints), name=arch.name)
 
 
-def springing_face(joint: Joint) -> Face:
-    """Return both ends of a springing joint."""
-    return joint.intrados, joint.extrados
-
-
 def extrados_points(ring: Structure) -> list[Point]:
     """Return the points along the extrados of a ring, from left to right [m]."""
     points = [ring.joints[0].extrados]
     for block in ring.blocks[1:-1]:
-        half = len(block.outline) // 2
+        half = len(block.outline) // 2  # the extrados is the second half, from the right
         points += list(reversed(block.outline[half:-1]))
     return points
 
@@ -107,20 +105,20 @@ class StoneworkBuilder:
         for number, arch in enumerate(arches):
             rings.append(build_ring(arch, x, self.material, self.contact, self.chords))
             x += arch.span + (piers[number].gap if number < len(piers) else 0.0)
-        faces = [(ring.joints[0], ring.joints[-1]) for ring in rings]
-        springings = [(springing_face(left), springing_face(right)) for left, right in faces]
+        joints = [[(joint.intrados, joint.extrados) for joint in ring.joints] for ring in rings]
+        springings = [(faces[0], faces[-1]) for faces in joints]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
             first = len(self.blocks)
-            self.blocks += ring.blocks[1:-1]
+            self.blocks += ring.blocks[1:-1]  # its abutments are the supports of this bridge
             last, right = len(self.blocks) - 1, springings[number][1]
             if number < len(piers):
                 after = self._build_pier(piers[number], right, springings[number + 1][0])
             else:
                 after = self._build_end(right, -1.0, ends[1:], "right abutment")
             stones = [support, *range(first, last + 1), after]
-            for k, (pair, joint) in enumerate(zip(pairwise(stones), ring.joints, strict=True)):
-                self._add_joint(pair, springing_face(joint), f"joint {k}", arch)
+            for k, (pair, face) in enumerate(zip(pairwise(stones), joints[number], strict=True)):
+                self._add_joint(pair, face, f"joint {k}", arch)
             support = after
         return springings, [extrados_points(ring) for ring in rings]
 
@@ -137,8 +135,10 @@ class StoneworkBuilder:
     ) -> int:
         """Add a block and return its number."""
         points = [(float(px), float(py)) for px, py in outline]
+        # Parts of no height or setback leave equal points one after the other.
         points = [point for k, point in enumerate(points) if point != points[k - 1]]
         x, y = np.array(points).T
+        # On the right side outlines come out clockwise, and blocks must be anticlockwise.
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0:
             points = [points[0], *reversed(points[1:])]
         corners = (0, 1, 2, 3) if structured else None
@@ -157,6 +157,7 @@ class StoneworkBuilder:
 
     def pave(self, surface: Sequence[Point], paving: Paving) -> None:
         """Lay paving stones on a surface."""
+        # Stones end where the slope of the surface changes.
         breaks, levels = np.array(surface).T
         parts = [
             np.linspace(a, b, count_pieces(b - a, paving.length, "paving stones") + 1)[:-1]
@@ -185,19 +186,11 @@ class StoneworkBuilder:
         self.joints.append(Joint(pair, *ends, self.contact, name, part.name, part.role))
 
     def _add_stone(
-        self,
-        outline: Sequence[Point],
-        words: str,
-        part: Courses,
-        *,
-        fixed: bool = False,
-        structured: bool = False,
+        self, outline: Sequence[Point], words: str, part: Courses, **options: Any
     ) -> int:
         """Add a block of a pier or sidewall and return its number."""
         name = f"{part.name}, {words}"
-        return self.add(
-            outline, name, part=part.name, role=part.role, fixed=fixed, structured=structured
-        )
+        return self.add(outline, name, part=part.name, role=part.role, **options)
 
     def _build_pier(self, pier: Pier, left: Face, right: Face) -> int:
         """Build a pier under two springings; return the number of its skewback."""
@@ -208,36 +201,36 @@ class StoneworkBuilder:
                 f"'{pier.name}': rings do not stand side by side on a gap of {pier.gap:.3g} m "
                 f"and a course of {step:.3g} m: give a wider gap or higher courses"
             )
-        below = self._build_courses((x0, x1), (-pier.height, -step), pier)
-        outline = [(x0, -step), (x1, -step), right[0], right[1], left[1], left[0]]
-        top = self._add_stone(outline, "skewback", pier)
-        self._add_bed((below, top), (x0, x1), -step, pier)
-        return top
+        # flush with the intrados below, along both springing joints above
+        top = [right[0], right[1], left[1], left[0]]
+        return self._build_skewback(pier, (x0, x1), step, top)
+
+    def _build_skewback(
+        self, pier: Pier, sides: tuple[float, float], step: float, top: Sequence[Point]
+    ) -> int:
+        """Build the courses of a pier and the skewback on them; return the number of the latter."""
+        below = self._build_courses(sides, (-pier.height, -step), pier)
+        outline = [(sides[0], -step), (sides[1], -step), *top]
+        skewback = self._add_stone(outline, "skewback", pier)
+        self._add_bed((below, skewback), sides, -step, pier)
+        return skewback
 
     def _build_courses(
         self, sides: tuple[float, float], levels: tuple[float, float], part: Courses
     ) -> int:
         """Build a foundation and courses between two levels; return the number of the top one."""
-        low = levels[0]
-        under = [
-            (sides[0], low - FOUNDATION_DEPTH),
-            (sides[1], low - FOUNDATION_DEPTH),
-            (sides[1], low),
-            (sides[0], low),
-        ]
+        (left, right), low = sides, levels[0]
+        base = low - FOUNDATION_DEPTH
+        under = [(left, base), (right, base), (right, low), (left, low)]
         below = self._add_stone(under, "foundation", part, fixed=True)
         return self._stack_courses(below, sides, levels, part)
 
     def _stack_courses(
-        self,
-        below: int,
-        sides: tuple[float, float],
-        levels: tuple[float, float],
-        part: Courses,
+        self, below: int, sides: tuple[float, float], levels: tuple[float, float], part: Courses
     ) -> int:
         """Build courses on a block, between two levels; return the number of the top one."""
         low, high = levels
-        if high - low < 1e-9:
+        if high - low < 1e-9:  # round-off of nothing to build
             return below
         count = count_pieces(high - low, part.course, f"courses of '{part.name}'")
         for y, top in pairwise(np.linspace(low, high, count + 1)):
@@ -251,6 +244,7 @@ class StoneworkBuilder:
     ) -> int:
         """Add a rectangular course and return its number."""
         (left, right), (low, top) = sorted(sides), levels
+        # Courses are numbered on above the skewback of a wall.
         count = sum(block.part == part.name and not block.fixed for block in self.blocks)
         outline = [(left, top), (left, low), (right, low), (right, top)]
         return self._add_stone(outline, f"course {count + 1}", part, structured=True)
@@ -268,6 +262,7 @@ class StoneworkBuilder:
         if not walls:
             outer, inner = face[1], face[0]
             radial = np.subtract(outer, inner)
+            # a fixed block, half as deep as the springing joint is long, behind it
             back = inward * 0.5 * np.array([-radial[1], radial[0]])
             far = [tuple(np.add(point, back)) for point in (outer, inner)]
             return self.add([inner, outer, *far], bare, fixed=True, structured=True)
@@ -285,11 +280,9 @@ class StoneworkBuilder:
                 f"'{pier.name}': a ring does not stand on a gap of {pier.gap:.3g} m and a course "
                 f"of {step:.3g} m: give a wider gap or higher courses"
             )
-        below = self._build_courses((outer, x), (-pier.height, -step), pier)
-        outline = [(outer, -step), (x, -step), (x, y), (edge, level), (outer, level)]
-        top = self._add_stone(outline, "skewback", pier)
-        self._add_bed((below, top), (outer, x), -step, pier)
-        return top
+        # Behind the only springing joint the skewback is level, out to its outer face.
+        top = [(x, y), (edge, level), (outer, level)]
+        return self._build_skewback(pier, (outer, x), step, top)
 
     def _build_wall(self, wall: Sidewall, face: Face, inward: float) -> int:
         """Build a sidewall; return the number of its skewback."""
@@ -308,15 +301,18 @@ class StoneworkBuilder:
             return self.add([*outline, *reversed(steps)], wall.name, role=wall.role, fixed=True)
         step = wall.height / count_pieces(wall.height, wall.course, f"courses of '{wall.name}'")
         below = self._build_courses((outer, x), (-wall.height, -step), wall)
+        # The skewback reaches from the springing to the setback; courses stand behind it.
         corner = [(back, level)] if wall.setback > 0.0 else []
         outline = [(back, -step), (x, -step), (x, y), (edge, level), *corner]
         skewback = self._add_stone(outline, "skewback", wall)
         self._add_bed((below, skewback), (back, x), -step, wall)
+        # the course behind the skewback, as high as both, and those above the springing on it
         behind = self._add_course((outer, back), (-step, level), wall)
         self._add_bed((below, behind), (outer, back), -step, wall)
         high = level + wall.above
         self._stack_courses(behind, (outer, back), (level, high), wall)
         if wall.state == "retained":
+            # a fixed wall behind all courses, which touches but does not bond with them
             far = outer - inward * FOUNDATION_DEPTH
             corners = [(outer, -wall.height), (outer, high), (far, high), (far, -wall.height)]
             self._add_stone(corners, "retaining wall", wall, fixed=True)

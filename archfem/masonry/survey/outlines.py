@@ -14,7 +14,7 @@ from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.assembly import assembled, by_materials, touching
 from archfem.masonry.block import Block
 from archfem.masonry.materials import (
-    MATERIALS,
+    MATERIAL_PRESETS,
     SOIL_TO_STONE,
     STONE,
     STONE_TO_STONE,
@@ -73,7 +73,7 @@ def read_outlines(
     snap: float = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
-    materials: Mapping[str, Material] = MATERIALS,
+    materials: Mapping[str, Material] = MATERIAL_PRESETS,
 ) -> Survey:
     """Read the outlines of a drawing as blocks, and close small gaps between them.
 
@@ -120,7 +120,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     snap: float = 1e-3,
     layers: Mapping[str, Layer] | None = None,
     material: Material = STONE,
-    materials: Mapping[str, Material] = MATERIALS,
+    materials: Mapping[str, Material] = MATERIAL_PRESETS,
     contact: Contact = STONE_TO_STONE,
     contacts: Mapping[str, Contact] = DEFAULT_CONTACTS,
     width: float = 1.0,

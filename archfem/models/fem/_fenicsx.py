@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._petsc import PETSc
+from archfem._typing import Array
 
 # The form compiler reports each call of the C compiler on the root logger.
 logging.getLogger().addFilter(lambda record: "distutils" not in record.pathname)
@@ -30,7 +31,6 @@ if "dolfinx" not in sys.modules:
         sys.setdlopenflags = _setdlopenflags
 
 import dolfinx.fem.petsc  # noqa: E402
-import ufl  # noqa: E402
 from dolfinx import cpp, fem  # noqa: E402
 
 try:
@@ -38,13 +38,12 @@ try:
 except ImportError:
     from dolfinx.io import gmsh as _gmsh_io  # type: ignore[attr-defined, no-redef]
 
-COMM = MPI.COMM_SELF
 Numbers = NDArray[np.int32]
 
 
 def import_gmsh_mesh(model: Any) -> tuple[Any, Any, Any]:
     """Return the current gmsh model as a plane mesh, its cell tags and its facet tags."""
-    grid, cells, facets = _gmsh_io.model_to_mesh(model, COMM, 0, gdim=2)[:3]
+    grid, cells, facets = _gmsh_io.model_to_mesh(model, MPI.COMM_SELF, 0, gdim=2)[:3]
     return grid, cells, facets
 
 
@@ -90,7 +89,7 @@ def renumber_space(space: Any, numbers: Numbers, count: int) -> Any:
     old = space.dofmap
     dofmap = cpp.fem.DofMap(
         old.dof_layout,
-        dolfinx.common.IndexMap(COMM, count),
+        dolfinx.common.IndexMap(MPI.COMM_SELF, count),
         old.index_map_bs,
         cpp.graph.AdjacencyList_int32(np.ascontiguousarray(numbers, dtype=np.int32)),
         old.index_map_bs,
@@ -109,17 +108,6 @@ def renumber_space(space: Any, numbers: Numbers, count: int) -> Any:
     return new
 
 
-def jump_measure(grid: Any, facets: Any, rule: str, degree: int) -> Any:
-    """Return the measure over tagged interior facets with a quadrature rule of a degree."""
-    metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
-    return ufl.Measure("dS", domain=grid, subdomain_data=facets, metadata=metadata)
-
-
-def cell_measure(grid: Any, cells: Any) -> Any:
-    """Return the measure over tagged cells."""
-    return ufl.Measure("dx", domain=grid, subdomain_data=cells)
-
-
 def constant(grid: Any, value: Any) -> Any:
     """Return a number in a form that may change without another compilation."""
     return fem.Constant(grid, PETSc.ScalarType(value))
@@ -135,10 +123,10 @@ def assemble_matrix(form: Any) -> sparse.csr_matrix:
     return assembled
 
 
-def assemble_vector(form: Any) -> NDArray[np.float64]:
+def assemble_vector(form: Any) -> Array:
     """Assemble a linear form."""
     vector = fem.petsc.assemble_vector(form)
-    values: NDArray[np.float64] = vector.array.copy()
+    values: Array = vector.array.copy()
     vector.destroy()
     return values
 

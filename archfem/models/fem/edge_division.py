@@ -131,9 +131,6 @@ def _insert_points_on_edges(boundary: Numbers, points: Array, near: float) -> Nu
     return np.insert(boundary, edge[order] + 1, others[point[order]])
 
 
-# Longest cell of a stone, relative to the stone's thickness across it [-]
-MAX_CELL_ASPECT = 2.0
-
 # Excess of a number of cells over an integer that counts as round-off [-]
 CELL_ROUND_OFF = 1e-6
 
@@ -218,7 +215,8 @@ def _side_cells(edges: Edges, number: int, settings: Discretisation) -> list[int
     wanted = [_cells_along(block.fixed, settings), settings.through]
     # faces of sectors are already drawn with so many chords
     if not block.fixed and block.centre is None:
-        slender = [long[k] / (MAX_CELL_ASPECT * long[1 - k]) for k in range(2)]
+        # no cell of a stone is longer than twice the stone's thickness across it
+        slender = [long[k] / (2.0 * long[1 - k]) for k in range(2)]
         wanted = [
             max(n, int(np.ceil(s - CELL_ROUND_OFF))) for n, s in zip(wanted, slender, strict=True)
         ]

@@ -29,7 +29,7 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem.joints.contact_law import (
     clip_to_friction,
-    closed_fraction,
+    contact_fraction,
     friction_excess,
     mean_closing,
     normal_traction,
@@ -105,7 +105,7 @@ class ContactFaces:
         """
         if not self.patch.contact.slides:
             return self.tractions(u)
-        limit, closed = self._limit_of(fixed), self._closed(fixed)
+        limit, closed = self._limit_of(fixed), self._is_closed(fixed)
         return self._tractions(u, SLIP_LIMIT_TOLERANCE * limit + CONTACT_PERTURBATION * closed)
 
     def _tractions(self, u: Any, reserve: Any) -> Fields:
@@ -116,21 +116,21 @@ class ContactFaces:
             shear = clip_to_friction(shear, self._limit_of(u) + reserve)
         return normal, shear
 
-    def _closed(self, u: Any) -> Any:
+    def _is_closed(self, u: Any) -> Any:
         """One where the joint is closed, else zero [-]."""
         return ufl.conditional(ufl.lt(self.opening(u) - CONTACT_PERTURBATION, 0.0), 1.0, 0.0)
 
     def _limit_of(self, u: Any) -> Any:
         """Coulomb's limit of a displacement [Pa]."""
         normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
-        return self._limit(normal, self._closed(u))
+        return self._limit(normal, self._is_closed(u))
 
     def energy(self, u: Any) -> Any:
         """Return the energy stored per area without further slip [J/m²]."""
         normal = normal_traction(self.opening(u), self._stiffness[0])
         return 0.5 * (normal * self.opening(u) + self._trial_shear(u) ** 2 / self._stiffness[1])
 
-    def updated_slip(self, u: Any) -> Any:
+    def add_slip(self, u: Any) -> Any:
         """Return the irreversible slip once the joint is displaced by u [m]."""
         return self._irreversible_slip(u, self.tractions(u)[1])
 
@@ -155,7 +155,7 @@ class ContactFaces:
     def _mean_limit(self, step: Fields, lag: Any) -> Any:
         """Coulomb's limit over a step: that of the mean normal traction [Pa]."""
         path = self._gap_path(step, lag)
-        return self._limit(self._stiffness[0] * mean_closing(*path), closed_fraction(*path))
+        return self._limit(self._stiffness[0] * mean_closing(*path), contact_fraction(*path))
 
     def _mean_shear(self, step: Fields, lag: Any, shear_lag: Any) -> Fields:
         """Mean shear with the limit at `lag`, and its elastic part at the end [Pa]."""
@@ -222,7 +222,7 @@ class Forms:
         of_block = np.array([materials.index(block.material) for block in structure.blocks])
         cells = np.arange(len(mesh.blocks), dtype=np.int32)
         tags = _fenicsx.tag_entities(mesh.grid, 2, cells, of_block[mesh.blocks])
-        dx = _fenicsx.cell_measure(mesh.grid, tags)
+        dx = ufl.Measure("dx", domain=mesh.grid, subdomain_data=tags)
         return [(material, dx(k)) for k, material in enumerate(materials)]
 
     @cached_property
@@ -333,9 +333,7 @@ class Forms:
     @cached_property
     def _tractions(self) -> PointReader:
         u = self._displacements[0]
-        return self.point_reader(
-            [[*faces.tractions(u), faces.updated_slip(u)] for faces in self.faces]
-        )
+        return self.point_reader([[*faces.tractions(u), faces.add_slip(u)] for faces in self.faces])
 
     def tractions(self, displacement: Array, slip: Array | None = None) -> Array:
         """Return tractions and irreversible slip of the points of each joint facet (3, f, k)."""

@@ -58,7 +58,7 @@ class JointFacets:
         return self.rule.count(self.space.degree)
 
     @cached_property
-    def _sorted(self) -> tuple[Numbers, Numbers, Array]:
+    def _facet_order(self) -> tuple[Numbers, Numbers, Array]:
         """Facets (f,), their joints (f,), and offsets of their ends from mid-depth (f, 2) [m]."""
         facets, joint = self.space.mesh.joints
         ends = np.array([self._end_offsets(*pair) for pair in zip(facets, joint, strict=True)])
@@ -77,12 +77,12 @@ class JointFacets:
     @property
     def numbers(self) -> Numbers:
         """Numbers of the facets in the mesh (f,)."""
-        return self._sorted[0]
+        return self._facet_order[0]
 
     @property
     def joint(self) -> Numbers:
         """Number of each facet's joint (f,)."""
-        return self._sorted[1]
+        return self._facet_order[1]
 
     @cached_property
     def _cells(self) -> Numbers:
@@ -111,13 +111,13 @@ class JointFacets:
     @cached_property
     def offsets(self) -> Array:
         """Offset of each facet's points from the joint's mid-depth (f, k) [m]."""
-        first, last = self._sorted[2].T[..., None]
+        first, last = self._facet_order[2].T[..., None]
         return first + (last - first) * self.rule.on_facet(self.space.degree)[0]
 
     @cached_property
     def _lengths(self) -> Array:
         """Quadrature weights of each facet's points (f, k) [m]."""
-        return np.diff(self._sorted[2], axis=1) * self.rule.on_facet(self.space.degree)[1]
+        return np.diff(self._facet_order[2], axis=1) * self.rule.on_facet(self.space.degree)[1]
 
     @cached_property
     def points(self) -> Numbers:
@@ -126,7 +126,7 @@ class JointFacets:
         numbers, count = np.empty(self.offsets.shape, dtype=np.intp), 0
         for joint in range(len(self.space.mesh.structure.joints)):
             facets = self.joint == joint
-            ends = self._sorted[2][facets]
+            ends = self._facet_order[2][facets]
             along = self.rule.on_joint(np.append(ends[:, 0], ends[-1, 1]), self.space.degree)[0]
             distance = np.abs(self.offsets[facets][..., None] - along)
             numbers[facets] = count + distance.argmin(axis=-1)
@@ -154,7 +154,9 @@ class JointFacets:
         count = self._colour_count
         numbers = of_joint[self.joint] * count + self.colours
         tags = _fenicsx.tag_entities(grid, 1, self.numbers, numbers)
-        dS = _fenicsx.jump_measure(grid, tags, *self._scheme)
+        rule, degree = self._scheme
+        metadata = {"quadrature_rule": rule, "quadrature_degree": degree}
+        dS = ufl.Measure("dS", domain=grid, subdomain_data=tags, metadata=metadata)
         return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
 
     @property
@@ -176,7 +178,7 @@ class JointFacets:
         """Function with the place of each facet and a value for each point; entries of those."""
         functions, entries = self._cellwise_space(FACET_VALUE_COUNT + self.size)
         structure = self.space.mesh.structure
-        start, length = self._sorted[2][:, :1], np.diff(self._sorted[2], axis=1)
+        start, length = self._facet_order[2][:, :1], np.diff(self._facet_order[2], axis=1)
         along = structure.tangents[self.joint]
         begin = structure.middles[self.joint] + start * along
         place = np.hstack([begin, along / length, self._tangent_signs[:, None]])

@@ -297,7 +297,7 @@ def _facet_points(grid: Any) -> Any:
 _recent_meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
 
 
-def cached_mesh(structure: Structure, settings: Discretisation, max_meshes: int = 4) -> Mesh:
+def get_mesh(structure: Structure, settings: Discretisation, max_meshes: int = 4) -> Mesh:
     """Return the mesh of a structure, or a recent one of a structure of the same shapes."""
     cells = (settings.through, settings.along, settings.cell, settings.coarse, settings.degree)
     key = (*map(_shape_key, (*structure.blocks, *structure.joints)), cells)

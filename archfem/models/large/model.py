@@ -6,7 +6,6 @@ neither move the centroid nor rotate the block on the mean (mean axes), so the m
 constant and diagonal. Inertia forces on the modes due to the spin of the block are neglected.
 """
 
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -44,7 +43,7 @@ from archfem.models.large.joints import (
     initial_segment_measures,
     joint_orientation,
 )
-from archfem.models.model import Doubt, Model, ModelStep, Observer, Prediction
+from archfem.models.model import Cells, Model, ModelStep, Observer
 
 
 class LargeDisplacementModel(Model):
@@ -77,27 +76,20 @@ class LargeDisplacementModel(Model):
         self.mass_influence = self.small.mass_influence
         self.cells: RotatingCells = RotatingCells.of(self.small.cells, blocks.blocks)
         self.support_motion = self.small.support_motion
-        self.initial_gaps: Array | None = None
-        self.prediction: Prediction | None = None
-        self.doubts: tuple[Doubt, ...] = ()
         self._points: dict[PointLoad, RotatingPoint | FramelessPoint] = {}
         self._slip = np.zeros_like(allocate_step_forces(self.joints).irreversible_slip)
 
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced, as far as they like."""
-        other = copy(self)
-        other.support_motion = motion
         sides = self.joints.kinematics._replace(fixed_pose=self.segments.fixed_poses(motion))
-        other.joints = self.joints._replace(kinematics=sides)
-        return other
+        joints = self.joints._replace(kinematics=sides)
+        return self.copy_with(support_motion=motion, joints=joints)
 
     def with_initial_gaps(self, gaps: Array) -> Self:
         """Return the model with gaps and slips of its joints at q = 0, due to construction."""
-        other = copy(self)
-        other.initial_gaps = gaps
         measures = initial_segment_measures(self.small, self.segments, gaps)
-        other.joints = self.joints._replace(initial_measures=np.ascontiguousarray(measures))
-        return other
+        joints = self.joints._replace(initial_measures=np.ascontiguousarray(measures))
+        return self.copy_with(initial_gaps=gaps, joints=joints)
 
     @property
     def memory(self) -> Array:
@@ -106,9 +98,7 @@ class LargeDisplacementModel(Model):
 
     def with_memory(self, memory: Array) -> Self:
         """Return the model with another joint memory."""
-        other = copy(self)
-        other._slip = np.ascontiguousarray(memory, float)
-        return other
+        return self.copy_with(_slip=np.ascontiguousarray(memory, float))
 
     def updated_memory(self, q: Array) -> Array:
         """Return the irreversible slip of each joint point once the model is at q (p,) [m]."""
@@ -214,21 +204,21 @@ class LargeDisplacementModel(Model):
         """Return the generalised forces of an action; point loads keep their direction (n,)."""
         if isinstance(action, BodyForce) or q is None:
             return self.small.load(action)
-        return self._loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
+        return self._find_loaded_point(action).gradient(q, self.size).T @ np.array(action.force)
 
     def load_rate(self, action: Action, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `load` by the coordinates (n, n)."""
         if isinstance(action, BodyForce):
             return super().load_rate(action, q)
-        return self._loaded_point(action).force_rate(q, np.array(action.force), self.size)
+        return self._find_loaded_point(action).force_rate(q, np.array(action.force), self.size)
 
     def work(self, action: Action, q: Array) -> float:
         """Return the work of an action since before anything moved [J]."""
         if isinstance(action, BodyForce):
             return super().work(action, q)
-        return float(self._loaded_point(action).displacement(q) @ np.array(action.force))
+        return float(self._find_loaded_point(action).displacement(q) @ np.array(action.force))
 
-    def _loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
+    def _find_loaded_point(self, action: PointLoad) -> RotatingPoint | FramelessPoint:
         """Return the point at which a point load acts."""
         if action in self._points:
             return self._points[action]

@@ -1,16 +1,11 @@
 """AFAD (Turkish national network) text files: three components in three columns, in gal."""
 
 import re
+from functools import partial
 
 import numpy as np
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-    find_units,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 40  # lines, at most
 _DIRECTION_PATTERN = r"[NSEWUD]-[NSEWUD]"
@@ -25,24 +20,15 @@ def recognises(text: RecordText) -> bool:
 
 def read(text: RecordText) -> list[Channel]:
     """Read the three components."""
-    count_line, count = text.find(
-        rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$", stop=_HEADER_LINES
-    )
-    step_line, step = text.find(
-        rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$", stop=_HEADER_LINES
-    )
-    peak_line, peaks = text.find(
-        r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$", stop=_HEADER_LINES
-    )
-    names_line, names = text.find(
+    find = partial(text.find, stop=_HEADER_LINES)
+    count_line, count = find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$")
+    step_line, step = find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$")
+    peak_line, peaks = find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$")
+    names_line, names = find(
         rf"^\s*({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s*$",
         start=max(count_line, step_line, peak_line),
-        stop=_HEADER_LINES,
     )
-    units = find_units(peaks[1])
-    if len(units) != 1:
-        raise text.error("the header does not state the unit of the peaks", peak_line)
-    unit = units.pop()
+    unit = text.find_unit(peaks[1], "the header does not state the unit of the peaks", peak_line)
     numbers = text.read_last_block(names_line + 1, 3 * int(count[1]))
     if len(text.parse_row(names_line + 1)) != 3:
         raise text.error("expected one sample of each of three components", names_line + 1)

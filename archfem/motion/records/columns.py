@@ -33,7 +33,7 @@ def read(
     # they may state units and step. An increasing first column is time.
     rows, lines, comments = _read_table(text)
     unit = _find_unit(text, comments, units)
-    step = _find_step(text, rows, lines, _stated_steps(comments, dt))
+    step = _find_step(text, rows, lines, _list_stated_steps(comments, dt))
     first = 1 if _is_time(rows) else 0
     if column is None:
         chosen = list(range(first, rows.shape[1]))
@@ -98,7 +98,7 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
     return written.pop()
 
 
-def _stated_steps(comments: str, dt: float | None) -> list[float]:
+def _list_stated_steps(comments: str, dt: float | None) -> list[float]:
     """Return the steps stated by keyword and in the comments [s]."""
     steps = [] if dt is None else [check_number(dt, "dt [s]")]
     steps += [

@@ -3,13 +3,7 @@
 import re
 from enum import IntEnum
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    Channel,
-    RecordText,
-    find_column_width,
-    find_units,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText, find_column_width
 
 _BLOCK_PATTERN = rf"^\s*({COUNT_PATTERN})\s+acceleration\s+pts\b(.*)$"
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
@@ -50,9 +44,9 @@ def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     values, line = _read_header(text, "Real", line)
     line, block = text.find(_BLOCK_PATTERN, line)
     count, rest = int(block[1]), block[2]
-    units = find_units(rest)
-    if len(units) != 1:
-        raise text.error("no single unit of acceleration such as cm/sec2: not volume 2", line)
+    unit = text.find_unit(
+        rest, "no single unit of acceleration such as cm/sec2: not volume 2", line
+    )
     dt = text.check_step(1e-3 * values[_Position.STEP], line)
     length = re.search(r"approx\s+(\d+)\s+secs", rest)
     if length and abs(count * dt - float(length[1])) > 1.0 + dt:
@@ -64,7 +58,7 @@ def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     if any(content.strip() for content in text.lines[after:end]):
         raise text.error(f"more follows after the {count} samples stated", after)
     direction = _VERTICAL_CODES.get(int(codes[_Position.AZIMUTH]), code[1])
-    return Channel.from_direction(numbers * units.pop(), dt, direction), end + 1
+    return Channel.from_direction(numbers * unit, dt, direction), end + 1
 
 
 def _read_header(text: RecordText, kind: str, start: int) -> tuple[list[float], int]:

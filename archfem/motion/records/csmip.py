@@ -6,7 +6,6 @@ from archfem.motion.records.record_file import (
     Channel,
     RecordText,
     find_column_width,
-    find_units,
 )
 
 _BLOCK_PATTERN = (
@@ -39,15 +38,12 @@ def _read_channel(text: RecordText, start: int, end: int) -> Channel:
     line, block = text.find(_BLOCK_PATTERN, start, end)
     if text.contains(_BLOCK_PATTERN, end, line + 1):
         raise text.error("a second channel begins before the end of the first", line)
-    units = find_units(block[3])
-    if len(units) != 1:
-        raise text.error("no single unit of acceleration such as CM/SEC/SEC", line)
+    unit = text.find_unit(block[3], "no single unit of acceleration such as CM/SEC/SEC", line)
     numbers, after = text.read_block(line + 1, int(block[1]), find_column_width(block[3]))
     if after < end and text.is_numeric(after):
         raise text.error(f"more numbers follow after the {block[1]} samples stated", after)
     if text.contains(_PEAK_PATTERN, line, start):
         text.check_peak(numbers, float(text.find(_PEAK_PATTERN, start, line)[1][1]))
     direction = text.find(_CHANNEL_PATTERN, start, line)[1][1]
-    return Channel.from_direction(
-        numbers * units.pop(), text.check_step(float(block[2]), line), direction
-    )
+    dt = text.check_step(float(block[2]), line)
+    return Channel.from_direction(numbers * unit, dt, direction)

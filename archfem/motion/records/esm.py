@@ -1,12 +1,8 @@
 """ESM, ITACA and AFAD-TADAS files (DYNA 1.x): a header of `KEY: value`, one sample a line."""
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-    find_units,
-)
+from functools import partial
+
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 80  # lines
 
@@ -23,26 +19,20 @@ def read(text: RecordText) -> list[Channel]:
     kind = _find_value(text, "DATA_TYPE")
     if kind.upper() != "ACCELERATION":
         raise text.error(f"DATA_TYPE is {kind!r}, expected ACCELERATION")
-    line, count = text.find(rf"^\s*NDATA\s*:\s*({COUNT_PATTERN})\s*$", stop=_HEADER_LINES)
-    step_line, step = text.find(
-        rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER_PATTERN})\s*$", stop=_HEADER_LINES
-    )
+    find = partial(text.find, stop=_HEADER_LINES)
+    line, count = find(rf"^\s*NDATA\s*:\s*({COUNT_PATTERN})\s*$")
+    step_line, step = find(rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER_PATTERN})\s*$")
     dt = text.check_step(float(step[1]), step_line)
     duration = _find_value(text, "DURATION_S")
     if duration and abs(_parse_number(text, duration) - int(count[1]) * dt) > 2.0 * dt + 1e-3:
         raise text.error(f"{count[1]} samples at {dt:g} s do not last {duration} s", line)
-    units = find_units(_find_value(text, "UNITS"))
-    if len(units) != 1:
-        raise text.error("UNITS is not a unit of acceleration")
-    samples = text.read_last_block(text.header_length(), int(count[1])) * units.pop()
+    unit = text.find_unit(_find_value(text, "UNITS"), "UNITS is not a unit of acceleration")
+    samples = text.read_last_block(text.header_length(), int(count[1])) * unit
     peak = _find_value(text, r"PGA_CM/S\^2")
     if peak:
         text.check_peak(samples, 0.01 * _parse_number(text, peak))
-    return [
-        Channel.from_direction(
-            samples, dt, _find_value(text, "STREAM") or _find_value(text, "COMPONENT")
-        )
-    ]
+    direction = _find_value(text, "STREAM") or _find_value(text, "COMPONENT")
+    return [Channel.from_direction(samples, dt, direction)]
 
 
 def _find_value(text: RecordText, key: str) -> str:

@@ -2,13 +2,7 @@
 
 import re
 
-from archfem.motion.records.record_file import (
-    COUNT_PATTERN,
-    NUMBER_PATTERN,
-    Channel,
-    RecordText,
-    find_units,
-)
+from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
@@ -35,10 +29,8 @@ def read(text: RecordText) -> list[Channel]:
     other = re.search(r"\b(?:VELOC|DISPL)", header, re.IGNORECASE)
     if other and not re.search(r"\bACC", header, re.IGNORECASE):
         raise text.error("the header does not state an acceleration, but another quantity")
-    units = find_units(header)
-    if len(units) != 1:
-        raise text.error("the header does not state one unit, such as UNITS OF G")
-    samples = text.read_last_block(line + 1, count) * units.pop()
+    unit = text.find_unit(header, "the header does not state one unit, such as UNITS OF G")
+    samples = text.read_last_block(line + 1, count) * unit
     return [Channel.from_direction(samples, text.check_step(dt, line), _find_direction(text, line))]
 
 
@@ -48,9 +40,8 @@ def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
         together = _VALUES_BEFORE_NAMES.match(content) or _VALUES_AFTER_NAMES.search(content)
         if together:
             return int(together[1]), float(together[2]), line
-    count_line, count = text.find(
-        rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)", stop=_HEADER_LINES
-    )
+    count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
+    count_line, count = text.find(count_pattern, stop=_HEADER_LINES)
     step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=_HEADER_LINES)
     return int(count[1]), float(step[1]), max(count_line, step_line)
 

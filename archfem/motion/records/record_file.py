@@ -123,6 +123,13 @@ class RecordText:
         self.check_end()
         return numbers
 
+    def find_unit(self, header: str, problem: str, line: int | None = None) -> float:
+        """Return the unit of acceleration in a header [m/s²], or refuse none and several."""
+        units = find_units(header)
+        if len(units) != 1:
+            raise self.error(problem, line)
+        return units.pop()
+
     def check_end(self) -> None:
         """Refuse a file whose last number is truncated, compared with the previous ones."""
         if self.ended:

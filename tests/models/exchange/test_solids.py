@@ -20,12 +20,12 @@ def test_faces_are_where_their_edges_say(fidelity):
         radius=2.0, thickness=0.4, voussoirs=5, pier_breadth=0.8, courses=[0.5, 0.5]
     )
     solids = Solids(af.build(portal, fidelity=fidelity, cells=(2, 3)))
-    found = solids.joint_faces(solids.places)
+    found = solids.joint_faces(solids.cells.places)
     ends = np.array([joint.ends for joint in portal.joints])
     assert found == pytest.approx(solids.corners, abs=ROUND_OFF)
     assert found[:, :2] == pytest.approx(ends, abs=ROUND_OFF)
     assert found[:, 2:] == pytest.approx(ends[:, ::-1], abs=ROUND_OFF)
     assert {*np.ravel(solids._anchors[1])} != {0.0, 1.0}
-    owner = solids.block[solids._anchors[0][:, 0]].reshape(-1, 4)
+    owner = solids.cells.block[solids._anchors[0][:, 0]].reshape(-1, 4)
     lower, higher = portal.pairs.T
     assert (owner == np.column_stack([lower, lower, higher, higher])).all()
