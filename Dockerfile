@@ -1,6 +1,6 @@
 # archfem in a container, on Debian 13:
 #   docker build -t archfem . && docker run --rm -v "$PWD/out:/out" archfem run ring.toml --out /out/ring
-# What it does is what `make test-debian13` tests; as a container it was not tried by the authors.
+# `make test-debian13` tests the same steps; the authors have not tried the container.
 FROM debian:13-slim
 RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends make ca-certificates \
     && rm -rf /var/lib/apt/lists/*

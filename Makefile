@@ -1,24 +1,24 @@
-# `make demo` and `make test` each do all of their own set-up.
+# `make demo` and `make test` install everything they need.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 PYTHON := .venv/bin/python
-# What is large is never compiled from source: that takes an hour, and fails in the end.
+# Large packages are never compiled from source: that takes an hour, and fails in the end.
 PIP := .venv/bin/pip install -q --disable-pip-version-check -c constraints.txt \
 	--only-binary numpy,scipy,numba,llvmlite,vtk,gmsh,pandas,shapely
 APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py-mpi libopenblas0-pthread \
 	libegl1 libgl1 libglu1-mesa libopengl0 libxcursor1 libxft2 libxinerama1 libxrender1 libfontconfig1
 
-# Small dense and sparse problems: threads only get in each other's way.
+# Problems are small: threads slow each other down.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-# What is imported is compiled once, for all workers and the processes that tests start.
+# Imported modules are compiled once, for all workers and the processes of tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Where `make test-debian13` makes its Debian, and finds it again.
+# Folder of the Debian of `make test-debian13`, reused by later calls.
 DEBIAN13 := /var/tmp/archfem-debian13
 
-# A worker a core, and whoever is done takes over from others.
+# One worker a core; idle workers take over tests from others.
 SPREAD := -n auto --dist worksteal
 
 .PHONY: help setup demo test test-slow test-debian13 hard bench docs notebooks verification fuzz mutants lint clean
@@ -37,7 +37,7 @@ setup: .venv/ready  ## install what is needed (system packages, .venv)
 	$(PIP) -e '.[dev]'
 	@touch $@
 
-# What time steps need is compiled once, on all cores: test workers would each do it for themselves.
+# Time stepping code is compiled once, on all cores; otherwise each test worker would compile it.
 .venv/compiled: .venv/ready $(shell find archfem -name '*.py')
 	$(PYTHON) -m archfem compile
 	@touch $@
@@ -51,16 +51,16 @@ test: .venv/compiled  ## the default tests, on all cores
 test-slow: .venv/compiled  ## the tests that take minutes
 	$(PYTHON) -m pytest $(SPREAD) -m slow
 
-test-debian13:  ## the default tests in a Debian 13 made for them (root, debootstrap, 4 GB in DEBIAN13)
+test-debian13:  ## the default tests in a fresh Debian 13 (root, debootstrap, 4 GB in DEBIAN13)
 	.ci/debian.sh trixie $(DEBIAN13) make test
 
-hard: .venv/compiled  ## the suite of hard cases, a line each: outcome, effort, energy drift, error
+hard: .venv/compiled  ## the suite of hard cases, one line a case: outcome, effort, energy drift, error
 	cd tests && ../$(PYTHON) -m hard
 
-mutants: .venv/compiled  ## changes in the physics, COUNT=60 of them, that the tests should notice
+mutants: .venv/compiled  ## changes in the physics, COUNT=60 of them, that the tests should detect
 	cd tests && ../$(PYTHON) -m mutants --count $(or $(COUNT),60) --seed $(or $(SEED),0)
 
-fuzz: .venv/compiled  ## odd input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
+fuzz: .venv/compiled  ## malformed input by the thousand, a table; COUNT=100 for a short run, SEED=1 for another
 	cd tests && ../$(PYTHON) -m fuzz --seed $(or $(SEED),0) $(if $(COUNT),--count $(COUNT))
 
 bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled loop
@@ -73,10 +73,10 @@ bench: .venv/bench  ## speed beside error, against OpenSees and a bare compiled 
 docs: .venv/docs  ## the documentation as pages: docs/build/html/index.html
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/build/html
 
-notebooks: .venv/docs .venv/compiled  ## run the notebooks, and keep what they show
+notebooks: .venv/docs .venv/compiled  ## run the notebooks, and save their outputs
 	$(PYTHON) docs/execute.py
 
-verification: .venv/compiled  ## the table of what tests verify, for the documentation
+verification: .venv/compiled  ## the verification table of the documentation, written by the tests
 	$(PYTHON) -m pytest $(SPREAD) -m "" --verified=docs/verification.json
 
 .venv/docs: .venv/ready

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# `make test` of this tree in a Debian of its own, made in a folder where there is none yet:
+# Run `make test` of this tree in its own Debian, created in a folder if missing:
 #   debian.sh SUITE FOLDER [COMMAND...]       e.g. debian.sh trixie /var/tmp/archfem-trixie make demo
-# Needs root, debootstrap and 4 GB. To be rid of it: rm -rf --one-file-system FOLDER
+# Needs root, debootstrap and 4 GB. Remove it with: rm -rf --one-file-system FOLDER
 set -euo pipefail
 suite=$1 folder=$2
 shift 2

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Install packages of Debian that are missing: packages.sh NAME... Where that cannot be, say what can.
+# Install missing Debian packages: packages.sh NAME... Elsewhere print the alternatives.
 set -euo pipefail
 say() { printf '%s\n' "$@" >&2; }
 
-# Whoever has them all needs neither root nor this Debian.
+# If none is missing, neither root nor this Debian is needed.
 dpkg -s "$@" >/dev/null 2>&1 && exit 0
 
 system="this system" ID="" VERSION_ID=""

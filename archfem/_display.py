@@ -13,7 +13,7 @@ from typing import Any
 LATE_BOUND_METHODS: Mapping[str, str] = {
     "CaseResult.player": "cases.report.report:player_of_case",
     "CaseResult.report": "cases.report.report:write_report_of_case",
-    "Collapse.plot": "view.collapse:draw_found",
+    "Collapse.plot": "view.collapse:draw_collapse_result",
     "Equilibrium.plot": "view.statics:draw_dead_load",
     "History.player": "view.pages.player:player",
     "History.plot": "view.histories:draw_joints",

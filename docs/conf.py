@@ -1,4 +1,4 @@
-"""How the documentation is built: `make docs`."""
+"""Sphinx configuration of the documentation: `make docs`."""
 
 import sys
 from importlib.util import find_spec
@@ -29,7 +29,7 @@ nitpicky = True
 default_role = "py:obj"
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
-# Notebooks are shipped as they were run; building the pages runs nothing.
+# Notebooks are shipped with their outputs; the build does not execute them.
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_block", "colon_fence"]
 myst_heading_anchors = 3
@@ -67,7 +67,7 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-# Pages without pages below them need no column for these.
+# Pages without subpages have no side bar.
 html_sidebars = {
     name: []
     for name in ("index", "install", "tutorial", "gallery", "verification", "speed", "limits")

@@ -1,8 +1,8 @@
-"""Run notebooks and keep what they show: `python docs/execute.py [SCRIPT …]`, `make notebooks`.
+"""Run notebooks and save their outputs: `python docs/execute.py [SCRIPT …]`, `make notebooks`.
 
 The scripts `notebooks/*.py` are the source. Each becomes a notebook of the same name beside it,
-with its tables and pictures in it, so that it can be read where nothing is installed. Pictures are
-reduced to 256 colours, and what differs between two runs (times, identifiers) is left out.
+with its tables and figures, so that it can be read where nothing is installed. Figures are reduced
+to 256 colours, and data that differ between two runs (times, identifiers) are removed.
 """
 
 import base64
@@ -19,17 +19,17 @@ from PIL import Image
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 
+# Notebooks that take many minutes, shipped with the coarse settings and short motions of the tests
 QUICK = ("06_a_roman_bridge", "07_from_first_hinge_to_the_ground")
-"""What takes many minutes, and is shipped as it runs in tests: coarse, and on short motions."""
 
 NOTE = """```{note}
-What this notebook shows was computed on coarse settings (`ARCHFEM_QUICK`), to be run in half a
-minute. Its words tell of the whole settings, which take it many minutes.
+The outputs of this notebook were computed with coarse settings (`ARCHFEM_QUICK`), which take half a
+minute. Its text describes the results of the full settings, which take many minutes.
 ```"""
 
 
 def executed(script: Path, whole: bool) -> nbformat.NotebookNode:
-    """The notebook of a script, run from the start in a fresh kernel, outside of the checkout."""
+    """Run the notebook of a script in a fresh kernel, outside of the checkout."""
     notebook = jupytext.read(script)
     if script.stem in QUICK and not whole:
         notebook.cells.insert(1, nbformat.v4.new_markdown_cell(NOTE))
@@ -48,7 +48,7 @@ def executed(script: Path, whole: bool) -> nbformat.NotebookNode:
 
 
 def smaller(png: str) -> str:
-    """A picture in base64, in 256 colours."""
+    """Reduce a base64 picture to 256 colours."""
     picture = Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")
     kept = io.BytesIO()
     picture.quantize(256, dither=Image.Dither.NONE).save(kept, "PNG", optimize=True)
@@ -56,7 +56,7 @@ def smaller(png: str) -> str:
 
 
 def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """The notebook without what differs between runs, its pictures reduced."""
+    """Remove data that differ between runs, and reduce the figures."""
     notebook.metadata = {"kernelspec": notebook.metadata["kernelspec"]}
     for number, cell in enumerate(notebook.cells):
         cell.id, cell.metadata = f"cell-{number}", {}
@@ -75,7 +75,7 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 
 def main(words: list[str]) -> None:
-    """Run the scripts that are named, or all; `--whole` makes none quick. Say what each cost."""
+    """Run the named scripts, or all; `--whole` uses full settings. Print the cost of each."""
     scripts = [word for word in words if word != "--whole"]
     for script in map(Path, scripts or sorted(FOLDER.glob("*.py"))):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -31,29 +31,29 @@ def save(figure: Figure, name: str) -> None:
 
 
 def page(width: float, height: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """A figure with axes side by side."""
+    """Return a figure with axes side by side."""
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, list(np.atleast_1d(figure.subplots(1, columns)))
 
 
 def bare(axes: Axes) -> None:
-    """Leave a drawing without axes, to scale."""
+    """Hide the axes of a drawing, and draw it to scale."""
     axes.set_axis_off()
     axes.set_aspect("equal")
 
 
 def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
-    """An arrow between two places."""
+    """Draw an arrow between two points."""
     axes.annotate("", end, start, arrowprops={**ARROW, "color": colour})
 
 
 def stone(axes: Axes, points: list[tuple[float, float]]) -> None:
-    """The outline of a stone."""
+    """Draw the outline of a stone."""
     axes.add_patch(Polygon(points, facecolor=STONE, edgecolor=EDGE, lw=1.0))
 
 
 def signs() -> None:
-    """N, V, M and e at a joint, its opening, rotation and slip; all positive."""
+    """Draw positive N, V, M and e of a joint, its opening, rotation and slip."""
     figure, (left, right) = page(7.6, 2.3, 2)
     stone(left, [(-1.5, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.5, 1.0)])
     left.plot([0.35, 0.35], [0.0, 1.0], color=EDGE, lw=1.0)
@@ -92,7 +92,7 @@ def signs() -> None:
 
 
 def law() -> None:
-    """Traction across and along a joint, and what it does over a step."""
+    """Draw normal and shear traction of a joint, and its mean over a step."""
     figure, (normal, shear, step) = page(8.4, 2.5, 3)
     g = np.array([-1.0, 0.0, 1.0])
     normal.plot(g, np.minimum(g, 0.0), color=RED)
@@ -119,7 +119,7 @@ def law() -> None:
 
 
 def section() -> None:
-    """Moment over turn of a joint under a constant force, exact and by springs."""
+    """Draw moment over rotation of a joint under constant force, exact and by springs."""
     figure, (axes,) = page(5.0, 2.8)
     turn = np.linspace(1e-3, 12.0, 400)  # over N / (k_n w h²)
     exact = np.where(turn <= 2.0, turn / 12.0, 0.5 - np.sqrt(2.0 / turn) / 3.0)
@@ -143,7 +143,7 @@ def section() -> None:
 
 
 def rules() -> None:
-    """Where rules look at the traction of a joint of four facets."""
+    """Draw the quadrature points of a joint of four facets."""
     figure, (axes,) = page(5.4, 1.9)
     facets = np.linspace(0.0, 1.0, 5)
     gauss = 0.5 + 0.5 * np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0])
@@ -166,7 +166,7 @@ def rules() -> None:
 
 
 def frame() -> None:
-    """Two faces that have moved far: the mean frame, the overlap, the linear gap."""
+    """Draw two faces after large displacements: mean frame, overlap, linear gap."""
     figure, (axes,) = page(4.6, 3.2)
     turn, slip = 0.36, 0.22
 
@@ -194,7 +194,7 @@ def frame() -> None:
 
 
 def ladder() -> None:
-    """Coordinates of a stone on each rung."""
+    """Draw the coordinates of a stone at each fidelity."""
     figure, axes = page(7.6, 1.9, 4)
     low, high = np.linspace(0.0, 1.0, 5), np.array([0.0, 1.4])
     for each, name in zip(axes, ("rigid", "faces", "condensed", "full"), strict=True):
@@ -220,7 +220,7 @@ def ladder() -> None:
 
 
 def states() -> None:
-    """Pressure along a joint, closed, open in part, hinged, sliding."""
+    """Draw the pressure along a joint: closed, partly open, hinged, sliding."""
     figure, axes = page(7.6, 1.9, 4)
     shapes = {
         "closed": [(0.0, 0.3), (1.0, 0.7)],
@@ -244,7 +244,7 @@ def states() -> None:
 
 
 def programme() -> None:
-    """What limit analysis lets a joint bear."""
+    """Draw the strength of a joint in limit analysis."""
     figure, (moment, shear) = page(6.4, 2.5, 2)
     n = np.linspace(0.0, 1.0, 101)
     moment.plot(n, 0.5 * n, color=RED, label="no crushing")
@@ -266,7 +266,7 @@ def programme() -> None:
 
 
 def tutorial() -> None:
-    """The pictures of the tutorial, by the lines that it gives."""
+    """Draw the figures of the tutorial by its own code."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, width=1.0)
     model = af.build(ring, fidelity="full", cells=(4, 4))
     dead = af.dead_load(model)

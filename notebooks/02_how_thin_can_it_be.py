@@ -12,7 +12,7 @@
 # # How thin can it be?
 #
 # A dry-stone arch has no mortar and no tension. It stands as long as a line of thrust fits inside
-# its ring, so it stands by its shape alone: neither the stiffness nor the weight of the stone
+# its ring. So it stands by its shape alone: neither the stiffness nor the weight of the stone
 # matters. Then there is a thinnest semicircle that stands at all. **How thin is it?**
 
 # %%
@@ -29,8 +29,8 @@ quick = "ARCHFEM_QUICK" in os.environ  # a map of few points: for tests
 # %% [markdown]
 # ## The structure
 #
-# A semicircle of 50 voussoirs with radius 1 m; a thickness in metres is then the ratio $t/R$. It
-# could as well be 10 m: there is no scale in this problem.
+# A semicircle of 50 voussoirs with radius 1 m; a thickness in metres is then the ratio $t/R$. The
+# radius could be 10 m as well: there is no scale in this problem.
 
 
 # %%
@@ -44,15 +44,15 @@ af.view.draw_structure(semicircle(0.15))
 # ## The equation
 #
 # Each joint of depth $h$ carries a compression at its intrados end, $F_i$, one at its extrados end,
-# $F_e$, and a shear force $V$. That the thrust stays within the joint, $|M| \le N h/2$, is the same
-# as $F_i, F_e \ge 0$. Milankovitch's question of 1907 is then whether the linear equations of
-# balance have a solution in numbers that are not negative:
+# $F_e$, and a shear force $V$. The thrust stays within the joint, $|M| \le N h/2$, if and only if
+# $F_i, F_e \ge 0$. Milankovitch's question of 1907 is then whether the linear equations of
+# equilibrium have a solution with non-negative compressions:
 #
 # $$ -G_o^\mathsf{T} F + G_s^\mathsf{T} V = f_\text{weight}, \qquad F \ge 0 . $$
 #
 # Heyman's *safe theorem* (1966) says that one such solution is enough: if we can find a line of
-# thrust, so can the arch. A linear programme finds one, or proves that there is none, and halving
-# a bracket of thicknesses finds the last one that has.
+# thrust, so can the arch. A linear programme finds one, or proves that there is none. Bisection of
+# a bracket of thicknesses finds the least one with a solution.
 
 # %%
 least = af.minimum_thickness(semicircle, friction=None)
@@ -62,9 +62,9 @@ f"a semicircle stands down to t/R = {least:.4f}"
 # ## What it looks like
 #
 # At that thickness a single line of thrust is left. It touches the extrados at the crown, the
-# intrados at the haunches and the extrados at the springings: five hinges, one more than a
-# mechanism needs, since the arch is symmetric. We ask for it by letting a support give way, which
-# makes an arch find its least thrust.
+# intrados at the haunches and the extrados at the springings. These are five hinges, one more than
+# a mechanism needs, since the arch is symmetric. A small movement of a support selects this line:
+# an arch on spreading supports has its least thrust.
 
 # %%
 thinnest = semicircle(least)
@@ -72,8 +72,8 @@ spread = af.collapse_factor(thinnest, live=af.Settlement("left abutment", (-0.01
 af.view.draw_collapse(thinnest, spread)
 
 # %% [markdown]
-# Two per cent thinner, there is no line of thrust, and the limit analysis shows how it falls: the
-# crown sinks, the haunches go out.
+# Two per cent thinner, there is no line of thrust. The limit analysis shows how it falls: the
+# crown sinks, the haunches move out.
 
 # %%
 too_thin = semicircle(0.98 * least)
@@ -84,17 +84,17 @@ af.view.draw_collapse(too_thin, fall)
 # ## Check against theory
 #
 # Milankovitch found $t/R = 0.1075$, with hinges at 54.5° from the crown. With 50 stones the nearest
-# joints are at 54°, and a ring can only hinge at its joints: it may be thinner by a hair.
+# joints are at 54°, and a ring can only hinge at its joints: it may be slightly thinner.
 
 # %%
 angles = [90.0 - 3.6 * joint for joint, _ in spread.hinges]
 f"t/R = {least:.5f}, {least / 0.1075 - 1.0:+.2%} off; hinges at {np.round(angles, 1)}°"
 
 # %% [markdown]
-# Flatter arches may be much thinner: their thrust line is nearer to a circle. What is left above
-# the least thickness is resistance to an earthquake. The map shows the constant horizontal
-# acceleration that would turn rings into mechanisms, with known values on it: Oppenheim's of 1992
-# for seven voussoirs at 157.5°, and Milankovitch's for the semicircle, which resists none.
+# Flatter arches may be much thinner: their thrust line is nearer to a circle. The thickness above
+# the least one is resistance to an earthquake. The map shows the constant horizontal acceleration
+# that turns rings into mechanisms, with known values on it. They are Oppenheim's of 1992 for seven
+# voussoirs at 157.5°, and Milankovitch's for the semicircle, which resists none.
 
 
 # %%
@@ -134,10 +134,10 @@ af.view.draw_capacity(capacity, {embrace: least_of(embrace) for embrace in embra
 # - Seven voussoirs instead of 50: the ring may be 10 % thinner. Why does an arch with fewer joints
 #   need less?
 # - `contact=af.Contact(1.48e9, 0.3e9, friction=0.39)`, and no `friction=None`: below 0.395 the
-#   springings slide before the arch is as thin as it could be.
+#   springings slide before the arch reaches its least thickness.
 # - `strength=1 * af.units.MPa` in `minimum_thickness`, and a radius of 20 m: when does the strength
 #   of stone begin to matter?
-# - `chords=1` cuts the stones with straight faces. Which way does the least thickness go?
+# - `chords=1` cuts the stones with straight faces. Does the least thickness increase or decrease?
 
 # %%
 checked = least

@@ -11,9 +11,9 @@
 # %% [markdown]
 # # A load finds its four hinges
 #
-# An arch that stands can be loaded, and stones do not crush easily. It gives way when its joints
+# An arch that stands can be loaded, and stones do not crush easily. It fails when its joints
 # turn into hinges, one after another, until it moves. **How much does it carry, and in which order
-# do the hinges come?**
+# do the hinges form?**
 
 # %%
 # %matplotlib inline
@@ -27,8 +27,8 @@ import archfem as af
 # %% [markdown]
 # ## The structure
 #
-# The ring of Demirel and Aldemir (2021), with which they validated their springs: two equal loads,
-# pushed down until it fails. The paper does not print where they stand. We put them on the edges of
+# The ring with which Demirel and Aldemir (2021) validated their springs: two equal loads,
+# increased until it fails. The paper does not state their position. We put them on the edges of
 # the keystone, 0.26 m from the crown. Stones have faces of four chords, as their mesh will, and
 # joints that never slide, as in the paper.
 
@@ -53,13 +53,13 @@ figure
 # %% [markdown]
 # ## The equation
 #
-# There are two ways to ask. The first follows the equilibrium of elastic stones and joints, with
+# There are two methods. The first follows the equilibrium of elastic stones and joints, with
 # the load factor $\lambda$ as one more unknown and its displacement $d$ prescribed:
 #
 # $$ f(q) = f_\text{weight} + \lambda\, f_\text{load}, \qquad f_\text{load} \cdot q =
 # |f_\text{load}|\; d . $$
 #
-# The second knows no stiffness at all. Of all forces that balance the loads, with each joint's
+# The second needs no stiffness. Of all forces in equilibrium with the loads, with each joint's
 # thrust between its two faces, it takes those with the largest factor:
 #
 # $$ \max \lambda \quad \text{subject to} \quad B\,(N, V, M) = f_\text{weight} + \lambda\,
@@ -84,15 +84,15 @@ af.view.draw_pushover({"five springs a joint": push}, limits={"limit analysis": 
 af.view.draw_collapse(ring, limit)
 
 # %% [markdown]
-# Crown, haunches and springings turn; each of the three comes as a pair, since ring and loads are
-# symmetric, and four of the six would do. Sliding is left out here; with friction of 0.6 joints
-# would slip at a somewhat lower load (`friction="coulomb"`).
+# Crown, haunches and springings rotate. Each of the three is a pair, since ring and loads are
+# symmetric, and four of the six would suffice. Sliding is excluded here. With friction of 0.6
+# joints would slip at a somewhat lower load (`friction="coulomb"`).
 
 # %% [markdown]
 # ## In which order?
 #
-# That depends on what one calls a hinge. The table gives the share of the ultimate load at which
-# joints first reach an eccentricity: 1/6, where a joint begins to open; 0.46, the paper's mark;
+# That depends on the definition of a hinge. The table gives the share of the ultimate load at which
+# joints first reach an eccentricity: 1/6, where a joint begins to open; 0.46, the paper's limit;
 # 0.499, when the last of five springs carries all. Below the five springs, Lobatto's rule.
 
 
@@ -116,12 +116,13 @@ table = {
 pd.DataFrame(table).T.rename_axis(["joints", "|e| from"]).round(2)
 
 # %% [markdown]
-# The crown is first by every measure, since weight alone has tilted it to $e = 0.29$ and the loads
-# stand beside it; haunches come before springings where 0.46 counts, and after them, at the very
-# end, where a hinge is the last of five springs. The paper reports springings, crown, haunches: by
-# the strict measure the haunches are last here too, but springings and crown only draw level, where
-# stones weigh nothing and loads stand 0.57 m from the crown; neither the joints' stiffness nor any
-# other place of the loads turns them round.
+# The crown is first by every measure: weight alone has brought it to $e = 0.29$, and the loads
+# stand beside it. Haunches hinge before springings by the limit 0.46. At the very end, where a
+# hinge is the last of five springs, they hinge after them.
+#
+# The paper reports springings, crown, haunches. By the strict measure the haunches are last here
+# too. But springings and crown become equal only where stones are weightless and loads stand 0.57 m
+# from the crown. Neither the joints' stiffness nor any other position of the loads reverses them.
 
 # %%
 light = af.circular_arch(
@@ -135,8 +136,8 @@ pd.Series(first(af.pushover(row, pair(0.57)), 0.499), name="share of the ultimat
 # ## Where there is no limit
 #
 # At the quarter points of the span the same two loads have no limit load. The line of thrust under
-# them alone, three straight struts, fits inside the ring; the more they weigh, the nearer the
-# thrust comes to it.
+# them alone, three straight struts, fits inside the ring. The larger they are, the nearer the
+# thrust is to it.
 
 # %%
 unlimited = af.collapse_factor(ring, live=pair(1.40))
@@ -147,7 +148,7 @@ af.view.draw_structure(ring, heavy.joints.isel(step=-1))
 f"{unlimited.outcome.sentence}; at {heavy.factor:.0f} kN each, {len(heavy.hinges)} joints hinge"
 
 # %% [markdown]
-# A single load at a quarter point is another matter: it finds exactly four hinges, on alternating
+# A single load at a quarter point differs: it forms exactly four hinges, on alternating
 # faces, and the arch sways.
 
 # %%
@@ -157,8 +158,8 @@ af.view.draw_collapse(ring, single)
 # %% [markdown]
 # ## Check
 #
-# Pushover and limit analysis share neither unknowns nor solver. Of the curve's last point, and of
-# the number of hinges:
+# Pushover and limit analysis share neither unknowns nor solver. The check compares the last point
+# of the curve, and the number of hinges:
 
 # %%
 checked = push.factor / limit.factor
@@ -167,9 +168,10 @@ f"pushover / limit analysis = {checked:.5f}; one load: {len(single.hinges)} hing
 # %% [markdown]
 # ## What to try next
 #
-# - `quadrature="exact"`: the compressed strip at a hinge gets narrower for ever, and the curve only
-#   approaches the limit. `push.limit` extrapolates it; `push.uncertainty` says how far.
-# - `quadrature="gauss"`: the outermost point is 1.6 cm inside the face. What does that cost?
+# - `quadrature="exact"`: the compressed strip at a hinge narrows without end, and the curve only
+#   approaches the limit. `push.limit` extrapolates it; `push.uncertainty` is its uncertainty.
+# - `quadrature="gauss"`: the outermost point is 1.6 cm inside the face. How much load does that
+#   cost?
 # - `live=af.BodyForce(1.0)`: an earthquake's push, in multiples of g.
-# - `af.pushover(model, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))`: the abutment gives way,
+# - `af.pushover(model, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))`: the abutment moves,
 #   and the thrust falls to the least that can hold the arch.

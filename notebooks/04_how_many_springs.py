@@ -47,13 +47,13 @@ af.view.draw_structure(ring)
 #
 # with $g_i$ the opening at the spring. Two things follow. While all are closed, a row over $n$
 # intervals is stiffer against rotation than the joint, by $1 + 2/n^2$. And once a single spring is
-# left, $M = N r_i$: the outermost one decides how near to the face the thrust can come.
+# left, $M = N r_i$: the outermost one decides how near to the face the thrust can be.
 #
-# A gap $\delta$ between the stones is something that joints of no thickness do not have. We give
-# them what it changes. Stones are shorter, and lighter by $18\,\delta$ in 8.19 m of centre line.
-# The shear force $V$ has an arm $\delta/2$ from the middle of the gap to the stones' faces, so that
-# the thrust there is off by $V\delta/2N$ to either side: joints that are shallower by
-# $\delta\,V/N$ bound the effect, and at the crown's hinges $V/N = 0.6$.
+# A gap $\delta$ between the stones does not exist in joints of no thickness. We model its effects.
+# Stones are shorter, and lighter by $18\,\delta$ in 8.19 m of centre line. The shear force $V$ has
+# an arm $\delta/2$ from the middle of the gap to the stones' faces. So the thrust there is off
+# by $V\delta/2N$ to either side. Joints that are shallower by $\delta\,V/N$ bound the effect, and
+# at the crown's hinges $V/N = 0.6$.
 
 
 # %%
@@ -93,16 +93,16 @@ table = pd.DataFrame({key: row(found, key[1]) for key, found in pushed.items()})
 table.rename_axis(["springs", "gap [mm]"]).round(2)
 
 # %% [markdown]
-# The ultimate load knows nothing of the number of springs: each row has one at the face, and that
-# is all a hinge needs. A gap of 3 mm costs 2.6 % at most. But at half the ultimate load five
-# springs have moved three quarters as far as eight.
+# The ultimate load does not depend on the number of springs: each row has one at the face, and a
+# hinge needs no more. A gap of 3 mm costs 2.6 % at most. But at half the ultimate load five springs
+# have moved three quarters as far as eight.
 
 # %% [markdown]
 # ## From 3 to 33 springs, and other rules
 #
-# What the paper did not try: more springs, and rules that look at three points of each facet
-# between them. Lobatto's has points at both ends of a facet, Gauss's has none; exact facets
-# integrate the triangle of compression in closed form.
+# The paper did not try more springs, or rules with three points on each facet. Lobatto's rule has
+# points at both ends of a facet, Gauss's has none. Exact facets integrate the triangle of
+# compression in closed form.
 
 # %%
 numbers, rules = [3, 5, 9, 17, 33], ["nodal", "lobatto", "gauss"]
@@ -133,15 +133,15 @@ figure
 
 # %% [markdown]
 # Nodal springs and Lobatto's points reach the limit load with any number. Gauss's outermost point
-# is inside the face, and what that takes from each lever arm adds up to more than a quarter of the
-# load on four facets. Exact facets never stop closing: their hinge has a compressed strip that
-# narrows with the square root of the turning, and after 0.7 m, a tenth of the ring, 5 % are
-# missing. (So are 3 % on 32 of Lobatto's facets, the last of which is as narrow.)
+# is inside the face, which shortens each lever arm: together more than a quarter of the load is
+# lost on four facets. Exact facets never stop closing: their hinge has a compressed strip that
+# narrows with the square root of the rotation. After 0.7 m, a tenth of the ring, 5 % are missing.
+# (So are 3 % on 32 of Lobatto's facets, the last of which is as narrow.)
 #
-# For the way there it is the other way round: exact facets are the reference, Lobatto's and Gauss's
-# rules are within half a per cent on eight facets, and a row of springs needs 33 for 2 %. So the
-# number of springs does not matter where the ultimate load is asked, and matters most of all where
-# the displacement is, as in an earthquake.
+# Before the ultimate load the order is reversed. Exact facets are the reference, Lobatto's and
+# Gauss's rules are within half a per cent on eight facets, and a row of springs needs 33 for 2 %.
+# So the number of springs does not matter for the ultimate load. It matters most for the
+# displacement, as in an earthquake.
 
 # %%
 extrapolated = found["exact"][0].limit / limit.factor
@@ -150,8 +150,8 @@ f"the curve of exact facets, extrapolated: {extrapolated:.4f} of the limit load"
 # %% [markdown]
 # ## Check
 #
-# If the outermost Gauss point is what counts, then four facets are a thinner ring of the same
-# weight, for limit analysis. The point stands $(1 - \sqrt{3/5})/2$ of a facet inside the face.
+# If the outermost Gauss point decides, then four facets are a thinner ring of the same
+# weight, for limit analysis. The point is $(1 - \sqrt{3/5})/2$ of a facet inside the face.
 
 # %%
 thin = 0.55 * (1.0 - (1.0 - np.sqrt(0.6)) / 4)
@@ -164,10 +164,10 @@ f"pushover with Gauss's rule {gauss:.2f}, limit analysis of the thinner ring {kn
 # %% [markdown]
 # ## What to try next
 #
-# - `fidelity="faces"` or `"condensed"` in `push`: stones give as well. Does the picture change?
+# - `fidelity="faces"` or `"condensed"` in `push`: stones deform as well. Do the results change?
 # - `degree=2` and `quadrature="lobatto"` with `fidelity="full"`: what is a link then?
 # - A time history: how far is the largest $|e|$ of five springs from that of exact facets? The next
-#   notebook knows.
+#   notebook has the answer.
 
 # %%
 checked = gauss / known

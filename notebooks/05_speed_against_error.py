@@ -11,8 +11,8 @@
 # %% [markdown]
 # # Speed against error
 #
-# A stone is some fifty times stiffer than its joints. So why give it nodes? And if it gets none,
-# **what does that cost in accuracy, and what does accuracy cost in time?**
+# A stone is some fifty times stiffer than its joints. So why give it nodes? Without nodes,
+# **how much accuracy is lost, and how much time does accuracy cost?**
 
 # %%
 # %matplotlib inline
@@ -25,27 +25,28 @@ import archfem as af
 quick = "ARCHFEM_QUICK" in os.environ  # a short motion: for tests
 
 # %% [markdown]
-# ## One formula for every rung
+# ## One formula for every fidelity
 #
 # Between joints everything is linear. With a basis $B$ of the displacements a block may have,
 #
 # $$ M \to B^T M B, \qquad K \to B^T K B, \qquad G \to G B, $$
 #
-# where $G$ takes displacements to openings and slips along the joints. Three rigid motions a block
-# make the rung `rigid`; three of each joint face `faces`; all nodes on joints `condensed`.
+# where $G$ maps displacements to openings and slips along the joints. Three rigid motions a block
+# give the fidelity `rigid`; three of each joint face `faces`; all nodes on joints `condensed`.
 
 # %%
 ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 motion = af.Motion.synthetic(duration=2.0 if quick else 8.0, pga=1.7, seed=1)
 damping = af.Rayleigh(0.05, (8.0, 16.0))
-for rung in ("rigid", "faces", "condensed", "full"):
-    print(f"{rung:10s} {af.build(ring, fidelity=rung, quadrature='exact').size:4d} coordinates")
+for fidelity in ("rigid", "faces", "condensed", "full"):
+    model = af.build(ring, fidelity=fidelity, quadrature="exact")
+    print(f"{fidelity:10s} {model.size:4d} coordinates")
 
 # %% [markdown]
 # ## How they differ
 #
-# Five springs a joint, as in Demirel and Aldemir (2021), on all nodes; against three coordinates a
-# stone and the traction integrated in closed form.
+# Five springs a joint, as in Demirel and Aldemir (2021), on all nodes, are compared with three
+# coordinates a stone and the traction integrated in closed form.
 
 # %%
 springs = af.build(ring, fidelity="full", quadrature="nodal")
@@ -57,10 +58,10 @@ runs = {
 af.view.draw_envelope(runs, dead=af.dead_load(stones).joints)
 
 # %% [markdown]
-# ## All of it in one picture
+# ## All of it in one figure
 #
-# Rungs, quadratures and time steps against a converged reference: 12 × 12 cells, exact facets,
-# 1.25 ms. The shape of a mark is the rung, its colour the quadrature.
+# Fidelities, quadratures and time steps against a converged reference: 12 × 12 cells, exact facets,
+# 1.25 ms. The shape of a mark is the fidelity, its colour the quadrature.
 
 # %%
 found = af.accuracy(ring, motion, damping=damping, cells=((4, 4),), steps=(0.005, 0.0025))
@@ -68,10 +69,10 @@ print(found.table())
 af.view.draw_accuracy(found)
 
 # %% [markdown]
-# ## Let it choose
+# ## Automatic selection
 #
-# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, cheapest first,
-# until the error it predicts for the largest $|e|$ of every joint is within the tolerance.
+# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, cheapest first.
+# It stops when the error it predicts for the largest $|e|$ of every joint is within the tolerance.
 
 # %%
 chosen = af.build(ring, fidelity="auto", tolerance=0.005, motion=motion, damping=damping)
@@ -80,8 +81,8 @@ print(chosen.fidelity, chosen.size, chosen.prediction.text)
 # %% [markdown]
 # ## Was the prediction honest?
 #
-# The ratio of the predicted error to the one that came about should be above one, and not by much:
-# what the model and what its steps err by is added up, though one may make up for the other.
+# The ratio of the predicted error to the actual one should be slightly above one.
+# The errors of model and steps are added, though they may cancel.
 
 # %%
 reference = af.build(ring, fidelity="condensed", cells=(12, 12), quadrature="exact")
@@ -97,6 +98,7 @@ print(f"predicted {chosen.prediction.error:.4f}, actual {actual:.4f}, ratio {rat
 # %% [markdown]
 # ## What to try next
 #
-# - A stronger motion (`pga=4.0`): past the first mechanism no rung follows another closely.
-# - Joints ten times stiffer: the stones then take part, and `rigid` falls behind `faces`.
+# - A stronger motion (`pga=4.0`): beyond the first mechanism no fidelity follows another closely.
+# - Joints ten times stiffer: the stones then deform noticeably, and `rigid` is less accurate than
+#   `faces`.
 # - A block of backfill among the stones: `auto` gives it all its nodes.

@@ -14,17 +14,16 @@
 # Three arches of dry stone over the stream at Konuralp, in one of the most seismic parts of Turkey.
 # Demirel and Aldemir (Buildings 11 (2021)) found that the bridge of **Prusias ad Hypium collapses
 # under every motion of the design earthquake as it stands, and under none once it is restored**.
-# Do we find the same, and what does the answer hang on?
+# Is this reproduced here, and on which assumptions does the verdict depend?
 #
 # The bridge carried traffic until a flood in 1963, and still stood when it was surveyed for its
 # restoration. Of the earthquakes that the paper lists, the nearest, at Düzce on 12 November 1999,
-# had its epicentre 15 km away; peak acceleration at the site is put at 0.30 g, by prediction
-# equations. The motions of the design earthquake divided by R = 3, under which the paper finds
-# collapse, reach 0.16 to 0.17 g here. What 1999 did to the bridge, and how much of its fill was
-# left then, the paper does not tell.
+# had its epicentre 15 km away. Prediction equations give a PGA of 0.30 g at the site. The motions
+# of the design earthquake divided by R = 3, under which the paper finds collapse, reach 0.16 to
+# 0.17 g here. The paper does not state the damage of 1999, or how much of the fill was left then.
 #
-# Their motions were recorded ones; these here are made from seeds and matched to the same spectrum,
-# so that this page runs without any file. Figures are numbered as in the paper.
+# The paper used recorded motions. The motions here are synthetic and matched to the same spectrum,
+# so that this page needs no files. Figures are numbered as in the paper.
 
 # %%
 # %matplotlib inline
@@ -51,8 +50,9 @@ existing, restored = (case.structure for case in cases.values())
 # ## The bridge (figures 10 and 14)
 #
 # Rings, skewbacks, piers and sidewalls are stones with dry joints; the fill is one soft body that
-# lies on them. What the paper does not tell (the height of the piers, how much of the fill is gone,
-# how the ruined northern sidewall stands) is a number in the case file, marked as assumed.
+# rests on them. The paper does not state the height of the piers, the eroded part of the fill, and
+# the support of the ruined northern sidewall. Each of these is a number in the case file, marked as
+# assumed.
 
 # %%
 print(f"{len(existing.free)} blocks, {len(existing.joints)} joints, {existing.weight / 1e6:.2f} MN")
@@ -61,8 +61,8 @@ af.view.draw_instants({name: (case.structure, None) for name, case in cases.item
 # %% [markdown]
 # ## Dead load (figure 12)
 #
-# Stones are low on the ladder of models: a voussoir keeps the ends of its faces, the fill all its
-# nodes. Weight and support must balance, whatever the mesh.
+# Stones have a low fidelity: a voussoir keeps the ends of its faces, the fill all its
+# nodes. Weight and support must be in balance, for any mesh.
 
 # %%
 dead = {name: af.cases.dead_load_of_case(case) for name, case in cases.items()}
@@ -83,10 +83,11 @@ af.view.draw_stress(model, dead["as it stands"])
 
 # %% [markdown]
 # No joint is near hinging or sliding, as the paper says. Its largest compression, 0.6 MPa, is more
-# than twice what this fill gives; a deck 2 m above the crown would do it. Either way the stone uses
-# one per cent of its strength: **arches fall by losing stability, not strength.**
+# than twice the value with this fill; a deck 2 m above the crown would explain it. In both cases
+# the stone uses one per cent of its strength: **arches fall by losing stability, not strength.**
 #
-# The keystone as a free body: the forces of its neighbours, of the fill, and its weight close.
+# The keystone as a free body: the forces of its neighbours, of the fill, and its weight sum to
+# zero.
 
 # %%
 stone = "main arch, voussoir 9"
@@ -94,11 +95,11 @@ body = af.statics.forces_on(existing, joints, stone, model.cells)
 af.view.draw_free_body(existing, joints, stone, cells=model.cells)
 
 # %% [markdown]
-# ## Modes (figure 11), and what the damping uses
+# ## Modes (figure 11), and the damping
 #
-# About the dead load, joints as closed as they are then. The fill sways between the walls; without
-# erosion and with both sidewalls held the first mode lies at 3.1 Hz instead. Damping is 5 % at the
-# first and at the last mode that counts along the bridge.
+# The modes are those about the dead load, with the joints open or closed as they are then. The fill
+# sways between the walls. Without erosion and with both sidewalls held the first mode is at 3.1 Hz
+# instead. Damping is 5 % at the first and at the last effective mode along the bridge.
 
 # %%
 found = {name: af.modes(each.model, 6, about=each) for name, each in dead.items()}
@@ -111,12 +112,12 @@ for name, each in dead.items():
 af.view.draw_modes(found["as it stands"])
 
 # %% [markdown]
-# ## As the paper computes it: R = 3, five springs a joint (figures 13, 15 and 16)
+# ## The paper's model: R = 3, five springs a joint (figures 13, 15 and 16)
 #
 # The paper divides the motions by R = 3 and gives each joint five springs. A ring has collapsed
-# once four joints *of its own* hinge (|e| ≥ 0.46) or slide at the same time; failed joints of piers
-# then make the mechanism semi-global or global. Four joints anywhere are met sooner, and told apart
-# here. Done so, this is its figure 13.
+# once four joints *of its own* hinge (|e| ≥ 0.46) or slide at the same time. Failed joints of piers
+# then make the mechanism semi-global or global. Four failed joints anywhere occur earlier, and are
+# distinguished here. With this model the next figure is the paper's figure 13.
 
 # %%
 motion = cases["as it stands"].ground_suite().motions[0]
@@ -166,17 +167,19 @@ af.view.draw_envelope(paper, dotted=["as it stands"], dead=joints)
 af.view.draw_joint(paper, "north arch, joint 5")
 
 # %% [markdown]
-# By the paper's law, joints that never slide, four joints of two rings fail at once as the bridge
-# stands, for 15 ms, open by 1.6 mm and close again; restored they do not. **That is four joints
-# anywhere, and not the paper's criterion**: that one is met in the northern ring, under two of the
-# six pairs, for 5 to 20 ms, where the paper has a collapse under all of its six. And can the blocks
-# move? Under none of the six pairs is there a motion that the failed joints, and they alone,
-# permit: it is a count of hinges that last for an instant, in arches that go on standing.
+# By the paper's law joints never slide. As the bridge stands, four joints of two rings then fail at
+# once for 15 ms, open by 1.6 mm and close again. Of the restored bridge they do not. **That is four
+# joints anywhere, and not the paper's criterion.** That criterion is met in the northern ring,
+# under two of the six pairs, for 5 to 20 ms, whereas the paper has a collapse under all of its six.
+#
+# Can the blocks move? Under none of the six pairs is there a motion that the failed joints, and
+# only they, permit. It is a count of hinges that last for an instant, in arches that remain
+# standing.
 #
 # ## With joints that are integrated exactly, and slide
 #
-# Five springs are a factor (1 + 2/4²) stiffer in rotation than the joint they stand for, and a
-# joint on five points is at |e| = 0.5 as soon as four of them are open. Exact joints need more.
+# Five springs are a factor (1 + 2/4²) stiffer in rotation than the joint they represent. A joint on
+# five points is at |e| = 0.5 as soon as four of them are open, whereas exact joints need more.
 
 # %%
 exact = {name: run(each.model, name) for name, each in dead.items()}
@@ -191,11 +194,11 @@ af.view.draw_envelope(
 # %% [markdown]
 # ## The earthquake itself, undivided
 #
-# The paper's criterion is now met as the bridge stands: four joints of the main ring for 5 ms, with
-# joints that slide and rigid stones. Hinges open by 8 mm, and stones end 13 mm from where they
-# stood; still no motion of the blocks was verified. **Restored, no four joints fail**; stones end 4
-# mm from where they stood. How R and the joints enter decides the verdict; the restoration shifts
-# it.
+# With joints that slide and rigid stones, the paper's criterion is now met as the bridge stands, by
+# four joints of the main ring for 5 ms. Hinges open by 8 mm, and the residual displacement is 13
+# mm. Still no motion of the blocks was verified. **Restored, no four joints fail**, and the
+# residual displacement is 4 mm. The verdict depends on R and the joint model; the restoration
+# shifts it.
 
 # %%
 whole = {name: run(each.model, name, 3.0) for name, each in dead.items()}
@@ -205,15 +208,16 @@ af.view.draw_envelope(whole, dotted=["as it stands"])
 # %% [markdown]
 # ## What does each measure buy?
 #
-# The factor on the whole motion at which each definition of a mechanism is first met tells more
-# than a verdict at one level. Each measure alone, exact joints, three pairs, by
+# The factor on the whole motion at which each definition of a mechanism is first met contains more
+# information than a verdict at one level. Each measure alone, exact joints, three pairs, by
 # `archfem study meshes/prusias_retrofit.toml --out out/retrofit`:
 #
 # ![factors at first mechanism](figures/bridge_retrofit.png)
 #
-# Holding the sidewall and paving buy most. Filling up with lime-sand between new spandrels buys
-# nothing by itself: it is heavier and stiffer, and the bridge follows the ground more closely. All
-# four together gain a tenth to a quarter in the rings. Here are the two ends of it, for one pair.
+# The held sidewall and the paving have the largest effect. Filling with lime-sand between new
+# spandrels has none by itself: the fill is heavier and stiffer, and the bridge follows the ground
+# more closely. All four together gain a tenth to a quarter in the rings. The next cell computes the
+# two extremes, for one pair.
 
 # %%
 steps = {"precision": 1.0, "between": (1.0, 1.5)} if quick else {"precision": 0.1}
@@ -232,28 +236,30 @@ for name, scales in factors.items():
     print(f"{name}\n{scales.table()}\n")
 
 # %% [markdown]
-# ## What the verdict hangs on
+# ## Sensitivity of the verdict
 #
 # - **Friction.** Where joints slide at 0.60, no four of them fail at once under any of the six
-#   pairs, by five springs or exact: they slip by 0.4 to 3 mm and turn less. By the paper's law,
-#   which never lets them slide, four anywhere fail under three pairs and four in one ring under two
+#   pairs, by five springs or exact: they slip by 0.4 to 3 mm and rotate less. By the paper's law
+#   joints never slide. Then four anywhere fail under three pairs, and four in one ring under two
 #   (under a third, for one step, with half the time step). Friction of 0.5 and softer or stiffer
-#   springs in shear change how far they slip.
-# - **Damping.** Without its part by mass, which holds back the motion of the whole bridge relative
-#   to the ground, the paper's law gives four in one ring and, for 5 ms, a motion of the blocks,
-#   with hinges open by 8 mm, not 2.5; joints of five springs that slide count four in one ring too,
-#   exact ones do not. To halve the part by stiffness changes little.
-# - **Fill that yields** (35°, 15 kPa, pieces of 0.8 m) brings no mechanism either, and more slip.
+#   springs in shear change the amount of slip.
+# - **Damping.** The mass part damps the motion of the whole bridge relative to the ground. Without
+#   it the paper's law gives four in one ring and, for 5 ms, a motion of the blocks, with hinges
+#   open by 8 mm, not 2.5. Joints of five springs that slide count four in one ring too, exact ones
+#   do not. To halve the stiffness part changes little.
+# - **Fill that yields** (35°, 15 kPa, pieces of 0.8 m) causes no mechanism either, and more slip.
 # - **The joint rule.** Where joints slide, exact ones reach |e| = 0.44, five springs 0.50, and slip
-#   up to five times as far: how a joint slides in part hangs on where it is looked at.
-# - **What a mechanism is.** Any four joints of the whole bridge hinge at a lower level than four of
-#   one ring, and four hinges on which the blocks can really move come later still.
-# - **R, and the sign of the motion.** Each moves a verdict that sits this close to its limit.
+#   up to five times as far: partial sliding of a joint depends on the evaluation points.
+# - **The definition of a mechanism.** Any four joints of the whole bridge hinge at a lower level
+#   than four of one ring. Four hinges on which the blocks can really move occur at a higher level
+#   still.
+# - **R, and the sign of the motion.** Each changes a verdict that is this close to its limit.
 #
-# The range at R = 3 under the first pair, by `tests/benchmarks/bridge_range.py`, stones rigid: the
-# widest hinge, the largest slip and what is left at the end, of rings and piers [mm]; and how long
-# the joints of the first mechanism stay failed, of any four joints, of four in one ring, and
-# verified. Exact joints and five springs slide at 0.60; k_s is in MPa/mm, otherwise 0.30.
+# The table gives the range at R = 3 under the first pair, by `tests/benchmarks/bridge_range.py`,
+# with rigid stones. Its columns are the widest hinge, the largest slip and the residual
+# displacement, of rings and piers [mm]. The last three are the time for which the joints of the
+# first mechanism stay failed: of any four joints, of four in one ring, and verified. Exact joints
+# and five springs slide at 0.60; k_s is in MPa/mm, otherwise 0.30.
 #
 # | pair 1 | \|e\| | opens | slips | left | four | ring | verified |
 # |---|---|---|---|---|---|---|---|
@@ -278,15 +284,16 @@ for name, scales in factors.items():
 # | the paper's law, k_s = 0.05 | 0.500 | 2.46 | 1.11 | 0.47 | 10 ms | – | – |
 # | the paper's law, k_s = 0.97 | 0.500 | 2.19 | 0.08 | 0.18 | 10 ms | – | – |
 #
-# Nothing comes down in these runs: what is left is millimetres. Nor could it, for displacements are
-# taken as small. The range speaks of made motions; the paper's are recorded ones.
+# Nothing falls in these runs: the residual displacements are millimetres. Displacements are taken
+# as small, so a fall is not possible. The range is that of synthetic motions; the paper's are
+# recorded ones.
 #
-# What else is assumed, varied under the matched Erzincan E-W record with exact joints that never
-# slide, moves the levels by a fifth or so. Damping of 2 % or a fill of 24 MPa bring four hinges
-# below R = 3; mesh and time step hardly matter. `archfem study meshes/prusias_sensitivity.toml
-# --out out/sensitivity` does the same under made motions.
+# The other assumptions were varied under the matched Erzincan E-W record with exact joints that
+# never slide. They move the levels by about a fifth. Damping of 2 % or a fill of 24 MPa bring four
+# hinges below R = 3; mesh and time step have little effect. `archfem study
+# meshes/prusias_sensitivity.toml --out out/sensitivity` does the same under synthetic motions.
 #
-# ![what the verdict hangs on](figures/bridge_sensitivity.png)
+# ![sensitivity of the verdict](figures/bridge_sensitivity.png)
 
 # %% [markdown]
 # ## What to try next

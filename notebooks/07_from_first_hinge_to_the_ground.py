@@ -12,7 +12,7 @@
 # # From the first hinge to the ground
 #
 # Four hinges are a mechanism, but not yet a heap of stones: an arch that rocks may close its joints
-# again. As long as displacements are small nobody can tell, since a small motion neither loses
+# again. Small displacements cannot decide this, since a small motion neither loses
 # height nor overturns. **How much is left beyond the peak, and when does the arch fall?**
 
 # %%
@@ -31,9 +31,9 @@ quick = "ARCHFEM_QUICK" in os.environ  # short paths, one step: for tests
 # %% [markdown]
 # ## The structure
 #
-# The ring of Demirel and Aldemir (2021) once more, of rigid stones, with joints that never slide. A
-# point load stands at $x = -1.4$ m; or the ground is tilted, which pushes every stone sideways by
-# a part of its weight.
+# The ring of Demirel and Aldemir (2021) once more, of rigid stones, with joints that never slide.
+# It has one of two loads: a point load at $x = -1.4$ m, or a horizontal push on every stone by a
+# part of its weight, as on tilted ground.
 
 # %%
 rough = replace(af.masonry.STONE_TO_STONE, friction=None)
@@ -53,19 +53,20 @@ ring = ring_on(rough)
 # %% [markdown]
 # ## The equation
 #
-# A joint now goes along with its stones. Let $d$ be the displacement of the middle of its higher
-# face relative to that of the lower, $n$ and $t$ the normal and the tangent, turned by the mean of
-# both stones' angles, and $\delta$ the difference of these. Opening, slip and turn are then
+# A joint now moves with its stones. Let $d$ be the displacement of the middle of its higher face
+# relative to that of the lower. The normal $n$ and the tangent $t$ are rotated by the mean of both
+# stones' angles, and $\delta$ is their difference. Opening, slip and rotation are then
 #
 # $$ g = n \cdot d, \qquad s = t \cdot d, \qquad \sigma = 2 \sin \tfrac12 \delta , $$
 #
-# exactly, whatever the angles, and what touches is what still overlaps, a length of $h - |s|$.
+# exactly, for any angles. Contact is where the faces still overlap, over a length of $h - |s|$.
 # The rest is as before: a law of compression only over that length, and equilibrium
 #
 # $$ \sum_\text{joints} B(q)^T F(g, s, \sigma) = f_\text{weight} + \lambda\, f_\text{load} . $$
 #
-# It has no convex energy any more. The curve may fall, and even turn back, so that we follow it
-# across each last step, whether load or displacement grows or not: `control="path"`.
+# It has no convex energy any more. The curve may fall, and even reverse. So each step is taken
+# along a hyperplane across the last one, which permits load and displacement to grow or not:
+# `control="path"`.
 
 # %% [markdown]
 # ## Beyond the peak
@@ -109,16 +110,16 @@ draw(found, limits)
 
 
 # %% [markdown]
-# With small displacements curves rise to the dashed lines and stay there. With large ones they turn
-# back before: as hinges form the arch changes its shape, and it carries the less the more it has
-# moved. At 118 mm it bears no push at all, and would go on by itself. Where the path folds a hinge
-# moves from one joint to the next; five springs end at the first such place, since there the
-# hinge cannot be between two springs.
+# With small displacements curves rise to the dashed lines and stay there. With large ones they
+# reverse earlier: as hinges form the arch changes its shape, and its resistance decreases with the
+# displacement. At 118 mm it resists no push at all, and would continue by itself. Where the path
+# folds, a hinge moves from one joint to the next. Five springs end at the first such place, since
+# there the hinge cannot be between two springs.
 #
-# HybriDFEM, of five springs a joint, was published with 53.55 kN at 8 mm and 0.4427 g. Our five
-# springs say the same. But those are numbers of five springs, not of this joint: exact facets have
-# a sixth less. The corner spring carries the hinge at the very edge; the true hinge is a strip that
-# is crushed, and moves inward.
+# HybriDFEM, with five springs a joint, was published with 53.55 kN at 8 mm and 0.4427 g. Our five
+# springs give the same. But those are numbers of five springs, not of this joint: exact facets have
+# a sixth less. The corner spring carries the hinge at the very edge. The true hinge is a compressed
+# strip whose resultant moves inward.
 
 
 # %%
@@ -139,8 +140,8 @@ pd.DataFrame({key: row(push) for key, push in found.items()}).T.round(3)
 # %% [markdown]
 # ## How stiff is a joint?
 #
-# That inward move hangs on the normal stiffness $k_n$, which no one knows well. The same ring with
-# joints ten and a hundred times as stiff:
+# That inward move depends on the normal stiffness $k_n$, which is not well known. The same ring
+# with joints ten and a hundred times as stiff:
 
 
 # %%
@@ -163,16 +164,16 @@ pd.DataFrame({key: row(push) for key, push in (exact | stiff).items()}).T.round(
 
 # %% [markdown]
 # The stiffer the joints, the nearer to limit analysis: under the point load the peak is 72, 86 and
-# 94 % of it. Far beyond the peak those curves run together, since there geometry alone decides;
-# sideways stiffness also decides when a hinge moves on. **Whoever gives a number for the peak
-# should give the stiffness too**, and what ten times as much would do.
+# 94 % of it. Far beyond the peak those curves coincide, since there geometry alone decides. In the
+# horizontal direction, stiffness also decides when a hinge moves to the next joint. **A stated peak
+# needs the joint stiffness beside it**, and the result for ten times as much.
 
 # %% [markdown]
-# ## Shaken
+# ## Under an earthquake
 #
-# A thinner ring, of 0.40 m, whose joints slide at 0.60, under an earthquake that we make: 8 s, with
-# a peak of 8 m/s² and then of 10. Over each step the forces do the work by which energies change,
-# to rounding (`Conserving`), so that nothing falls by an error of the scheme.
+# A thinner ring, of 0.40 m, whose joints slide at 0.60, under a synthetic earthquake of 8 s, with a
+# PGA of 8 m/s² and then of 10. Over each step the work of the forces is the change of the energies,
+# to round-off (`Conserving`), so that nothing falls by an error of the scheme.
 
 # %%
 thin = ring_on(af.masonry.STONE_TO_STONE, 0.40)
@@ -191,15 +192,15 @@ figure = Figure(figsize=(6.4, 2.8), layout="constrained")
 axes = figure.subplots()
 for scale, run in runs.items():
     axes.plot(run.time, 1e3 * run.joint("joint 13")["rotation"], lw=0.9, label=f"× {scale}")
-axes.set(xlabel="time [s]", ylabel="turn of joint 13 [mrad]")
+axes.set(xlabel="time [s]", ylabel="rotation of joint 13 [mrad]")
 axes.legend(frameon=False, fontsize=8)
 figure
 
 # %% [markdown]
-# Both make mechanisms and close them again, the weaker even after a joint has turned by 0.19 rad.
-# In the stronger it goes on. Once a joint has turned by 0.3 rad its stones count as loose, and
-# another way of reckoning takes over: rigid polygons that hit each other and slide, down to the
-# ground. `run.fall` tells what is left.
+# Both form mechanisms and close them again, the weaker even after a joint has rotated by 0.19 rad.
+# In the stronger the rotation continues. Once a joint has rotated by 0.3 rad its stones count as
+# loose, and another method takes over: rigid polygons that collide and slide, down to the ground.
+# `run.fall` describes the final state.
 
 # %%
 af.view.draw_fall(runs[1.0])
@@ -207,8 +208,8 @@ af.view.draw_fall(runs[1.0])
 # %% [markdown]
 # ## The scale at which it falls
 #
-# Mechanisms begin at much less than what brings a ring down. Falls are sensitive to everything: we
-# ask for a bracket of scales, by two time steps.
+# Mechanisms form at much lower scales than the one at which the ring falls. Falls are sensitive to
+# every input, so we compute a bracket of scales, with two time steps.
 
 # %%
 steps = (0.005,) if quick else (0.005, 0.0025)
@@ -221,11 +222,11 @@ f"it stands up to × {scale.lower:.2f} by every step, and falls from × {scale.u
 # %% [markdown]
 # ## How long, how strong?
 #
-# An earthquake is a row of pushes. Take one alone: the arch of Oppenheim (1992), of seven stones,
-# under an acceleration that is constant for some time and then gone. A long push must only exceed
-# what limit analysis says; a short one may be much stronger. We look for the boundary twice, by
-# joints that give a little and by rigid stones that hit each other: two ways of reckoning that
-# share the shape of the stones, and nothing else.
+# An earthquake is a sequence of pushes. Consider a single one: the arch of Oppenheim (1992), of
+# seven stones, under an acceleration that is constant for some time and then zero. A long push must
+# only exceed the factor of limit analysis; a short one may be much stronger. We compute the
+# boundary twice, with compliant joints and with rigid stones that collide. The two methods share
+# the shape of the stones, and nothing else.
 
 # %%
 G = 9.81
@@ -237,7 +238,8 @@ def arch_of_seven(friction):
 
 
 giving = af.build(arch_of_seven(None), fidelity="rigid", displacements="large")
-stones = af.dynamics.RigidBlockSimulation(arch_of_seven(5.0), dt=1e-3)  # so rough that nothing slides
+rough_arch = arch_of_seven(5.0)  # friction so large that nothing slides
+stones = af.dynamics.RigidBlockSimulation(rough_arch, dt=1e-3)
 
 
 def push(length, peak, every=1e-3, rest=4.0):
@@ -274,7 +276,7 @@ boundary = {
 figure = Figure(figsize=(6.4, 3.2), layout="constrained")
 axes = figure.subplots()
 axes.fill_between(lengths, boundary["joints"], 4.0, color="tab:red", alpha=0.12, lw=0.0)
-axes.plot(lengths, boundary["joints"], "o-", ms=3.0, color="tab:red", label="joints that give")
+axes.plot(lengths, boundary["joints"], "o-", ms=3.0, color="tab:red", label="compliant joints")
 axes.plot(lengths, boundary["rigid stones"], "kx", label="rigid stones")
 axes.axhline(static, color="black", ls="--", lw=1.0, label="limit analysis")
 axes.set(xscale="log", yscale="log", ylim=(0.3, 4.0), xlabel="length of the push [s]")
@@ -288,16 +290,16 @@ axes.legend(frameon=False, fontsize=8)
 figure
 
 # %% [markdown]
-# What a short push must have is speed: the boundary falls nearly as one over its length. From
-# half a second on it hardly does, and ends at what limit analysis says. Both programs agree
-# within a few percent; with stiffer joints the first comes nearer to the second.
+# The decisive quantity of a short push is its velocity: the boundary decreases nearly as one over
+# its length. From half a second on it is nearly constant, at the factor of limit analysis. Both
+# methods agree within a few percent; with stiffer joints the first approaches the second.
 
 # %% [markdown]
 # ## Islands
 #
-# More is not always worse. A block of 0.6 m by 2.4 m stands on ground that moves by one full sine.
-# The first half tilts it, the second pushes it back: a stronger sine may bring it back upright
-# where a weaker one throws it over (Zhang and Makris, 2001).
+# A stronger motion is not always worse. A block of 0.6 m by 2.4 m stands on ground that moves by
+# one full sine. The first half tilts it, the second pushes it back. A stronger sine may bring it
+# back upright where a weaker one overturns it (Zhang and Makris, 2001).
 
 # %%
 rocking = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 1e9, friction=5.0))
@@ -309,9 +311,9 @@ def overturns(ratio, peak):
     end = 2.0 * np.pi / (ratio * rate)
     steps = int(np.ceil(end / 1e-3))
     wave = np.sin(2.0 * np.pi * np.arange(steps + 1) / steps)
-    frames = free.frames(
-        af.dynamics.LooseBlocks.as_built(rocking), 8.0, af.Motion(peak * G * wave, end / steps), spacing=0.1
-    )
+    motion = af.Motion(peak * G * wave, end / steps)
+    start = af.dynamics.LooseBlocks.as_built(rocking)
+    frames = free.frames(start, 8.0, motion, spacing=0.1)
     return any(abs(frame.poses[-1, 2]) > 0.8 for frame in frames)
 
 
@@ -334,9 +336,8 @@ figure
 
 # %% [markdown]
 # Red is overturned. At three times $p$ the block falls from 0.350 g on, stands again between 0.887
-# and 0.916 g, and falls beyond. For a single record this means: that a
-# structure falls at one scale says nothing certain about a larger one. `above` of `collapse_scale`
-# names scales at which it stood again.
+# and 0.916 g, and falls beyond. A fall under a single record at one scale therefore says nothing
+# certain about a larger scale. `above` of `collapse_scale` lists larger scales at which it stood.
 
 # %% [markdown]
 # ## Check
@@ -352,6 +353,6 @@ f"five springs / HybriDFEM = {checked:.4f}"
 # ## What to try next
 #
 # - `archfem run meshes/ring_falls.toml --out out/ring_falls`: the fall as a film.
-# - `fidelity="faces"`: stones give as well. Does the peak change? By how much, at a tenth of E?
+# - `fidelity="faces"`: stones deform as well. Does the peak change? By how much, at a tenth of E?
 # - `collapse_scale` with a stiffness ten times as large: is the bracket the same?
-# - `af.dynamics.Falling(thin, restitution=0.3)`: stones that bounce.
+# - `af.dynamics.RigidBlockSimulation(thin, restitution=0.3)`: stones that bounce.

@@ -11,8 +11,9 @@
 # %% [markdown]
 # # From one record to a fragility curve
 #
-# One record shakes a ring, and four joints fail, or they do not. Another record as strong may do
-# the opposite. **How likely is it that an earthquake of some strength makes a mechanism?**
+# Under one record four joints of a ring fail, or they do not. Another record of equal strength may
+# have the opposite result. **What is the probability that an earthquake of some strength forms a
+# mechanism?**
 
 # %%
 # %matplotlib inline
@@ -48,7 +49,7 @@ motions = {
 # %% [markdown]
 # ## One record
 #
-# Made motions stand in for records: under `[motion]` a case may as well name a file.
+# Synthetic motions replace records: under `[motion]` a case may as well name a file.
 
 # %%
 alone = af.Case.of({**case.settings, "motion": motions["motion 1"]})
@@ -59,14 +60,13 @@ f"|e| up to {found['eccentricity']:.3f}; four joints failed at {found['any four 
 # %% [markdown]
 # ## The equation
 #
-# Each motion is scaled up until a limit state is met: the hunt goes up by √2, then brackets are
-# halved. If the intensities $x_i$ at which motions meet it are lognormal, the probability that a
-# motion of intensity $x$ does is
+# Each motion is scaled up until a limit state is met: the search goes up by √2, then brackets are
+# bisected. If the intensities $x_i$ at which motions meet it are lognormal, the probability for a
+# motion of intensity $x$ is
 #
 # $$ P(x) = \Phi\!\left( \frac{\ln (x / \theta)}{\beta} \right) , $$
 #
-# and the median $\theta$ and the dispersion $\beta$ are those under which the brackets that were
-# found are the most likely.
+# The median $\theta$ and the dispersion $\beta$ maximise the likelihood of the brackets found.
 
 # %%
 settings = {"precision": 0.5, "between": (0.3, 5.0), "workers": 1} if quick else {"precision": 0.1}
@@ -76,8 +76,8 @@ ida.table[["pga", "first hinge", "four failures", "verified"]].to_dataframe()
 # %% [markdown]
 # ## Curves
 #
-# Grey are the motions as they are. A curve may turn back: a stronger motion may find the ring at a
-# luckier moment. Triangles are motions that did not meet a limit state as far as they were scaled.
+# The single motions are grey. A curve may reverse: a stronger motion may meet the ring at a more
+# favourable instant. Triangles are motions that did not meet a limit state at the scales tried.
 
 # %%
 capacities = {limit: ida.capacities(limit) for limit in ida.limits}
@@ -85,10 +85,10 @@ intensity = np.linspace(0.1, 1.5 * capacities["four failures"][1].max(), 60)
 af.view.draw_ida(ida.curves(), capacities, fractiles=(intensity, ida.fractiles(intensity)))
 
 # %% [markdown]
-# ## The fragility curve, and how sure it is
+# ## The fragility curve, and its uncertainty
 #
-# The band is the bootstrap's, at 90 %: what so few motions leave open. What is not known of the
-# stiffness of joints widens the curve as well; `af.joint_stiffness` says by how much it may differ.
+# The band is the bootstrap's, at 90 %: the uncertainty due to so few motions. The uncertain
+# stiffness of joints widens the curve as well; `af.joint_stiffness` gives its range.
 
 # %%
 curves = {limit: ida.fragility(limit) for limit in ("first hinge", "four failures")}
@@ -107,8 +107,8 @@ print(af.joint_stiffness(30e9, 0.5, "weathered", stress=40e3).table())
 # %% [markdown]
 # ## Check
 #
-# Brackets are narrow beside the spread of motions, so that the median must be the geometric mean
-# of their middles.
+# Brackets are narrow relative to the spread of motions, so that the median must be the geometric
+# mean of their middles.
 
 # %%
 lower, upper = ida.capacities("first hinge")
@@ -118,7 +118,8 @@ f"median / geometric mean = {checked:.4f}"
 # %% [markdown]
 # ## What to try next
 #
-# - `ida.fragility("four failures", "sa")`: does Sa(T1) tell more than PGA, that is, is β smaller?
-# - `folder="out/ida"`: end it, and call it again; it goes on where it was.
+# - `ida.fragility("four failures", "sa")`: is Sa(T1) a better predictor than PGA, that is, is β
+#   smaller?
+# - `folder="out/ida"`: interrupt it, and call it again; it continues from the saved results.
 # - `client="tcp://…"`: the same on a cluster.
 # - `model.displacements = "large"`: collapse is then a limit state too.

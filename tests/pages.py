@@ -2,7 +2,11 @@
 
 import json
 import re
+import zlib
+from base64 import b64decode
 from html.parser import HTMLParser
+
+import numpy as np
 
 VOID = {"br", "hr", "img", "input", "link", "meta", "path", "circle", "rect", "col"}
 """Elements without a closing tag, and those of SVG that close themselves."""
@@ -48,4 +52,18 @@ def read_page(page):
     style = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
     assert not any(word in each for each in style for word in ("url(", "@import"))
     assert len(found.ids) == len(set(found.ids))
+    return found
+
+
+def unpack(head, text):
+    """Arrays of a pack by name, as a page reads them."""
+    raw = np.frombuffer(zlib.decompress(b64decode(text)), np.uint8)
+    found, start = {}, 0
+    for each in head:
+        count = int(np.prod(each["shape"]))
+        planes = raw[start : start + 4 * count].reshape(4, count)
+        folded = np.ascontiguousarray(planes.T).view("<u4").reshape(each["shape"]).astype(np.int64)
+        whole = np.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
+        found[each["name"]] = np.where(whole == -(2**29), np.nan, whole * each["quantum"])
+        start += 4 * count
     return found

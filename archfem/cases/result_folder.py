@@ -22,13 +22,13 @@ from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_collapse, draw_fall
-from archfem.view.histories import draw_envelope, draw_joints, telling_joints
+from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
 from archfem.view.stress import draw_stress
 from archfem.view.structure import draw_during, draw_names
 from archfem.view.studies import draw_accuracy
-from archfem.view.style import LINES, save
+from archfem.view.style import LINE_COLOURS, save
 
 CASE_FILE = "case.toml"
 # The summary of a run is written last: if it exists, all other files of the run do.
@@ -161,7 +161,7 @@ def write_run(run: Run, at_rest: DeadLoadResult, text: str, folder: Path) -> lis
         "critical_instant.png": draw_during(dead.model, history, _critical_instant(history)),
         "envelope.png": draw_envelope({case.title: history}, dead=dead.joints),
         # The joints of the case, or else those of the largest |e| and of the longest sliding.
-        "joints.png": draw_joints(history, case.joints or telling_joints(history)),
+        "joints.png": draw_joints(history, case.joints or most_stressed_joints(history)),
     }
     if "fall_pose" in history.dataset:
         figures["fall.png"] = draw_fall(history)
@@ -204,7 +204,10 @@ def write_pairs(
     runs: Mapping[str, History], at_rest: DeadLoadResult, text: str, folder: Path
 ) -> list[Path]:
     """Write the table of a suite, and draw the envelopes of its runs."""
-    pairs, per_figure = list(runs.items()), len(LINES)  # as many runs as there are line styles
+    pairs, per_figure = (
+        list(runs.items()),
+        len(LINE_COLOURS),
+    )  # as many runs as there are line styles
     files = [_write_text(text, folder / "suite.txt")]
     for number, first in enumerate(range(0, len(pairs), per_figure), start=1):
         figure = draw_envelope(dict(pairs[first : first + per_figure]), dead=at_rest.dead.joints)

@@ -7,6 +7,7 @@ from itertools import pairwise
 from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_fields, check_unmasked
@@ -36,6 +37,18 @@ def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     reach = float(radii[1] ** 3 - radii[0] ** 3) / 3.0 * 2.0 * np.sin(angle / 2.0) / area
     about_centre = 0.25 * float(radii[1] ** 4 - radii[0] ** 4) * angle
     return area, centre + reach * bisector, about_centre - area * reach**2
+
+
+def triangulate_polygon(points: Array) -> NDArray[np.intp]:
+    """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3)."""
+    import shapely
+
+    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(points))
+    # a ring of a triangle repeats its first vertex
+    rings = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)
+    # the coordinates are copies: the nearest vertex gives the number
+    distance = np.linalg.norm(rings[:, :3, None] - points, axis=-1)
+    return distance.argmin(axis=-1)
 
 
 def intersect_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[float]:

@@ -21,7 +21,7 @@ from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import rigid_motion_matrix
 from archfem.masonry.survey.drawings import write_dxf
-from archfem.models.model import Model
+from archfem.models.model import Model, check_coordinate_count
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +64,7 @@ class Solids:
 
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (m, 2) [m]."""
-        if len(q) != self.model.size:
-            raise InvalidInput(
-                f"there are {len(q)} coordinates, and the model has {self.model.size}: give the "
-                "model, of the same cells and degree, that they were computed with"
-            )
+        check_coordinate_count(self.model, len(q))
         centroids = [block.centroid for block in self.model.structure.blocks]
         fixed = [
             rigid_motion_matrix(points, centroids[number]) @ self.model.support_motion[number]

@@ -455,3 +455,12 @@ def check_model(model: object) -> None:
         raise InvalidInput(
             f"model is a {type(model).__name__}: build one, e.g. build(structure, fidelity='rigid')"
         )
+
+
+def check_coordinate_count(model: Model, count: int) -> None:
+    """Refuse as many coordinates as another model has."""
+    if count != model.size:
+        raise InvalidInput(
+            f"there are {count} coordinates, and the model has {model.size}: give the model, of "
+            "the same cells and degree, that they were computed with"
+        )

@@ -1,17 +1,18 @@
 """Figures and films of structures and of results.
 
-    collapse     limit analysis and falls
-    films        films, still pictures and a viewer of moving structures
+    collapse     limit analysis, falls
+    films        films, pictures and a viewer of moving structures
     histories    joints over time, envelopes
-    joint_marks  hinges, thrust line, slips at an instant
+    joint_marks  thrust line, hinges, sliding and open joints at an instant
     motions      accelerograms and spectra
     pages        HTML pages: the player of a run, and documents that embed it
-    positions    positions of blocks and joint ends over a run
-    statics      dead load, stress, modes, free body, pushover
+    positions    positions of blocks over a run
+    statics      dead load, mode shapes, free body, pushover
     stress       stress map
-    structure    a structure, its names, loads, displaced shape
-    studies      study factors, IDA, fragility, tornado, convergence, accuracy
-    style        one look for all figures
+    structure    structures, joint names, loads, displaced shapes
+    studies      studies, IDA, fragility, sensitivity, convergence, accuracy
+    style        common style of all figures
+    triangles    triangulation of cells
 
 Imports all rooms before it. Start reading at `structure`, then at `style`.
 """

@@ -1,16 +1,16 @@
-"""Pictures of limit analysis: thrust line and mechanism in one, and the capacity of rings.
+"""Figures of limit analysis and of collapse.
 
-The picture of a fall: where the blocks are, from the joint that lets go to the ground.
+Thrust line and mechanism of a limit analysis, capacity map of rings, and instants of a fall.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
@@ -18,63 +18,65 @@ from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.structure import Structure, rigid_motion_matrix
-from archfem.view.joint_marks import displaced, swung
+from archfem.view.joint_marks import outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
-from archfem.view.structure import draw_loads, draw_structure
+from archfem.view.structure import block_colours, draw_loads, draw_structure
 from archfem.view.style import (
-    COLUMN,
-    EDGE,
-    GHOST,
-    HINGE,
-    INK,
-    LIGHT_TO_DARK,
-    MOVED,
-    NORMAL,
-    SLIP,
-    SMALL,
-    STONE,
-    SUPPORT,
-    THRUST,
-    Page,
-    canvas,
-    dress,
-    entitle,
-    legend,
+    COLOUR_MAP,
+    COLUMN_WIDTH,
+    TITLE_SIZE,
+    Colour,
+    add_legend,
+    add_polygons,
+    annotate,
+    new_figure,
+    set_title,
+    structure_figure,
+    style_axes,
+    style_colour_bar,
+    white_halo,
 )
-
-# Horizontal accelerations between which the map of capacity changes its colour [g]
-LEVELS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]
 
 
 def draw_collapse(structure: Structure, found: Collapse) -> Figure:
-    """Draw the thrust line in the structure as it stands, over the mechanism that it becomes.
+    """Draw the thrust line in the undeformed structure, and the collapse mechanism over it.
 
     Args:
-        structure: as it stands.
-        found: what limit analysis found for it.
+        structure: undeformed.
+        found: result of its limit analysis.
 
     Returns:
-        The page; what was found is its title.
+        The figure; its title gives the outcome and the collapse factor.
     """
     figure = draw_structure(structure)
     axes = figure.axes[0]
     if found.motion.any():
-        motion = swung(structure, found.motion)
-        _draw_motion(axes, structure, motion)
+        motion = scale_motion(structure, found.motion)
+        style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism"}
+        outlines = outline_moving_blocks(structure, motion)
+        add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
+        axes.autoscale_view()
         _mark_hinges(axes, structure, found, motion)
-        _mark_sliding(axes, structure, found)
-    _draw_thrust(axes, structure, found.joints)
-    draw_loads(axes, structure, found.live, of=_multiple(found))
-    entitle(axes, f"{structure.name}: {_caption(found)}")
-    legend(axes)
+        if found.sliding:
+            ends = structure.ends[list(found.sliding)]
+            style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
+            axes.add_collection(LineCollection(ends, label="sliding joint", **style))
+    line = thrust_line(structure, found.joints).values
+    if np.isfinite(line).any():
+        style = {"color": Colour.THRUST, "lw": 1.5, "marker": ".", "ms": 3, "zorder": 4}
+        axes.plot(*line.T, label="thrust line", **style)
+    factor = f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
+    draw_loads(axes, structure, found.live, factor=factor)
+    set_title(axes, f"{structure.name}: {_outcome_text(found)}")
+    add_legend(axes)
     return figure
 
 
-def draw_found(found: Collapse) -> Figure:
-    """Draw what was found for the structure that it knows, as by `draw_collapse`."""
+def draw_collapse_result(found: Collapse) -> Figure:
+    """Draw a limit analysis over the structure that the result contains."""
     if found.structure is None:
         raise InvalidInput(
-            "this result does not know its structure: use draw_collapse(structure, …)"
+            "this result does not contain its structure: use draw_collapse(structure, …)"
         )
     return draw_collapse(found.structure, found)
 
@@ -84,165 +86,120 @@ def draw_capacity(
     thinnest: Mapping[float, float],
     known: Mapping[tuple[float, float], float],
 ) -> Figure:
-    """Draw what rings withstand over embrace and thickness, with known values on it.
+    """Map the horizontal acceleration at collapse of rings over embrace and thickness.
 
     Args:
         capacity: horizontal acceleration at collapse over embrace [degrees] and ratio, t/R [g];
             undefined (NaN) where a ring does not stand.
-        thinnest: least t/R under self-weight over embrace [degrees], the edge of the map.
-        known: accelerations over (embrace [degrees], t/R) that are known from elsewhere [g]; zero
-            at the least t/R.
+        thinnest: least t/R under self-weight over embrace [degrees], the lower limit of the map.
+        known: reference values of the acceleration over (embrace [degrees], t/R) [g]; zero at the
+            least t/R.
 
     Returns:
-        The page, with a bar of colours beside the map.
+        The figure, with a colour bar beside the map.
     """
-    figure = Page(figsize=(COLUMN, 4.4), layout="constrained")
+    figure = new_figure(COLUMN_WIDTH, 4.4)
     axes = figure.add_subplot()
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
-    # height of the map where no acceleration overturns a ring [g]
+    # rings that no acceleration overturns are drawn in the colour of the largest values
     values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=1e3)
-    filled = axes.contourf(embraces, ratios, values, LEVELS, cmap=LIGHT_TO_DARK, extend="max")
-    axes.contour(embraces, ratios, values, LEVELS[1:], colors="white", linewidths=0.5)
+    levels = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0]  # [g]
+    filled = axes.contourf(embraces, ratios, values, levels, cmap=COLOUR_MAP, extend="max")
+    axes.contour(embraces, ratios, values, levels[1:], colors="white", linewidths=0.5)
     edge = np.array(sorted(thinnest.items()))
     axes.fill_between(edge[:, 0], 0.0, edge[:, 1], color="white", zorder=2)
-    axes.plot(*edge.T, color=INK, lw=1.6, zorder=3, label="thinnest that stands")
-    _mark_known(axes, known)
-    dress(axes, "embrace [°]", "thickness / radius, t/R [-]")
-    axes.set_xlim(embraces[0], embraces[-1])
-    axes.set_ylim(0.0, ratios[-1])
-    legend(axes)
-    bar = figure.colorbar(filled)
-    bar.set_label("horizontal acceleration at collapse [g]", fontsize=SMALL)
-    bar.ax.tick_params(labelsize=SMALL, color=EDGE)
+    axes.plot(*edge.T, color=Colour.TEXT, lw=1.6, zorder=3, label="least thickness")
+    _mark_reference_values(axes, known)
+    style_axes(axes, "embrace [°]", "thickness / radius, t/R [-]")
+    axes.set(xlim=(embraces[0], embraces[-1]), ylim=(0.0, ratios[-1]))
+    add_legend(axes)
+    style_colour_bar(figure.colorbar(filled), "horizontal acceleration at collapse [g]")
     return figure
 
 
-def _draw_motion(axes: Axes, structure: Structure, motion: Array) -> None:
-    """Draw the blocks that move where a motion (n_blocks, 3) takes them."""
-    moved = PolyCollection(
-        displaced(structure, motion),
-        facecolors=f"{MOVED}30",
-        edgecolors=MOVED,
-        linewidths=0.8,
-        zorder=2,
-    )
-    moved.set_label("mechanism")
-    axes.add_collection(moved)
-    axes.autoscale_view()
-
-
 def _mark_hinges(axes: Axes, structure: Structure, found: Collapse, motion: Array) -> None:
-    """Mark each hinge on the face where its blocks stay in contact, as moved."""
+    """Mark each hinge at the face where its blocks stay in contact, displaced."""
     points = []
     for number, side in found.hinges:
         joint = structure.joints[number]
         end = joint.ends[0 if side == "intrados" else 1]
-        carrier = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
-        points.append(end + carrier @ motion[joint.lower])
+        matrix = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
+        points.append(end + matrix @ motion[joint.lower])
     if points:
-        x, y = np.array(points).T
-        axes.plot(x, y, "o", mfc=HINGE, mec="white", mew=0.8, ms=7.5, zorder=6, label="hinge")
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "ms": 7.5, "zorder": 6}
+        axes.plot(*np.array(points).T, "o", label="hinge", **style)
 
 
-def _mark_sliding(axes: Axes, structure: Structure, found: Collapse) -> None:
-    """Draw sliding joints as heavy lines, where they were."""
-    for count, number in enumerate(found.sliding):
-        label = "_" if count else "sliding joint"
-        axes.plot(*structure.joints[number].ends.T, color=SLIP, lw=2.4, zorder=4, label=label)
-
-
-def _draw_thrust(axes: Axes, structure: Structure, joints: xr.Dataset) -> None:
-    """Draw the line through the points where the thrust crosses the joints."""
-    line = thrust_line(structure, joints).values
-    if np.isfinite(line).any():
-        axes.plot(*line.T, color=THRUST, lw=1.5, marker=".", ms=3, zorder=4, label="thrust line")
-
-
-def _caption(found: Collapse) -> str:
-    """Outcome, and the factor where there is one."""
+def _outcome_text(found: Collapse) -> str:
+    """Return the outcome, with the collapse factor if there is one."""
     sentence = found.outcome.sentence
     if found.outcome in (Outcome.COLLAPSES, Outcome.BRACKETED):
         sentence += f" at a factor of {found.factor:.4g}"
     return sentence
 
 
-def _multiple(found: Collapse) -> str:
-    """What the live load is multiplied by, in words."""
-    return f"{found.factor:.3g} ×" if np.isfinite(found.factor) else ""
-
-
-def _mark_known(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
-    """Put known values on the map of capacity."""
+def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
+    """Mark reference values on the capacity map."""
     thin = [point for point, factor in known.items() if factor == 0.0]
     strong = [point for point, factor in known.items() if factor > 0.0]
-    for points, label, mark in (
-        (thin, "known thinnest", {"marker": "D", "mfc": "white", "mec": INK, "ms": 6}),
-        (strong, "known factor", {"marker": "o", "mfc": HINGE, "mec": "white", "ms": 7}),
+    style: dict[str, Any] = {"ms": 6.5, "zorder": 5, "clip_on": False}
+    for points, label, marker, face, edge in (
+        (thin, "reference thickness", "D", "white", Colour.TEXT),
+        (strong, "reference acceleration", "o", Colour.HINGE, "white"),
     ):
         if points:
-            axes.plot(*np.array(points).T, ls="", zorder=5, clip_on=False, label=label, **mark)
+            axes.plot(*np.array(points).T, marker, mfc=face, mec=edge, label=label, **style)
     for point, factor in known.items():
         text = f"{factor:.3f}".rstrip("0") if factor else f"{point[1]:.4g}"
-        note = axes.annotate(
-            text, point, (-8, 3), textcoords="offset points", fontsize=SMALL, ha="right", zorder=6
-        )
-        note.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
-
-
-# Of the way down, by the mean of all blocks, at which they are drawn
-SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+        annotate(axes, text, point, (-8, 3), ha="right", zorder=6, path_effects=white_halo(2.0))
 
 
 def draw_fall(run: History) -> Figure:
-    """Draw the blocks of a structure at four instants of its fall, over where they stood.
+    """Draw the blocks at four instants of a collapse, over their original positions.
 
     Args:
-        run: in which blocks came loose, and which knows its structure.
+        run: a history with its structure and with loose blocks.
 
     Returns:
-        The page, a panel for each instant.
+        The figure, with a panel for each instant.
 
     Raises:
-        InvalidInput: the run does not know its structure, or nothing came loose.
+        InvalidInput: the run contains no structure, or no block came loose.
     """
     falls = None if run.structure is None else FallingBlocks.of(run.structure, run)
     if falls is None:
         raise InvalidInput(
             "there is no fall to draw: no block came loose, displacements were taken as small, or "
-            "the run does not know its structure; read it with History.read(path, structure)"
+            "the run has no structure; read it with History.read(path, structure)"
         )
-    wide, high = canvas(falls.structure).get_size_inches()
-    figure = Page(figsize=(1.5 * wide, 1.35 * high), layout="constrained")
+    wide, high = structure_figure(falls.structure).get_size_inches()
+    figure = new_figure(1.5 * wide, 1.35 * high)
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    for axes, time in zip(panels, _instants(falls), strict=True):
-        _panel(axes, falls, time)
+    for axes, time in zip(panels, _select_instants(falls), strict=True):
+        _draw_instant(axes, falls, time)
     return figure
 
 
-def _instants(falls: FallingBlocks) -> list[float]:
-    """Times of the instants that are drawn [s]."""
-    sunk = -falls.poses[:, list(falls.structure.free), 1].mean(axis=1)
-    way = np.maximum.accumulate(sunk - sunk[0])
-    first = [int(np.argmax(way >= share * way[-1])) for share in SHARES[:-1]]
-    return [float(falls.times[k]) for k in (*first, -1)]
+def _select_instants(
+    falls: FallingBlocks, shares: Sequence[float] = (0.0, 1.0 / 3.0, 2.0 / 3.0)
+) -> list[float]:
+    """Return the times [s] at which the blocks' mean descent reaches its shares, and the end."""
+    descent = -falls.poses[:, list(falls.structure.free), 1].mean(axis=1)
+    # blocks may bounce: only the progress counts
+    progress = np.maximum.accumulate(descent - descent[0])
+    frames = [int(np.argmax(progress >= share * progress[-1])) for share in shares]
+    return [float(falls.times[k]) for k in (*frames, -1)]
 
 
-def _panel(axes: Axes, falls: FallingBlocks, time: float) -> None:
-    """Draw one instant."""
-    blocks = falls.structure.blocks
-    dress(axes, "x [m]", "y [m]")
+def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
+    """Draw the loose blocks and the ground at one instant."""
+    structure = falls.structure
+    style_axes(axes, "x [m]", "y [m]")
     axes.set_aspect("equal")
-    axes.axhline(falls.level, color=EDGE, lw=1.2, zorder=0)
-    built = [block.drawn() for block in blocks]
-    axes.add_collection(
-        PolyCollection(built, facecolors="none", edgecolors=GHOST, linewidths=0.6, zorder=1)
-    )
-    faces = [SUPPORT if block.fixed else STONE for block in blocks]
-    moved = PolyCollection(
-        falls.outlines(time), facecolors=faces, edgecolors=EDGE, linewidths=0.7, zorder=2
-    )
-    moved.set_gid("blocks")
-    axes.add_collection(moved)
-    axes.set_title(f"t = {time:.2f} s", fontsize=NORMAL, color=INK)
+    axes.axhline(falls.level, color=Colour.EDGE, lw=1.2, zorder=0)
+    built = [block.drawn() for block in structure.blocks]
+    add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
+    add_polygons(axes, falls.outlines(time), block_colours(structure), zorder=2, gid="blocks")
+    axes.set_title(f"t = {time:.2f} s", fontsize=TITLE_SIZE, color=Colour.TEXT)
     axes.autoscale_view()
     axes.label_outer()

@@ -1,6 +1,7 @@
-"""Joints over time: several of one run, or one of several runs.
+"""Figures of joints over time, and of eccentricities joint by joint.
 
-Eccentricity of the joints, part by part: its envelope over runs, or its value at one instant.
+Time histories of several joints of a run or of one joint in several runs; the envelope of the
+eccentricities over runs, and the eccentricities at one instant.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from archfem._typing import Array
@@ -28,31 +29,18 @@ from archfem.joints.criteria import (
 from archfem.masonry.structure import Structure
 from archfem.view.structure import short_name
 from archfem.view.style import (
-    COLUMN,
-    EDGE,
-    FAINT,
-    HINGE,
-    INK,
-    LINES,
-    SLIP,
-    SMALL,
-    WIDE,
-    Page,
-    dress,
-    entitle,
-    legend,
+    COLUMN_WIDTH,
+    LABEL_SIZE,
+    LINE_COLOURS,
+    PAGE_WIDTH,
+    Colour,
+    add_legend,
+    add_legend_below,
+    annotate,
+    new_figure,
+    set_title,
+    style_axes,
 )
-
-# Joints that fit side by side in a wide picture, and those for which a panel has room at least
-ROOM = 8
-
-LABEL = "eccentricity e = M / (N h) [-]"
-
-# Of the band between the least and the largest eccentricity of one run alone
-SHADE = 0.15
-
-# Distance of the crosses of one run from those of the next, above the upper face
-STEP = 0.05
 
 
 def draw_envelope(
@@ -62,81 +50,84 @@ def draw_envelope(
     dotted: Collection[str] = (),
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the least and largest eccentricity of each joint over runs, against the faces.
+    """Draw the least and largest eccentricity of each joint over runs, between the joint's faces.
 
-    Each ring and pier has a panel of its own, with short names of its joints below. Crosses above
-    the upper face mark joints that came apart at some time. Where runs have different criteria, the
+    Each ring and pier has its own panel, with short names of its joints at the axis. Crosses above
+    the upper face mark joints that opened at some time. Where runs have different criteria, the
     least |e| of a hinge is shown.
 
     Args:
-        runs: what to call each run, and the run; those of different structures share the panels
-            of parts of one name.
+        runs: the label of each run, and the run; runs of different structures share the panels
+            of parts of the same name.
         dead: joints under dead load, drawn dotted.
-        dotted: names of the runs that are drawn dotted and not filled.
-        axes: where to draw, for a single ring or pier; by default a new figure.
+        dotted: labels of the runs that are drawn dotted, without shading.
+        axes: matplotlib axes, for a single ring or pier; by default those of a new figure.
 
     Returns:
-        The page, with a panel for each ring and pier; that of `axes` where given.
+        The figure, with a panel for each ring and pier; that of `axes` if given.
 
     Raises:
-        InvalidInput: there is no run, or too many to tell apart; axes were given for several
+        InvalidInput: there is no run, or more than there are colours; axes were given for several
             parts.
     """
-    drawn = {label: run.joints for label, run in runs.items()}
-    shown, apart = _panels(drawn, axes), 0
-    for row, ((label, joints), colour) in enumerate(zip(drawn.items(), LINES, strict=False)):
-        for part, panel in shown.items():
-            own = _of_part(joints, part)
-            draw_band(panel, own, label, colour, shade=SHADE * (label not in dotted) / len(runs))
+    joints_of_runs = {label: run.joints for label, run in runs.items()}
+    panels, openings = _make_panels(joints_of_runs, axes), 0
+    row_height = 0.05  # of the crosses of a run, in units of e
+    for row, ((label, joints), colour) in enumerate(
+        zip(joints_of_runs.items(), LINE_COLOURS, strict=False)
+    ):
+        # shades of several runs add up where they overlap
+        shade = 0.0 if label in dotted else 0.15 / len(runs)
+        for part, panel in panels.items():
+            own = _joints_of_part(joints, part)
+            _draw_band(panel, own, label, colour, shade=shade)
             crosses = np.flatnonzero(own["open"].any("time").values)
-            height = np.full(len(crosses), 0.56 + STEP * row)
+            height = np.full(len(crosses), 0.56 + row_height * row)
             panel.plot(crosses, height, "x", ms=4, color=colour)
-            apart += len(crosses)
-    first = next(iter(shown.values()))
-    if apart:
-        first.plot([], [], "x", ms=4, color=FAINT, label="came apart")
+            openings += len(crosses)
+    first = next(iter(panels.values()))
+    if openings:
+        first.plot([], [], "x", ms=4, color=Colour.GREY, label="opened")
     if dead is not None:
-        for part, panel in shown.items():
-            at_rest = _of_part(dead, part)["eccentricity"]
-            panel.plot(at_rest.values, ":", color=INK, lw=1.4, label="dead load")
-    first.set_ylim(-0.56, 0.56 + (STEP * len(runs) if apart else 0.0))
-    return _explained(shown)
+        for part, panel in panels.items():
+            e = _joints_of_part(dead, part)["eccentricity"]
+            panel.plot(e.values, ":", color=Colour.TEXT, lw=1.4, label="dead load")
+    first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
+    return _finish_panels(panels)
 
 
 def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[str] = ()) -> Figure:
     """Draw the eccentricity of each joint at one instant of each of several structures.
 
-    Each ring and pier has a panel of its own, as by `draw_envelope`.
+    Each ring and pier has its own panel, as in `draw_envelope`.
 
     Args:
-        states: what to call each state, and its joints at one instant, for example dead load.
-        dotted: names of the states that are drawn dotted.
+        states: the label of each state, and its joints at one instant, for example dead load.
+        dotted: labels of the states that are drawn dotted.
 
     Returns:
-        The page, with a panel for each ring and pier.
+        The figure, with a panel for each ring and pier.
 
     Raises:
-        InvalidInput: there is no state, or too many to tell apart, or one has several instants.
+        InvalidInput: there is no state, or more than there are colours, or one has several
+            instants.
     """
     several = [label for label, joints in states.items() if joints["N"].dims != ("joint",)]
     if several:
         raise InvalidInput(f"{several} have several instants: give one, e.g. joints.isel(time=-1)")
-    shown = _panels(states, None)
-    for (label, joints), colour in zip(states.items(), LINES, strict=False):
-        line = ":" if label in dotted else "-"
+    panels = _make_panels(states, None)
+    for (label, joints), colour in zip(states.items(), LINE_COLOURS, strict=False):
         style: dict[str, Any] = {"color": colour, "lw": 1.4, "marker": "o", "ms": 2.8}
-        for part, panel in shown.items():
-            values = _of_part(joints, part)["eccentricity"].values
-            panel.plot(values, ls=line, label=label, **style)
-    first = next(iter(shown.values()))
-    first.set_ylim(-0.56, 0.56)
-    return _explained(shown)
+        style["ls"] = ":" if label in dotted else "-"
+        for part, panel in panels.items():
+            e = _joints_of_part(joints, part)["eccentricity"]
+            panel.plot(e.values, label=label, **style)
+    next(iter(panels.values())).set_ylim(-0.56, 0.56)
+    return _finish_panels(panels)
 
 
-def draw_band(
-    axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float = SHADE
-) -> None:
-    """Draw the least and the largest eccentricity of joints, one after another from 0."""
+def _draw_band(axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float) -> None:
+    """Draw the least and the largest eccentricity of joints; dotted where there is no shade."""
     span, number = envelope(joints), np.arange(joints.sizes["joint"])
     style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
     if shade > 0.0:
@@ -147,269 +138,247 @@ def draw_band(
     axes.plot(number, span["lowest"], **style)
 
 
-def draw_faces(axes: Axes, hinge: float) -> None:
-    """Draw the faces of the joints, and where a joint counts as hinged."""
+def _draw_faces(axes: Axes, hinge: float) -> None:
+    """Draw the faces of a joint at e = ±1/2, and the least |e| of a hinge."""
     for side in (-1.0, 1.0):
-        axes.axhspan(side * hinge, side * 0.5, color=HINGE, alpha=0.12, lw=0)
-        axes.axhline(side * 0.5, color=EDGE, lw=1.2)
-        axes.axhline(side * hinge, color=HINGE, lw=0.7, ls="--")
-    axes.axhline(0.0, color=FAINT, lw=0.5)
+        axes.axhspan(side * hinge, side * 0.5, color=Colour.HINGE, alpha=0.12, lw=0)
+        axes.axhline(side * 0.5, color=Colour.EDGE, lw=1.2)
+        axes.axhline(side * hinge, color=Colour.HINGE, lw=0.7, ls="--")
+    axes.axhline(0.0, color=Colour.GREY, lw=0.5)
 
 
-def _of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
-    """The joints of one part."""
+def _joints_of_part(joints: xr.Dataset, part: str) -> xr.Dataset:
+    """Return the joints of one part."""
     return joints.isel(joint=np.flatnonzero(joints["part"].values.astype(str) == part))
 
 
-def _panels(drawn: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:
-    """A panel for each ring and pier, the rings first, with the faces of its joints."""
-    if not 1 <= len(drawn) <= len(LINES):
-        raise InvalidInput(f"{len(drawn)} runs in one picture: give 1 to {len(LINES)}")
+def _make_panels(states: Mapping[str, xr.Dataset], axes: Axes | None) -> dict[str, Axes]:
+    """Return a panel for each ring and pier, the rings first, with the faces of its joints."""
+    if not 1 <= len(states) <= len(LINE_COLOURS):
+        raise InvalidInput(f"{len(states)} runs in one picture: give 1 to {len(LINE_COLOURS)}")
     names: dict[str, list[str]] = {}
     roles: dict[str, str] = {}
-    for joints in drawn.values():
-        own = assessed_joints(joints)
-        roles |= part_roles(own)
-        for part in part_roles(own):
-            found = _of_part(own, part)["name"].values.astype(str).tolist()
-            names[part] = max(names.get(part, []), found, key=len)
-    sizes = {part: len(own) for part, own in names.items()}
-    parts = sorted(sizes, key=lambda part: roles[part] != "ring")
-    if axes is None:
-        shown = _page({part: sizes[part] for part in parts})
-    elif len(parts) == 1:
-        shown = {parts[0]: axes}
-        axes.set_ylabel(LABEL)
-    else:
+    for joints in states.values():
+        assessed = assessed_joints(joints)
+        roles |= part_roles(assessed)
+        for part in part_roles(assessed):
+            own = _joints_of_part(assessed, part)["name"].values.astype(str).tolist()
+            names[part] = max(names.get(part, []), own, key=len)
+    parts = sorted(names, key=lambda part: roles[part] != "ring")
+    if axes is not None and len(parts) > 1:
         raise InvalidInput(f"parts {parts} do not fit one pair of axes: leave axes out")
-    hinge = min(Criteria.of(joints).hinge for joints in drawn.values())
-    for part, panel in shown.items():
-        dress(panel, "joint [-]", panel.get_ylabel())
-        draw_faces(panel, hinge)
-        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-        panel.xaxis.set_major_formatter(_named([short_name(each, part) for each in names[part]]))
+    sizes = {part: len(names[part]) for part in parts}
+    panels = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
+    hinge = min(Criteria.of(joints).hinge for joints in states.values())
+    for part, panel in panels.items():
+        first = axes is not None or panel.get_subplotspec().is_first_col()
+        style_axes(panel, "joint [-]", "eccentricity e = M / (N h) [-]" if first else "")
+        _draw_faces(panel, hinge)
+        _label_joints(panel, [short_name(name, part) for name in names[part]])
         if len(parts) > 1:
-            entitle(panel, part)
+            set_title(panel, part)
             panel.set_xlim(-0.7, sizes[part] - 0.3)
-    return shown
+    return panels
 
 
-def _named(names: Sequence[str]) -> FuncFormatter:
-    """Write names at whole numbers, and nothing beyond them."""
-
-    def name(place: float, _: object) -> str:
-        number = round(place)
-        return names[number] if 0 <= number < len(names) else ""
-
-    return FuncFormatter(name)
+def _label_joints(axes: Axes, names: Sequence[str]) -> None:
+    """Write the names of joints at 0, 1, …, as far as there is room."""
+    labels = dict(enumerate(names))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place), ""))
 
 
-def _page(sizes: Mapping[str, int]) -> dict[str, Axes]:
-    """Empty panels on one page, as wide as their parts have joints, in as many rows as needed."""
+def _lay_out_panels(
+    sizes: Mapping[str, int], *, min_joints: int = 8, joints_per_row: int = 80
+) -> dict[str, Axes]:
+    """Return empty panels on one figure, as wide as their parts have joints, in rows."""
     rows: list[dict[str, int]] = [{}]
     for part, size in sizes.items():
-        # joints that fit side by side in a wide picture, and those for which a panel has room at
-        # least
-        if rows[-1] and sum(rows[-1].values()) + max(size, ROOM) > 80:
+        width = max(size, min_joints)
+        if rows[-1] and sum(rows[-1].values()) + width > joints_per_row:
             rows.append({})
-        rows[-1][part] = max(size, ROOM)
-    inches = (COLUMN, 3.4) if len(sizes) == 1 else (WIDE, 0.6 + 2.8 * len(rows))
-    page, found = Page(figsize=inches, layout="constrained"), {}
+        rows[-1][part] = width
+    inches = (COLUMN_WIDTH, 3.4) if len(sizes) == 1 else (PAGE_WIDTH, 0.6 + 2.8 * len(rows))
+    figure, panels = new_figure(*inches), dict[str, Axes]()
     longest = max(sum(row.values()) for row in rows)
     first: Axes | None = None
-    whole = page.add_gridspec(len(rows), 1)
+    grid = figure.add_gridspec(len(rows), 1)
     for number, row in enumerate(rows):
+        # an empty last column: panels of all rows are drawn to one scale
         rest = longest - sum(row.values())
         widths = [*row.values(), *([rest] if rest else [])]
-        columns = whole[number].subgridspec(1, len(widths), width_ratios=widths)
+        columns = grid[number].subgridspec(1, len(widths), width_ratios=widths)
         for k, part in enumerate(row):
-            panel = page.add_subplot(columns[k], sharey=first)
-            panel.tick_params(labelleft=k == 0)
-            if k == 0:
-                panel.set_ylabel(LABEL)
-            first = first or panel
-            found[part] = panel
-    return found
+            panels[part] = figure.add_subplot(columns[k], sharey=first)
+            panels[part].tick_params(labelleft=k == 0)
+            first = first or panels[part]
+    return panels
 
 
-def _explained(shown: Mapping[str, Axes]) -> Figure:
-    """Mark quarters of the depth, and explain the lines of all panels once."""
-    first = next(iter(shown.values()))
+def _finish_panels(panels: Mapping[str, Axes]) -> Figure:
+    """Mark quarters of the depth, and add one legend for all panels."""
+    first = next(iter(panels.values()))
     first.set_yticks(np.linspace(-0.5, 0.5, 5))
-    page = cast(Figure, first.figure)
-    if len(shown) == 1:
-        legend(first)
+    figure = cast(Figure, first.figure)
+    if len(panels) == 1:
+        add_legend(first)
     else:
-        page.legend(
-            *first.get_legend_handles_labels(),
-            loc="outside lower center",
-            ncols=2 + len(LINES),
-            frameon=False,
-            fontsize=SMALL,
-        )
-    return page
+        handles, labels = first.get_legend_handles_labels()
+        add_legend_below(figure, 2 + len(LINE_COLOURS), handles=handles, labels=labels)
+    return figure
 
 
 def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figure:
-    """Draw eccentricity and mobilised friction of joints over time, below the ground's motion.
+    """Draw eccentricity and mobilised friction of joints over time, below the ground acceleration.
 
-    Friction has the sense of the shear force. Lines are interrupted while a joint is open; limits
-    are by the run's criteria.
+    Friction has the sign of the shear force. Lines are interrupted while a joint is open; limits
+    follow from the run's criteria.
 
     Args:
-        run: what happened.
-        joints: their names, or their numbers; by default the two that tell most.
+        run: the history.
+        joints: their names or numbers; by default the two that are closest to failure.
 
     Returns:
-        The page: the ground's motion, and a row for each joint.
+        The figure: the ground acceleration, and a row for each joint.
 
     Raises:
         InvalidInput: there is no such joint.
     """
-    joints = telling_joints(run) if joints is None else joints
+    joints = most_stressed_joints(run) if joints is None else joints
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
-    chosen, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
-    figure = Page(figsize=(COLUMN, 0.9 + 1.15 * rows), layout="constrained")
+    selected, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
+    figure = new_figure(COLUMN_WIDTH, 0.9 + 1.15 * rows)
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
-    _ground(ground, run)
+    draw_ground(ground, run.time, run.dataset["ground"].values)
     ground.xaxis.set_major_locator(MaxNLocator(5))
-    panels = []
-    for row, own in enumerate(chosen, start=1):
+    left_panels = []
+    for row, joint in enumerate(selected, start=1):
         left, right = (figure.add_subplot(grid[row, k], sharex=ground) for k in range(2))
-        criteria = Criteria.of(own)
-        # that fit beside a panel
-        name = "\n".join(wrap(str(own["name"].values), 20))
-        dress(left, "", f"{name}\nM / (N h) [-]")
-        _eccentricity(left, own, criteria)
-        _friction(right, own, criteria)
-        panels.append((left, right))
-    for axes in panels[-1]:
-        axes.set_xlabel("time [s]", fontsize=SMALL)
-    for axes in (each for row in panels[:-1] for each in row):
-        axes.tick_params(labelbottom=False)
-    figure.align_ylabels([ground, *(left for left, _ in panels)])
+        # a line of 20 letters fits beside a panel
+        name = "\n".join(wrap(str(joint["name"].values), 20))
+        _draw_eccentricity(left, joint, f"{name}\nM / (N h) [-]")
+        _draw_friction(right, joint)
+        left_panels.append(left)
+        for axes in (left, right):
+            axes.set_xlabel("time [s]" if row == len(selected) else "", fontsize=LABEL_SIZE)
+            axes.tick_params(labelbottom=row == len(selected))
+    figure.align_ylabels([ground, *left_panels])
     return figure
 
 
 def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     """Draw mobilised friction and eccentricity of one joint over time, a column for each run.
 
-    Friction has the sense of the shear force. Lines are interrupted while the joint is open; dashed
-    ones are the limits by the run's criteria: the coefficient of friction, and |e| of a hinge.
+    Friction has the sign of the shear force. Lines are interrupted while the joint is open. Dashed
+    lines are the limits by the run's criteria: the friction coefficient, and |e| of a hinge.
 
     Args:
-        runs: what to call each run, and the run.
-        joint: its name, or its number.
+        runs: the label of each run, and the run.
+        joint: its name or number.
 
     Returns:
-        The page, with a column for each run.
+        The figure, with a column for each run.
 
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = Page(figsize=(0.8 * WIDE, 4.2), layout="constrained")
+    figure = new_figure(0.8 * PAGE_WIDTH, 4.2)
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
-        criteria = Criteria.of(own)
-        _friction(column[0], own, criteria)
-        dress(column[1], "time [s]", "eccentricity M / (N h) [-]")
-        _eccentricity(column[1], own, criteria)
-        entitle(column[0], f"{label}: {own['name'].values!s}")
+        _draw_friction(column[0], own)
+        _draw_eccentricity(column[1], own, "eccentricity M / (N h) [-]")
+        column[1].set_xlabel("time [s]", fontsize=LABEL_SIZE)
+        set_title(column[0], f"{label}: {own['name'].values!s}")
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()
     return figure
 
 
-def _ground(axes: Axes, run: History) -> None:
-    """Draw the acceleration of the ground."""
-    dress(axes, "", "ground [m/s²]")
-    time, ground = run.time, run.dataset["ground"].values
-    axes.plot(time, ground[:, 0], color=INK, lw=0.6, label="horizontal")
+def draw_ground(
+    axes: Axes, times: Array, ground: Array, *, size: float = LABEL_SIZE, width: float = 0.6
+) -> None:
+    """Draw the ground acceleration (n, 2) over time, in a font size and a line width [points]."""
+    style_axes(axes, "", "ground [m/s²]", size)
+    axes.plot(times, ground[:, 0], color=Colour.TEXT, lw=width, label="horizontal", zorder=3)
     if ground[:, 1].any():
-        axes.plot(time, ground[:, 1], color=LINES[4], lw=0.5, alpha=0.9, label="vertical")
-        axes.legend(
-            frameon=False, fontsize=SMALL, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.96)
-        )
-    axes.set_xlim(time[0], time[-1])
+        axes.plot(times, ground[:, 1], color=LINE_COLOURS[4], lw=0.85 * width, label="vertical")
+        # above the axes' right end: inside it would cover the lines
+        style: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+        axes.legend(ncols=2, frameon=False, fontsize=size, **style)
+    axes.set_xlim(times[0], max(times[-1], times[0] + 1e-9))
 
 
-def _eccentricity(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
-    """Draw where the thrust crosses a joint, against its faces."""
-    draw_faces(axes, criteria.hinge)
-    axes.plot(joint["time"], joint["eccentricity"], color=LINES[0], lw=0.6)
+def _draw_eccentricity(axes: Axes, joint: xr.Dataset, label: str) -> None:
+    """Draw the eccentricity of a joint between its faces."""
+    style_axes(axes, "", label)
+    _draw_faces(axes, Criteria.of(joint).hinge)
+    axes.plot(joint["time"], joint["eccentricity"], color=LINE_COLOURS[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
 
-def _friction(axes: Axes, joint: xr.Dataset, criteria: Criteria) -> None:
-    """Draw mobilised friction with the sense of the shear force, between its limits."""
-    dress(axes, "", "V / N [-]")
+def _draw_friction(axes: Axes, joint: xr.Dataset) -> None:
+    """Draw mobilised friction with the sign of the shear force, between its limits."""
+    style_axes(axes, "", "V / N [-]")
+    criteria = Criteria.of(joint)
     limit = float(criteria.coefficients(joint["friction_limit"].values))
-    if np.isfinite(limit):  # else it never slides
-        _friction_limits(axes, joint, criteria, limit)
     ratio = np.sign(joint["V"].values) * joint["friction"].values
-    axes.plot(joint["time"], ratio, color=LINES[0], lw=0.6)
-    most, top = float(np.nanmax(np.abs(ratio), initial=0.0)), axes.get_ylim()[1]
-    if np.isfinite(limit) and most > top:
+    if np.isfinite(limit):  # else the joint cannot slide
+        # cohesion raises the limits above the coefficient
+        limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
+        _draw_friction_limits(axes, joint["time"].values, ratio, limits)
+        style: dict[str, Any] = {"va": "bottom", "xycoords": ("axes fraction", "data")}
+        style |= {"ha": "right", "color": Colour.SLIDING}
+        annotate(axes, f"μ = {limit:g}", (1.0, limit), (-3, 1), **style)
+    axes.plot(joint["time"], ratio, color=LINE_COLOURS[0], lw=0.6)
+
+
+def _draw_friction_limits(axes: Axes, times: Array, ratio: Array, limits: Array) -> None:
+    """Draw the ratios V / N at which a joint slides, and marks where V / N is off the axis."""
+    largest = float(np.nanmax(np.abs(ratio), initial=0.0))
+    # a joint about to open has any V / N: the axis ends at three times the coefficient
+    top = float(np.clip(1.08 * largest, 1.5 * limits[0], 3.0 * limits[0]))
+    for side in (1.0, -1.0):
+        axes.plot(times, side * limits, color=Colour.SLIDING, lw=0.9, ls="--")
+        shade = {"color": Colour.SLIDING, "alpha": 0.12, "lw": 0}
+        axes.fill_between(times, side * limits, side * top, **shade)
+    axes.set_ylim(-top, top)
+    if largest > top:
         beyond = np.abs(np.nan_to_num(ratio)) > top
         edge = 0.97 * top * np.sign(ratio[beyond])
-        axes.scatter(joint["time"].values[beyond], edge, marker="d", s=6, color=HINGE, zorder=4)
-        _note(axes, f"◆ beyond, up to {most:.3g}", (0.0, 0.0), HINGE)
+        axes.scatter(times[beyond], edge, marker="d", s=6, color=Colour.HINGE, zorder=4)
+        style = {"xycoords": "axes fraction", "color": Colour.HINGE}
+        text = f"◆ beyond, up to {largest:.3g}"
+        annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=LABEL_SIZE - 1.0, **style)
 
 
-def _twins(structure: Structure | None, numbers: Array, first: int) -> NDArray[np.bool_]:
-    """Whether joints of some numbers are mirror images of one of them (n,)."""
+def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> NDArray[np.bool_]:
+    """Return which of the numbered joints are the mirror image of one of them (n,)."""
     if structure is None:
         return np.zeros(len(numbers), dtype=bool)
     middles, ends = structure.middles[numbers], structure.ends[..., 0]
     image = np.array([ends.min() + ends.max() - middles[first, 0], middles[first, 1]])
-    # distance of joints from each other's mirror image that makes them twins, relative to the size
-    # of the structure
+    # tolerance relative to the size of the structure
     return np.linalg.norm(middles - image, axis=1) < 1e-6 * structure.size
 
 
-def telling_joints(run: History) -> list[int]:
-    """Return two joints that tell most of a run: one by where its thrust is, one by its friction.
+def most_stressed_joints(run: History) -> list[int]:
+    """Return two joints closest to failure: one by its eccentricity, one by its friction.
 
-    The first has the largest |e|, or opens; the second slides for the longest time, or else comes
-    nearest to it. It is not the mirror image of the first, which does much the same, where the
-    run knows its structure.
+    The first has the largest |e|, or opens; the second slides for the longest time, or else is
+    closest to sliding. A mirror image of the first, which behaves similarly, is left out if the run
+    contains its structure.
     """
     own = assessed_joints(run.joints)
     numbers = own["joint"].values
-    tilt = abs(own["eccentricity"]).max("time").fillna(0.5).values
-    first = int(np.argmax(tilt))
+    e = abs(own["eccentricity"]).max("time").fillna(0.5).values
+    first = int(np.argmax(e))
     use = (own["friction"] / own["friction_limit"]).max("time").fillna(0.0).values
     slid = (own["slide"].transpose("time", "joint").values * step_lengths(run.time)[:, None]).sum(0)
-    order = np.lexsort([-tilt, -np.where(np.isfinite(use), use, 0.0), -np.round(slid, 9)])
-    twin = _twins(run.structure, numbers, first)
+    order = np.lexsort([-e, -np.where(np.isfinite(use), use, 0.0), -np.round(slid, 9)])
+    twin = _mirror_images(run.structure, numbers, first)
     others = [k for k in order if k != first and not twin[k]] or [k for k in order if k != first]
     return [int(numbers[k]) for k in (first, *others[:1])]
-
-
-def _friction_limits(axes: Axes, joint: xr.Dataset, criteria: Criteria, limit: float) -> None:
-    """Draw the ratios at which a joint slides: μ, and more by cohesion."""
-    limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
-    most = float(np.nanmax(joint["friction"].values, initial=0.0))
-    # mobilised friction at which its axis ends at least and at most, relative to the coefficient: a
-    # joint about to open has any value, and what lies beyond is told
-    top = float(np.clip(1.08 * most, 1.5 * limits[0], 3.0 * limits[0]))
-    for side in (1.0, -1.0):
-        axes.plot(joint["time"], side * limits, color=SLIP, lw=0.9, ls="--")
-        axes.fill_between(joint["time"], side * limits, side * top, color=SLIP, alpha=0.12, lw=0)
-    axes.set_ylim(-top, top)
-    axes.annotate(
-        f"μ = {limit:g}", (1.0, limit), (-3, 1), xycoords=("axes fraction", "data"),
-        textcoords="offset points", fontsize=SMALL, ha="right", va="bottom", color=SLIP,
-    )  # fmt: skip
-
-
-def _note(axes: Axes, words: str, place: tuple[float, float], colour: str) -> None:
-    """Write into a corner."""
-    axes.annotate(
-        words, place, (3, 2), xycoords="axes fraction", textcoords="offset points",
-        fontsize=SMALL - 1.0, color=colour, ha="left", va="bottom",
-    )  # fmt: skip

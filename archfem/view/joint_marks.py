@@ -1,11 +1,11 @@
-"""What a picture shows of the joints at one instant: thrust line, hinges, slips and gaps.
+"""Marks at the joints at one instant: thrust line, hinges, sliding and open joints.
 
-A state that is to be drawn: of which model, at which coordinates, and what its joints carry.
+Also the state to be drawn: its model, coordinates and joint resultants.
 """
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,117 +13,110 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from archfem._typing import Array
-from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
-from archfem.models.model import Model
+from archfem.models.model import Model, check_coordinate_count
 from archfem.statics.equilibrium import Equilibrium
 
-# Outline of an arrow of length 1 along x (7, 2)
-ARROW = np.array(
-    [[-0.5, -0.09], [0.1, -0.09], [0.1, -0.25], [0.5, 0.0], [0.1, 0.25], [0.1, 0.09], [-0.5, 0.09]]
-)
+# Largest displacement in a figure, relative to the size of the structure
+DRAWN_DISPLACEMENT = 0.06
 
-# Largest displacement in a picture, relative to the size of the structure
-SWING = 0.06
+# Variables of a joint dataset from which marks are derived
+MARKED_QUANTITIES = ("eccentricity", "V", "hinge", "slide", "open")
 
-
-# Length of the arrows of a slip, and their distance from the joint, relative to its depth
-LENGTH, APART = 0.55, 0.14
-
-
-# The same at most, relative to the distance to the next joint: arrows of both have room
-SNUG = 0.9 / (2.0 * APART + 0.5 * LENGTH)
-
-# What is known of joints that are marked
-TOLD = ("eccentricity", "V", "hinge", "slide", "open")
+logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Where to draw what."""
+    """Places of the marks at one instant; none by default."""
 
     # points of the thrust line (n_joints, 2) [m]; NaN in an open joint, and in one that is not of
     # a ring or pier
-    thrust: Array
-    # pieces of the thrust line, through the blocks between two such joints (n_links, 2, 2) [m]
-    links: Array
-    hinges: Array  # points where hinged joints stay in contact (n_hinges, 2) [m]
-    # outlines of two opposite arrows beside each sliding joint: the higher block's, then the
+    thrust: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    # segments of the thrust line across the blocks between two such joints (n_links, 2, 2) [m]
+    links: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    hinges: Array = field(
+        default_factory=lambda: np.zeros((0, 2))
+    )  # contact points of hinged joints (n_hinges, 2) [m]
+    # outlines of two opposite arrows beside each sliding joint: the upper block's, then the
     # lower's (2 n_sliding, 7, 2) [m]
-    slips: Array
-    gaps: Array  # ends of the joints that have come apart (n_open, 2, 2) [m]
-
-
-# Of joints of which nothing is to be drawn
-NO_MARKS = Marks(*(np.zeros((0, *rest)) for rest in ((2,), (2, 2), (2,), (7, 2), (2, 2))))
+    slips: Array = field(default_factory=lambda: np.zeros((0, 7, 2)))
+    gaps: Array = field(
+        default_factory=lambda: np.zeros((0, 2, 2))
+    )  # ends of the open joints (n_open, 2, 2) [m]
 
 
 class Marker:
-    """Finds what to draw at the joints of a structure, instant after instant."""
+    """Computes the marks of a structure at successive instants."""
 
     def __init__(self, structure: Structure, shown: NDArray[np.bool_]) -> None:
         self._structure, self._shown = structure, shown
-        self._pairs = linked(structure, shown)
-        self._line = structure.tangents * structure.depths[:, None]
+        self._pairs = joint_pairs(structure, shown)
+        self._depth_vectors = structure.tangents * structure.depths[:, None]
 
     def at(self, joints: xr.Dataset | Mapping[str, Array], shift: Array | None = None) -> Marks:
-        """Return the marks of an instant, moved by `shift`."""
+        """Return the marks at an instant, with joint ends displaced by `shift`."""
         structure, shown = self._structure, self._shown
-        tilt, shear, hinge, slide, apart = (np.asarray(joints[key]) for key in TOLD)
+        e, shear, hinge, slide, opened = (np.asarray(joints[key]) for key in MARKED_QUANTITIES)
         shift = np.zeros((len(structure.joints), 2, 2)) if shift is None else shift
-        ends, share = structure.ends + shift, 0.5 + tilt[:, None]
+        ends, share = structure.ends + shift, 0.5 + e[:, None]
+        # displacement of the point of the thrust, interpolated between the joint's ends
         carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
-        line = structure.middles + tilt[:, None] * self._line
+        line = structure.middles + e[:, None] * self._depth_vectors
         side = np.where(shown, hinge, 0)
-        failed = np.flatnonzero(side)
-        slips = [self._slip(int(k), ends[k], shear[k]) for k in np.flatnonzero(shown & slide)]
+        hinged = np.flatnonzero(side)
+        slips = [
+            self._slip_arrows(int(k), ends[k], shear[k]) for k in np.flatnonzero(shown & slide)
+        ]
         thrust = np.where(shown[:, None], carried + line, np.nan)
         links = thrust[self._pairs]
         return Marks(
             thrust=thrust,
             links=links[np.isfinite(links).all(axis=(1, 2))],
-            hinges=ends[failed, (side[failed] > 0).astype(int)],
-            slips=np.array(slips).reshape(-1, *ARROW.shape),
-            gaps=ends[shown & apart],
+            hinges=ends[hinged, (side[hinged] > 0).astype(int)],
+            slips=np.array(slips).reshape(-1, 7, 2),
+            gaps=ends[shown & opened],
         )
 
     @cached_property
-    def _room(self) -> Array:
-        """Distance of each joint to the next that is shown (n_joints,) [m]."""
+    def _spacing(self) -> Array:
+        """Distance of each joint to the nearest other one that is shown (n_joints,) [m]."""
         middles = self._structure.middles
-        apart = np.linalg.norm(middles[:, None] - middles[self._shown], axis=2)
-        return np.where(apart > 0.0, apart, np.inf).min(axis=1, initial=np.inf)
+        distance = np.linalg.norm(middles[:, None] - middles[self._shown], axis=2)
+        return np.where(distance > 0.0, distance, np.inf).min(axis=1, initial=np.inf)
 
-    def _slip(self, number: int, ends: Array, shear: float) -> Array:
-        """Two arrows that say how a joint slips, whose ends are there (2, 7, 2) [m]."""
+    def _slip_arrows(self, number: int, ends: Array, shear: float) -> Array:
+        """Return outlines of two arrows along a joint with these ends (2, 7, 2) [m]."""
         structure = self._structure
         joint, normal, middle = structure.joints[number], structure.normals[number], ends.mean(0)
         along, length = ends[1] - ends[0], float(np.linalg.norm(ends[1] - ends[0]))
-        if length > 0.0:
-            (x, y), (c, s) = normal, along / length
-            turn = np.array([c, s]) @ joint.tangent, s * joint.tangent[0] - c * joint.tangent[1]
-            normal = np.array([turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y])
-        else:
-            c, s = joint.tangent
-        sense = np.sign(shear) * np.array([c, s])
-        # depth that arrows are made for at least, relative to the size of the structure
-        depth = min(max(joint.depth, 0.03 * structure.size), SNUG * self._room[number])
-        outline = ARROW * LENGTH * depth
-        arrow = outline[:, :1] * sense + outline[:, 1:] * normal
-        away = APART * depth * normal
-        return np.array([middle + away + arrow, middle - away - arrow])
+        tangent = along / length if length > 0.0 else np.array(joint.tangent)
+        # the normal rotates with the joint, by the angle between its old and new tangent
+        cos, sin = tangent @ joint.tangent, tangent @ [-joint.tangent[1], joint.tangent[0]]
+        normal = np.array([[cos, -sin], [sin, cos]]) @ normal
+        # length of the arrows and their distance from the joint, relative to its depth
+        arrow_length, distance = 0.55, 0.14
+        # arrows of neighbouring joints must not overlap; those of a shallow joint must be seen
+        fitting = 0.9 / (2.0 * distance + 0.5 * arrow_length) * self._spacing[number]
+        depth = min(max(joint.depth, 0.03 * structure.size), fitting)
+        # outline of an arrow of length 1 along x
+        x = arrow_length * depth * np.array([-0.5, 0.1, 0.1, 0.5, 0.1, 0.1, -0.5])[:, None]
+        y = arrow_length * depth * np.array([-0.09, -0.09, -0.25, 0.0, 0.25, 0.09, 0.09])[:, None]
+        arrow = x * np.sign(shear) * tangent + y * normal
+        offset = distance * depth * normal
+        return np.array([middle + offset + arrow, middle - offset - arrow])
 
 
 def joint_marks(structure: Structure, joints: xr.Dataset, *, shift: Array | None = None) -> Marks:
-    """Find what to draw at the joints of rings and piers, or at all where there are neither."""
+    """Return the marks at joints of rings and piers, or at all where there are neither."""
     return Marker(structure, joints["judged"].values).at(joints, shift)
 
 
-def linked(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return pairs of joints with a block between them that has no other shown joint (n_links, 2)."""
+def joint_pairs(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return pairs of shown joints of blocks that have exactly two of them (n_links, 2)."""
     touching: list[list[int]] = [[] for _ in structure.blocks]
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
@@ -133,7 +126,7 @@ def linked(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def support_outlines(model: Model, magnification: float) -> list[Array]:
-    """Return the outlines of the fixed blocks, where they have moved, each (k, 2) [m]."""
+    """Return the outlines of the fixed blocks, displaced with the supports, each (k, 2) [m]."""
     return [
         block.drawn() + magnification * rigid_motion_matrix(block.drawn(), block.centroid) @ motion
         for block, motion in zip(model.structure.blocks, model.support_motion, strict=True)
@@ -141,59 +134,50 @@ def support_outlines(model: Model, magnification: float) -> list[Array]:
     ]
 
 
-def swung(structure: Structure, motion: Array) -> Array:
-    """Return a motion of all blocks, scaled so that the farthest point moves by `SWING`."""
-    return motion * SWING * structure.size / RigidBlocks(structure).largest_displacement(motion)
+def scale_motion(structure: Structure, motion: Array) -> Array:
+    """Scale a motion of all blocks (n_blocks, 3) so that it can be seen in a figure."""
+    largest = RigidBlocks(structure).largest_displacement(motion)
+    return motion * DRAWN_DISPLACEMENT * structure.size / largest
 
 
-def displaced(structure: Structure, motion: Array) -> list[Array]:
-    """Return the outlines of those blocks that move, each (k, 2) [m], where a motion takes them."""
+def outline_moving_blocks(structure: Structure, motion: Array) -> list[Array]:
+    """Return the displaced outlines of the blocks that move, each (k, 2) [m]."""
     outlines = []
-    for block, own in zip(structure.blocks, motion, strict=True):
-        by = rigid_motion_matrix(block.drawn(), block.centroid) @ own
-        # displacement too small to be drawn, relative to the size of the structure
-        if np.abs(by).max() > 1e-4 * structure.size:
-            outlines.append(block.drawn() + by)
+    for block, block_motion in zip(structure.blocks, motion, strict=True):
+        displacement = rigid_motion_matrix(block.drawn(), block.centroid) @ block_motion
+        # a smaller displacement cannot be seen
+        if np.abs(displacement).max() > 1e-4 * structure.size:
+            outlines.append(block.drawn() + displacement)
     return outlines
 
 
 def round_magnification(displacement: float) -> float:
-    """Return one of 1, 2, 5, 10, … that brings a displacement nearest to `SWING`."""
-    if displacement * 1.5 >= SWING or displacement == 0.0:
+    """Return the magnification 1, 2, 5, 10, … that best shows a displacement relative to size."""
+    if displacement * 1.5 >= DRAWN_DISPLACEMENT or displacement == 0.0:
         return 1.0
     steps = np.outer(10.0 ** np.arange(12), [1.0, 2.0, 5.0]).ravel()
-    return float(steps[np.argmin(np.abs(np.log(steps * displacement / SWING)))])
+    return float(steps[np.argmin(np.abs(np.log(steps * displacement / DRAWN_DISPLACEMENT)))])
 
 
-logger = logging.getLogger("archfem")
-
-
-def drawn(model: Model, state: Equilibrium | Array) -> tuple[Model, Array]:
+def model_and_coordinates(model: Model, state: Equilibrium | Array) -> tuple[Model, Array]:
     """Return the model and the coordinates (n,) of a state."""
-    found, q = (state.model, state.q) if isinstance(state, Equilibrium) else (model, state)
-    if len(q) != model.size:
-        raise InvalidInput(
-            f"there are {len(q)} coordinates, and the model has {model.size}: give the model, of "
-            "the same cells and degree, that they were computed with"
-        )
-    return found, q
+    model, q = (state.model, state.q) if isinstance(state, Equilibrium) else (model, state)
+    check_coordinate_count(model, len(q))
+    return model, q
 
 
-def joints_at(
+def joints_of_state(
     model: Model, q: Array, joints: xr.Dataset | None, criteria: Criteria | None
 ) -> xr.Dataset:
-    """Return what the joints carry in a state that is to be drawn.
-
-    Coordinates alone do not tell shear forces where joints have slid: then it warns.
-    """
+    """Return the joints in a state to be drawn; warn where coordinates leave shear ambiguous."""
     if joints is not None:
         check_instant(model.structure, joints)
         return with_failure_flags(joints, criteria)
     further = model.updated_memory(q) - model.memory
     if not model.memory.any() and further.any():
         logger.warning(
-            "joints slide at these coordinates, and the model does not remember how far they had "
-            "slid before: what is drawn of shear and sliding may be wrong; give the equilibrium "
+            "joints slide at these coordinates, and the model does not contain their slip before: "
+            "shear and sliding in the figure may be wrong; give the equilibrium "
             "in place of its coordinates, or joints=run.joints.sel(time=…)"
         )
     observer, moved = model.observer(), model.large_displacements

@@ -1,25 +1,36 @@
-"""Where blocks and the ends of joints are at some time of a run, loose blocks too."""
+"""Positions of blocks over a run, including blocks that came loose, and the ground motion."""
 
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
 
-def turned(points: Array, angle: Array) -> Array:
-    """Return points, turned about the origin (…, 2)."""
+def block_kinds(structure: Structure) -> list[str]:
+    """Return the kind of each block: "support", "soil" or "stone"."""
+    soil = find_yielding_blocks(structure)
+    return [
+        "support" if block.fixed else "soil" if number in soil else "stone"
+        for number, block in enumerate(structure.blocks)
+    ]
+
+
+def rotate(points: Array, angle: Array) -> Array:
+    """Rotate points about the origin (…, 2)."""
     c, s = np.cos(angle), np.sin(angle)
     x, y = np.moveaxis(points, -1, 0)
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def kept_fields(run: History) -> tuple[Array, Array]:
-    """Return the fields of a run; where blocks came loose, up to the last."""
+def recorded_fields(run: History) -> tuple[Array, Array]:
+    """Return times and coordinates of the recorded fields, up to the instant of collapse."""
     data = run.dataset
     times, fields = data["frame_time"].values, data["q"].values
     if "fall_pose" in data and data.attrs["last_time"] > times[-1]:
@@ -28,53 +39,60 @@ def kept_fields(run: History) -> tuple[Array, Array]:
     return times, fields
 
 
+def ground_acceleration(run: History) -> tuple[Array, Array]:
+    """Return times and ground acceleration (n, 2) [m/s²], including the fall."""
+    data = run.dataset
+    if "fall_ground" not in data:
+        return run.time, data["ground"].values
+    times = np.append(run.time, data["fall_time"].values[1:])
+    return times, np.concatenate([data["ground"].values, data["fall_ground"].values[1:]])
+
+
 def fields_at(run: History, times: Array) -> Array:
-    """Return coordinates at some times, straight between those that were kept (frames, n)."""
-    kept, fields = kept_fields(run)
-    if len(kept) == 1:
-        return np.repeat(fields, len(times), axis=0)
-    after = np.searchsorted(kept, times).clip(1, len(kept) - 1)
-    share = ((times - kept[after - 1]) / (kept[after] - kept[after - 1]))[:, None]
-    return (1.0 - share) * fields[after - 1] + share * fields[after]
+    """Interpolate the recorded fields linearly at times (len(times), n)."""
+    return _interpolate(*recorded_fields(run), times)
+
+
+def _interpolate(known: Array, values: Array, times: Array) -> Array:
+    """Interpolate values (f, …) at known times (f,) linearly, constant beyond their range."""
+    after = np.searchsorted(known, times).clip(1, max(len(known) - 1, 1))
+    before, after = after - 1, np.minimum(after, len(known) - 1)
+    # a single frame has no interval; any length gives its value
+    length = np.where(after > before, known[after] - known[before], 1.0)
+    share = np.clip((times - known[before]) / length, 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return (1.0 - share) * values[before] + share * values[after]
 
 
 @dataclass(frozen=True, eq=False)
 class FallingBlocks:
-    """Where blocks that came loose in a run are, until they rest."""
+    """Positions of the blocks from the instant of collapse until they rest."""
 
-    structure: Structure  # whose blocks
+    structure: Structure  # undeformed
     times: Array  # of the frames (f,) [s]
-    # displacement of each block's centroid from where it was built, and its turn (f, n_blocks, 3)
-    # [m, m, rad]
+    # displacement of each block's centroid, and its rotation (f, n_blocks, 3) [m, m, rad]
     poses: Array
     level: float  # of the ground [m]
 
     @classmethod
     def of(cls, structure: Structure, run: History) -> Self | None:
-        """Return the falling part of a run; None where blocks held together."""
+        """Return the fall in a run; None where no block came loose."""
         if "fall_pose" not in run.dataset:
             return None
         times, poses = run.dataset["fall_time"].values, run.dataset["fall_pose"].values
         return cls(structure, times, poses, make_bodies(structure, 0.0).level)
 
     def pose(self, time: float) -> Array:
-        """Return the poses of all blocks, straight between two frames (n_blocks, 3)."""
-        if len(self.times) == 1:
-            return self.poses[0]
-        after = int(np.searchsorted(self.times, time).clip(1, len(self.times) - 1))
-        before, last = self.times[after - 1], self.times[after]
-        share = np.clip((time - before) / (last - before), 0.0, 1.0)
-        return (1.0 - share) * self.poses[after - 1] + share * self.poses[after]
+        """Return the poses of all blocks at a time (n_blocks, 3)."""
+        return _interpolate(self.times, self.poses, np.array([time]))[0]
 
-    def places(self, points: Array, block: Array, time: float) -> Array:
-        """Return where points of the blocks are (m, 2) [m]."""
+    def places(self, points: Array, block: int | NDArray[np.intp], time: float) -> Array:
+        """Return the positions at a time (m, 2) [m] of points of a block, or of one block each."""
         poses = self.pose(time)[block]
         centres = np.array([each.centroid for each in self.structure.blocks])[block]
-        return centres + poses[:, :2] + turned(points - centres, poses[:, 2])
+        return centres + poses[..., :2] + rotate(points - centres, poses[..., 2])
 
     def outlines(self, time: float) -> list[Array]:
-        """Return the outlines of all blocks, each (k, 2) [m]."""
-        drawn = [block.drawn() for block in self.structure.blocks]
-        sizes = [len(each) for each in drawn]
-        block = np.repeat(np.arange(len(drawn)), sizes)
-        return np.split(self.places(np.concatenate(drawn), block, time), np.cumsum(sizes)[:-1])
+        """Return the outlines of all blocks at a time, each (k, 2) [m]."""
+        blocks = enumerate(self.structure.blocks)
+        return [self.places(block.drawn(), number, time) for number, block in blocks]

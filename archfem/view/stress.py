@@ -1,11 +1,11 @@
-"""A map of principal compression over the blocks, with thrust lines and principal directions."""
+"""Map of principal compression over the blocks, with thrust lines and principal directions."""
 
 from collections.abc import Collection
 from typing import cast
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -21,24 +21,19 @@ from archfem.models.model import Cells, Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.stress import cell_stress, corner_stress_operator, principal_values
 from archfem.units import MPa, kPa
-from archfem.view.joint_marks import drawn, joint_marks
+from archfem.view.joint_marks import joint_marks, model_and_coordinates
 from archfem.view.structure import draw_blocks, draw_thrust
-from archfem.view.style import BEYOND, EDGE, INK, MOVED, SMALL, STONE, canvas, entitle, stand
-
-# From none to the largest compression; warm, so that the thrust line stands out
-SHADES = LinearSegmentedColormap.from_list(
-    "compression", (STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
+from archfem.view.style import (
+    CLIPPED_PERCENT,
+    Colour,
+    add_legend_below,
+    add_polygons,
+    set_title,
+    structure_figure,
+    style_colour_bar,
+    style_structure_axes,
 )
-
-
-# Cells whose mean stress a cross shows
-TOGETHER = 4
-
-# Into how many a cell's sides are cut for shading
-PIECES = 3
-
-# Width of the colour bar, and its distance from the picture [inch]
-BAR = 0.16
+from archfem.view.triangles import Triangles
 
 Numbers = NDArray[np.intp]
 
@@ -52,48 +47,46 @@ def draw_stress(
 ) -> Figure:
     """Map the largest principal compression, with thrust lines and principal directions.
 
-    Crosses lie along the principal directions and are as long as the stresses are large: dark
-    under compression, green under tension.
+    Crosses show the principal directions; the length of an arm is proportional to the stress: dark
+    for compression, green for tension.
 
     Args:
-        model: any rung with a mesh.
-        q: an equilibrium, or coordinates (n,) of a model that knows how its joints began, as that
-            of a dead load in stages does.
-        parts: whose blocks are shaded, for example ["backfill"]; by default all but soil.
-        axes: where to draw; by default a new figure.
+        model: a model with a mesh, of any fidelity but "rigid".
+        q: an equilibrium, or coordinates (n,) of a model that contains the initial gaps of its
+            joints, for example those of a dead load in construction stages.
+        parts: parts whose blocks are shaded, for example ["backfill"]; by default all but soil.
+        axes: matplotlib axes; by default those of a new figure.
 
     Returns:
-        The page, with a bar of colours; that of `axes` where given.
+        The figure, with a colour bar; that of `axes` if given.
 
     Raises:
-        InvalidInput: the blocks are rigid, there is no such part, or q is another model's.
+        InvalidInput: the blocks are rigid, there is no such part, or q belongs to another model.
     """
-    model, q = drawn(model, q)
+    model, q = model_and_coordinates(model, q)
     structure, cells = model.structure, model.cells
-    chosen = _chosen(structure, parts)
+    blocks = _select_blocks(structure, parts)
     corners = (corner_stress_operator(cells) @ q).reshape(-1, 3)
-    own = axes is None
-    axes = canvas(structure).add_subplot() if axes is None else axes
-    page = cast(Figure, axes.figure)
-    stand(axes, structure)
+    has_own_figure = axes is None
+    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    figure = cast(Figure, axes.figure)
+    style_structure_axes(axes, structure)
     draw_blocks(axes, structure)
-    _shade(axes, cells, -principal_values(*corners.T)[1], chosen)
+    _shade(axes, cells, -principal_values(*corners.T)[1], blocks)
     outlines = [block.drawn() for block in structure.blocks]
-    axes.add_collection(
-        PolyCollection(outlines, facecolors="none", edgecolors=EDGE, linewidths=0.6, zorder=3)
-    )
-    _crosses(axes, cells, cell_stress(model, q), chosen)
+    add_polygons(axes, outlines, "none", width=0.6, zorder=3)
+    _draw_crosses(axes, cells, cell_stress(model, q), blocks)
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))
-    entitle(axes, f"{structure.name}: principal compression")
+    set_title(axes, f"{structure.name}: principal compression")
     axes.autoscale_view()
-    if own:
-        page.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=SMALL)
-    return page
+    if has_own_figure:
+        add_legend_below(figure)
+    return figure
 
 
-def _chosen(structure: Structure, parts: Collection[str] | None) -> Numbers:
-    """Numbers of the blocks that are shaded."""
+def _select_blocks(structure: Structure, parts: Collection[str] | None) -> Numbers:
+    """Return the numbers of the blocks to be shaded."""
     soil = find_yielding_blocks(structure)
     if parts is None:
         return np.array([number for number in structure.free if number not in soil])
@@ -104,95 +97,75 @@ def _chosen(structure: Structure, parts: Collection[str] | None) -> Numbers:
     return np.array([n for n in structure.free if structure.blocks[n].part in parts])
 
 
-def _shade(axes: Axes, cells: Cells, compression: Array, chosen: Numbers) -> None:
-    """Colour the cells of blocks by compression at their corners [Pa], and add a colour bar."""
-    shaded = [c for c, own in zip(cells.polygons, cells.owner, strict=True) if own in chosen]
-    corners = np.array([[*cell, cell[-1]][:4] for cell in shaded])
-    shown = compression[np.unique(corners)].clip(0.0)
-    highest = max(float(np.percentile(shown, 100.0 - BEYOND)), 1.0)
+def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> None:
+    """Shade the cells of blocks by compression at their corners [Pa], and add a colour bar."""
+    triangles = Triangles(cells)
+    shaded = np.isin(cells.owner[triangles.cell], blocks)
+    x, y = triangles.corners(cells.places)[shaded].reshape(-1, 2).T
+    shown = compression[np.isin(cells.block, blocks)].clip(0.0)
+    highest = max(float(np.percentile(shown, 100.0 - CLIPPED_PERCENT)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
-    places, triangles = _cut(cells.places[corners])
+    # warm colours, so that the blue thrust line stands out
+    colours = (Colour.STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
     painted = axes.tripcolor(
-        Triangulation(places[..., 0].ravel(), places[..., 1].ravel(), triangles),
-        _inside(compression[corners]).ravel().clip(0.0) / unit,
+        Triangulation(x, y, np.arange(len(x)).reshape(-1, 3)),
+        triangles.corners(compression)[shaded].ravel().clip(0.0) / unit,
         shading="gouraud",
-        cmap=SHADES,
+        cmap=LinearSegmentedColormap.from_list("compression", colours),
         vmin=0.0,
         vmax=highest / unit,
         zorder=2,
         rasterized=True,
+        gid="compression",
     )
-    painted.set_gid("compression")
-    wide = BAR / cast(Figure, axes.figure).get_figwidth()
-    beyond = "max" if shown.max() > highest else "neither"
+    # width of the colour bar, and its distance from the axes: 0.16 inch
+    wide = 0.16 / cast(Figure, axes.figure).get_figwidth()
     beside = axes.inset_axes((1.0 + wide, 0.0, wide, 1.0))
-    bar = axes.figure.colorbar(painted, cax=beside, extend=beyond)
-    bar.set_label(f"largest compression [{name}]", fontsize=SMALL)
-    bar.ax.tick_params(labelsize=SMALL, color=EDGE)
-    bar.ax.yaxis.set_major_locator(MaxNLocator(5))
-    bar.outline.set(edgecolor=EDGE, linewidth=0.8)
+    extend = "max" if shown.max() > highest else "neither"
+    bar = axes.figure.colorbar(painted, cax=beside, extend=extend, ticks=MaxNLocator(5))
+    style_colour_bar(bar, f"largest compression [{name}]")
 
 
-def _inside(corners: Array) -> Array:
-    """Values on a grid in each cell from those at its four corners (cells, 4, …)."""
-    s, t = np.meshgrid(*(np.linspace(0.0, 1.0, PIECES + 1),) * 2)
-    share = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]).reshape(4, -1)
-    return np.einsum("kp,ck...->cp...", share, corners)
-
-
-def _cut(corners: Array) -> tuple[Array, Numbers]:
-    """Return points on a grid in each cell (cells, p, 2), and triangles between them (m, 3).
-
-    Colours of a triangle run straight between those of its corners, past the ones between on the
-    scale: over a whole cell of a coarse mesh that would be seen.
-    """
-    places = _inside(corners)
-    row = PIECES + 1
-    first = (np.arange(PIECES)[:, None] * row + np.arange(PIECES)).ravel()
-    square = np.column_stack(
-        [first, first + 1, first + row + 1, first, first + row + 1, first + row]
-    )
-    starts = np.arange(len(places)) * row**2
-    return places, (starts[:, None, None] + square.reshape(-1, 3)).reshape(-1, 3)
-
-
-def _crosses(axes: Axes, cells: Cells, stress: Array, chosen: Numbers) -> None:
+def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> None:
     """Draw crosses along the principal directions, on a grid in each block."""
-    # distance between two crosses on paper, and length of the longest arms [inch]
+    # distance between crosses, and length of the longest arms: 0.21 inch on paper
     spacing = 0.21 * np.ptp(cells.places[:, 0]) / cast(Figure, axes.figure).get_figwidth()
     centre = np.array([cells.places[cell].mean(axis=0) for cell in cells.polygons])
     groups = [
         np.flatnonzero(cells.owner == number)[group]
-        for number in chosen
-        for group in _grid(
+        for number in blocks
+        for group in _group_cells(
             cells.places[cells.block == number], centre[cells.owner == number], spacing
         )
     ]
     middle = np.array([centre[group].mean(axis=0) for group in groups])
-    across, up, shear = np.array([stress[group].mean(axis=0) for group in groups]).T
-    angle = 0.5 * np.arctan2(2.0 * shear, across - up)
-    turned = np.stack([angle, angle + 0.5 * np.pi])
-    size = np.stack(principal_values(across, up, shear))
+    xx, yy, xy = np.array([stress[group].mean(axis=0) for group in groups]).T
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    angles = np.stack([angle, angle + 0.5 * np.pi])
+    size = np.stack(principal_values(xx, yy, xy))
     share = size / np.abs(size).max()
-    direction = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     arm = 0.5 * spacing * np.abs(share)[..., None] * direction
     ends = np.stack([middle - arm, middle + arm], axis=2)
-    for sign, colour, name in ((-1.0, INK, "compression"), (1.0, MOVED, "tension")):
-        # arms shorter than this, relative to the longest, are left out
+    for sign, colour, name in (
+        (-1.0, Colour.TEXT, "compression"),
+        (1.0, Colour.MECHANISM, "tension"),
+    ):
+        # shorter arms, relative to the longest, are left out
         lines = ends[sign * share > 0.08]
         if len(lines):
-            drawn = LineCollection(list(lines), colors=colour, linewidths=0.8, label=name)
-            drawn.set(zorder=4, gid=name)
-            axes.add_collection(drawn)
+            style = {"colors": colour, "linewidths": 0.8, "label": name, "gid": name}
+            axes.add_collection(LineCollection(list(lines), zorder=4, **style))
 
 
-def _grid(corners: Array, centre: Array, spacing: float) -> list[Numbers]:
-    """Groups of neighbouring cells of a block, about equally far from each other."""
+def _group_cells(corners: Array, centre: Array, spacing: float, size: int = 4) -> list[Numbers]:
+    """Return groups of neighbouring cells of a block, at about equal distances."""
     middle = corners.mean(axis=0)
+    # principal axes of the block: the grid follows an inclined voussoir
     axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
     along, local = (corners - middle) @ axes.T, (centre - middle) @ axes.T
     low, high = along.min(axis=0), along.max(axis=0)
-    spacing = max(spacing, np.sqrt(TOGETHER * np.prod(high - low) / len(centre)))
+    spacing = max(spacing, np.sqrt(size * np.prod(high - low) / len(centre)))
     counts = np.maximum(1, np.round((high - low) / spacing)).astype(int)
     steps = [
         a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts, strict=True)
@@ -201,5 +174,5 @@ def _grid(corners: Array, centre: Array, spacing: float) -> list[Numbers]:
     for place in np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2):
         distance = np.linalg.norm(local - place, axis=1)
         if distance.min() < 0.5 * spacing:
-            groups.append(np.argsort(distance, kind="stable")[:TOGETHER])
+            groups.append(np.argsort(distance, kind="stable")[:size])
     return groups

@@ -1,11 +1,4 @@
-"""Structures on paper: one at an instant, or several side by side.
-
-Which joint is which: names of joints in pictures, and a picture of nothing else.
-
-A structure where its blocks have gone, with its thrust line there.
-
-Live loads, drawn as arrows with their sizes.
-"""
+"""Figures of structures: blocks, thrust lines, joint names, loads and displaced shapes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -22,38 +15,35 @@ from archfem.dynamics.history import History
 from archfem.joints.criteria import Criteria, with_failure_flags
 from archfem.joints.resultants import check_instant
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Joint, Structure
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.view.joint_marks import (
     Marks,
-    drawn,
     joint_marks,
-    joints_at,
+    joints_of_state,
+    model_and_coordinates,
     round_magnification,
     support_outlines,
 )
-from archfem.view.positions import fields_at
+from archfem.view.positions import block_kinds, fields_at
 from archfem.view.style import (
-    EDGE,
-    GHOST,
-    HINGE,
-    INK,
-    LOAD,
-    SLIP,
-    SMALL,
-    SOIL,
-    STONE,
-    SUPPORT,
-    THRUST,
-    Page,
-    canvas,
-    entitle,
-    legend,
-    scale_of,
-    stand,
+    LABEL_SIZE,
+    Colour,
+    add_legend,
+    add_legend_below,
+    add_polygons,
+    annotate,
+    drawing_scale,
+    new_figure,
+    outline_bounds,
+    set_title,
+    structure_figure,
+    style_structure_axes,
+    white_halo,
 )
+
+Action = BodyForce | PointLoad | Settlement
 
 
 def draw_structure(
@@ -63,32 +53,32 @@ def draw_structure(
     criteria: Criteria | None = None,
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the blocks and, where given, what their joints do at one instant.
+    """Draw the blocks and, if joints are given, their thrust lines and failures at one instant.
 
     Supports are darker, soil is paler. Each ring and pier has its thrust line, interrupted where a
-    joint is open. A red circle marks a hinge on the face where its blocks stay in contact, two
-    opposite arrows a joint that slides, a white gap one that has come apart.
+    joint is open. A red circle marks a hinge at the face where its blocks stay in contact. Two
+    opposite arrows mark a sliding joint, a white gap an open one.
 
     Args:
-        structure: what stands.
+        structure: the structure, undeformed.
         joints: its joints at one instant, as made by `joint_dataset`.
-        criteria: what makes a joint fail; by default those by which the joints were judged already.
-        axes: where to draw; by default a new figure.
+        criteria: failure criteria; by default those stored in `joints`.
+        axes: matplotlib axes; by default those of a new figure.
 
     Returns:
-        The page; that of `axes` where given.
+        The figure; that of `axes` if given.
 
     Raises:
-        InvalidInput: `joints` has several instants, or those of another structure.
+        InvalidInput: `joints` has several instants, or belongs to another structure.
     """
-    axes = canvas(structure).add_subplot() if axes is None else axes
-    stand(axes, structure)
+    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    style_structure_axes(axes, structure)
     draw_blocks(axes, structure)
     if joints is not None:
         check_instant(structure, joints)
         draw_marks(axes, joint_marks(structure, with_failure_flags(joints, criteria)))
-        legend(axes)
-    entitle(axes, title_of(structure, joints))
+        add_legend(axes)
+    set_title(axes, title_at_instant(structure.name, joints))
     axes.autoscale_view()
     return cast(Figure, axes.figure)
 
@@ -97,111 +87,107 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     """Draw several structures, one below the other, with thrust lines and failed joints.
 
     Args:
-        states: what to call each, the structure, and its joints at one instant or None.
+        states: the label of each state, its structure, and its joints at one instant or None.
 
     Returns:
-        The page, with a panel for each structure.
+        The figure, with a panel for each structure.
     """
-    wide, high = canvas(next(iter(states.values()))[0]).get_size_inches()
-    # height of a picture among others, relative to one by itself
-    figure = Page(figsize=(wide, 0.78 * high * len(states)), layout="constrained")
+    wide, high = structure_figure(next(iter(states.values()))[0]).get_size_inches()
+    # a panel among others needs less height than a figure of its own
+    figure = new_figure(wide, 0.78 * high * len(states))
     panels = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     marks: dict[str, Any] = {}
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         draw_structure(structure, joints, axes=axes)
-        if joints is not None and "time" in joints.coords:
-            label = f"{label}, t = {float(joints['time']):.3f} s"
-        entitle(axes, label)
+        set_title(axes, title_at_instant(label, joints))
         axes.label_outer()
-        handles, words = axes.get_legend_handles_labels()
-        marks |= dict(zip(words, handles, strict=True))
+        handles, names = axes.get_legend_handles_labels()
+        marks |= dict(zip(names, handles, strict=True))
         if axes.get_legend() is not None:
             axes.get_legend().remove()
-    if marks:
-        figure.legend(
-            handles=list(marks.values()), labels=list(marks), loc="outside lower center", ncols=4,
-            frameon=False, fontsize=SMALL,
-        )  # fmt: skip
+    if marks:  # one legend explains the marks of all panels
+        add_legend_below(figure, handles=list(marks.values()), labels=list(marks))
     return figure
 
 
-def title_of(structure: Structure, joints: xr.Dataset | None) -> str:
-    """Return the name of the structure, and the time where there is one."""
+def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
+    """Return a name, with the time of the joints if they have one."""
     if joints is None or "time" not in joints.coords:
-        return structure.name
-    return f"{structure.name}, t = {float(joints['time']):.3f} s"
+        return name
+    return f"{name}, t = {float(joints['time']):.3f} s"
+
+
+def block_colours(structure: Structure) -> list[str]:
+    """Return the fill colour of each block."""
+    colours = {"support": Colour.SUPPORT, "soil": Colour.SOIL, "stone": Colour.STONE}
+    return [colours[kind] for kind in block_kinds(structure)]
 
 
 def draw_blocks(axes: Axes, structure: Structure) -> None:
-    """Draw blocks where they are, supports darker, soil paler."""
-    soil = find_yielding_blocks(structure)
-    faces = [
-        SUPPORT if block.fixed else SOIL if number in soil else STONE
-        for number, block in enumerate(structure.blocks)
-    ]
+    """Draw the undeformed blocks, supports darker, soil paler."""
     outlines = [block.drawn() for block in structure.blocks]
-    drawn = PolyCollection(outlines, facecolors=faces, edgecolors=EDGE, linewidths=0.7, zorder=1)
-    drawn.set_gid("blocks")
-    axes.add_collection(drawn)
+    add_polygons(axes, outlines, block_colours(structure), gid="blocks")
+
+
+class DisplacedBlocks:
+    """Blocks of a model on axes, over their undeformed outlines."""
+
+    def __init__(self, axes: Axes, model: Model, magnification: float = 1.0) -> None:
+        cells, self._edges = model.cells, model.cells.outline_edges
+        colours = np.array(block_colours(model.structure))[cells.owner]
+        # soil is drawn first, below the stones
+        order = np.argsort(colours != Colour.SOIL, kind="stable")
+        self._polygons = [np.asarray(cells.polygons[k]) for k in order]
+        # cells are outlined in their own colour, which covers the seams between them
+        style = {"facecolors": colours[order], "edgecolors": "face", "linewidths": 0.3}
+        self._cells = PolyCollection([], zorder=1, gid="blocks", **style)
+        self._rims = LineCollection([], colors=Colour.EDGE, linewidths=0.7, zorder=2)
+        style = {"colors": Colour.UNDEFORMED, "linewidths": 0.6}
+        undeformed = LineCollection(cells.places[self._edges], zorder=0, **style)
+        for drawing in (undeformed, self._cells, self._rims):
+            axes.add_collection(drawing)
+        add_polygons(axes, support_outlines(model, magnification), Colour.SUPPORT)
+
+    def move(self, places: Array) -> None:
+        """Move the points of the cells to places (m, 2) [m]."""
+        self._cells.set_verts([places[polygon] for polygon in self._polygons])
+        self._rims.set_segments(places[self._edges])
 
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
     """Draw the thrust lines."""
-    halo = withStroke(linewidth=3.4, foreground="white")
-    line: dict[str, Any] = {"color": THRUST, "lw": 1.7, "zorder": 5, "path_effects": [halo]}
-    axes.plot(*_broken(marks.links).T, label="thrust line", gid="links", **line)
-    axes.plot(*marks.thrust.T, "o", ms=3.0, color=THRUST, zorder=5, gid="thrust")
+    line: dict[str, Any] = {"lw": 1.7, "path_effects": white_halo(3.4), "gid": "links"}
+    line |= {"color": Colour.THRUST, "zorder": 5}
+    axes.plot(*_join_segments(marks.links).T, label="thrust line", **line)
+    axes.plot(*marks.thrust.T, "o", ms=3.0, color=Colour.THRUST, zorder=5, gid="thrust")
 
 
 def draw_marks(axes: Axes, marks: Marks) -> None:
-    """Draw thrust line, hinges, slips and gaps; what does not occur has no label."""
+    """Draw thrust line, hinges, sliding and open joints; only those that occur have a label."""
     draw_thrust(axes, marks)
+    style: dict[str, Any]
     if len(marks.hinges):
-        disc: dict[str, Any] = {"mfc": HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
-        axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **disc)
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 8, "zorder": 7}
+        axes.plot(*marks.hinges.T, "o", label="hinge", gid="hinges", **style)
     if len(marks.slips):
-        arrows = PolyCollection(
-            list(marks.slips), facecolors=SLIP, edgecolors="white", linewidths=0.4
-        )
-        arrows.set(zorder=6, gid="slips")
-        axes.add_collection(arrows)
-        symbol: dict[str, Any] = {
-            "marker": r"$\rightleftharpoons$",
-            "ms": 12,
-            "color": SLIP,
-            "mew": 0.5,
-        }
-        axes.plot([], [], ls="", label="sliding joint", **symbol)
+        style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
+        add_polygons(axes, list(marks.slips), Colour.SLIDING, **style)
+        style = {"marker": r"$\rightleftharpoons$", "ms": 12, "mew": 0.5, "color": Colour.SLIDING}
+        axes.plot([], [], ls="", label="sliding joint", **style)
     if len(marks.gaps):
-        edge = [withStroke(linewidth=3.8, foreground=EDGE)]
-        style: dict[str, Any] = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4}
-        axes.plot(
-            *_broken(marks.gaps).T, label="open joint", gid="gaps", solid_capstyle="butt", **style
-        )
+        edge = [withStroke(linewidth=3.8, foreground=Colour.EDGE)]
+        style = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4, "gid": "gaps"}
+        gaps = _join_segments(marks.gaps)
+        axes.plot(*gaps.T, label="open joint", solid_capstyle="butt", **style)
 
 
-def _broken(pieces: Array) -> Array:
-    """Pieces of a line (n, 2, 2), one after another, with a break after each (3 n, 2)."""
-    return np.insert(pieces, 2, np.nan, axis=1).reshape(-1, 2)
-
-
-# A point of type [inch]
-POINT = 1.0 / 72.0
-
-# Size of type, relative to the distance of two names
-TIGHT = 0.65
-
-
-# Beside and below the blocks, for names, relative to the size of the structure
-ROOM = 0.1, 0.15
-
-
-# Space between the name of a joint and its end, relative to the size of its type
-APART = 0.5
+def _join_segments(segments: Array) -> Array:
+    """Join segments (n, 2, 2) to one line that is interrupted after each (3 n, 2)."""
+    return np.insert(segments, 2, np.nan, axis=1).reshape(-1, 2)
 
 
 def short_name(name: str, part: str) -> str:
-    """Return what tells a joint from others of its part: "5" of "main arch, joint 5"."""
+    """Return the name of a joint within its part: "5" for "main arch, joint 5"."""
     own = name.removeprefix(f"{part}, ")
     return own.removeprefix("joint ") or own
 
@@ -209,65 +195,57 @@ def short_name(name: str, part: str) -> str:
 def draw_names(structure: Structure) -> Figure:
     """Draw the blocks, with the short name of each joint beside its intrados.
 
-    Joints of rings and piers have one, or all where there are neither; what comes before, the
-    name of the part, stands in its midst. "5" in "main arch" is "main arch, joint 5".
+    Joints of rings and piers are named, or all joints of a structure that has neither. The name of
+    the part stands in its middle: "5" in "main arch" is "main arch, joint 5".
 
     Args:
-        structure: whose joints are named.
+        structure: the structure.
 
     Returns:
-        The page.
+        The figure.
     """
-    page = canvas(structure)
+    page = structure_figure(structure)
     axes = page.add_subplot()
-    stand(axes, structure)
+    style_structure_axes(axes, structure)
     draw_blocks(axes, structure)
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
-    inch = 1.0 / scale_of(structure)
-    wide = float(np.ptp(np.concatenate([block.drawn()[:, 0] for block in structure.blocks])))
-    # room beside the blocks at least [inch]
-    axes.margins(max(ROOM[0], 0.4 * inch / wide), ROOM[1])
+    inch = 1.0 / drawing_scale(structure)  # [m]
+    low, high = outline_bounds(structure)
+    # names beside the blocks need at least 0.4 inch
+    axes.margins(max(0.1, 0.4 * inch / (high - low)[0]), 0.15)
     axes.autoscale_view()
     for joint in shown:
-        axes.plot(*joint.ends.T, color=SLIP, lw=1.0, zorder=4)
+        axes.plot(*joint.ends.T, color=Colour.SLIDING, lw=1.0, zorder=4)
     for part in dict.fromkeys(joint.part for joint in shown):
         _name_part(axes, [joint for joint in shown if joint.part == part], inch)
     example = shown[len(shown) // 2].name
-    title = f"{structure.name}: names of joints, such as '{example}'"
-    entitle(axes, title)
+    set_title(axes, f"{structure.name}: names of joints, such as '{example}'")
     return page
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
-    """Name the joints of a part, each in line with itself, in type for which there is room."""
+    """Write the names of a part and of its joints, in type that fits their spacing."""
+    style: dict[str, Any] = {"color": Colour.TEXT, "zorder": 8, "path_effects": white_halo(1.6)}
     ends = np.array([joint.ends[0] for joint in joints])
     apart = np.linalg.norm(np.diff(ends, axis=0), axis=1).min() if len(ends) > 1 else np.inf
-    # smallest size of type that can be read on paper [points]
-    size = float(np.clip(TIGHT * apart / (inch * POINT), 4.5, SMALL))
+    # a line of type takes 0.65 of the spacing; type below 4.5 points cannot be read on paper
+    size = float(np.clip(0.65 * 72.0 * apart / inch, 4.5, LABEL_SIZE))
     for joint in joints:
-        x, y = -joint.tangent
-        angle = float(np.degrees(np.arctan2(y, x)))
-        # angle from which a name would stand on its head [°]; upright ones are read from the right
+        outward = -np.array(joint.tangent)
+        angle = float(np.degrees(np.arctan2(outward[1], outward[0])))
+        # a name must not be upside down; vertical ones are read from the right
         leftward = abs(angle) > 91.0
-        style = {"rotation": angle - 180.0 * leftward, "rotation_mode": "anchor"}
+        style |= {"rotation": angle - 180.0 * leftward, "rotation_mode": "anchor"}
         style |= {"ha": "right" if leftward else "left", "va": "center_baseline"}
-        words, away = short_name(joint.name, joint.part), (APART * size * x, APART * size * y)
-        _write(axes, words, joint.ends[0], away, fontsize=size, **style)
+        name = short_name(joint.name, joint.part)
+        annotate(axes, name, joint.ends[0], 0.5 * size * outward, fontsize=size, **style)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
-    place, where = ends.mean(axis=0), "center"
+    place, style["va"] = ends.mean(axis=0), "center"
     if joints[0].role != "ring":
-        place, where = min((joint.middle for joint in joints), key=lambda middle: middle[1]), "top"
-    below = (0.0, -1.4 * SMALL)
-    _write(axes, joints[0].part, place, below, fontsize=SMALL, ha="center", va=where)
-
-
-def _write(axes: Axes, words: str, place: Array, away: tuple[float, float], **style: Any) -> None:
-    """Write words near a place, away from it by so many points."""
-    axes.annotate(
-        words, tuple(place), away, textcoords="offset points", color=INK, zorder=8,
-        path_effects=[withStroke(linewidth=1.6, foreground="white")], **style,
-    )  # fmt: skip
+        place, style["va"] = min((j.middle for j in joints), key=lambda middle: middle[1]), "top"
+    style |= {"rotation": 0.0, "ha": "center"}
+    annotate(axes, joints[0].part, place, (0.0, -1.4 * LABEL_SIZE), **style)
 
 
 def draw_displaced(
@@ -279,122 +257,94 @@ def draw_displaced(
     magnification: float = 1.0,
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the blocks where they are, over where they stood, and their joints there.
+    """Draw the displaced blocks over the undeformed ones, with the marks at their joints.
 
     Args:
-        model: what stands.
+        model: the model.
         q: an equilibrium, or coordinates (n,).
-        joints: at that instant, e.g. `run.joints.sel(time=…)`; by default as the model has them.
-        criteria: what makes a joint fail; by default those of `joints`, or else the usual ones.
-        magnification: of displacements [-]; by default they are true to scale, and those of stiff
-            joints next to nothing.
-        axes: where to draw; by default a new figure.
+        joints: at that instant, e.g. `run.joints.sel(time=…)`; by default computed by the model.
+        criteria: failure criteria; by default those of `joints`, or else the default ones.
+        magnification: of displacements [-]; by default they are true to scale, so that those of
+            stiff joints cannot be seen.
+        axes: matplotlib axes; by default those of a new figure.
 
     Returns:
-        The page; that of `axes` where given.
+        The figure; that of `axes` if given.
 
     Raises:
-        InvalidInput: q or joints are another model's.
+        InvalidInput: q or joints belong to another model.
     """
-    model, q = drawn(model, q)
-    joints = joints_at(model, q, joints, criteria)
+    model, q = model_and_coordinates(model, q)
+    joints = joints_of_state(model, q, joints, criteria)
     structure, cells = model.structure, model.cells
-    axes = canvas(structure).add_subplot() if axes is None else axes
-    stand(axes, structure)
+    axes = structure_figure(structure).add_subplot() if axes is None else axes
+    style_structure_axes(axes, structure)
     places = cells.places + magnification * cells.displacement(q)
-    still = LineCollection(
-        list(cells.places[cells.outline_edges]), colors=GHOST, linewidths=0.6, zorder=0
-    )
-    faces = [places[np.asarray(cell)] for cell in cells.polygons]
-    stones = PolyCollection(faces, facecolors=STONE, edgecolors=STONE, linewidths=0.3, zorder=1)
-    rims = LineCollection(list(places[cells.outline_edges]), colors=EDGE, linewidths=0.7, zorder=2)
-    supports = PolyCollection(
-        support_outlines(model, magnification),
-        facecolors=SUPPORT,
-        edgecolors=EDGE,
-        linewidths=0.7,
-        zorder=1,
-    )
-    stones.set_gid("blocks")
-    for drawing in (still, stones, rims, supports):
-        axes.add_collection(drawing)
-    draw_marks(
-        axes, joint_marks(structure, joints, shift=magnification * model.observer().joint_ends(q))
-    )
-    legend(axes)
+    DisplacedBlocks(axes, model, magnification).move(places)
+    axes.update_datalim(places)
+    shift = magnification * model.observer().joint_ends(q)
+    draw_marks(axes, joint_marks(structure, joints, shift=shift))
+    add_legend(axes)
     scale = "" if magnification == 1.0 else f", displacements × {magnification:g}"
-    entitle(axes, title_of(structure, joints) + scale)
+    set_title(axes, title_at_instant(structure.name, joints) + scale)
     axes.autoscale_view()
     return cast(Figure, axes.figure)
 
 
 def draw_during(model: Model, run: History, joints: xr.Dataset) -> Figure:
-    """Draw an instant of a run: where displacements were kept, blocks where they have gone.
-
-    They are magnified by a round number that shows them well, unless they may be large.
-    """
+    """Draw an instant of a run, with displaced blocks if the run contains displacements."""
     if "q" in run.dataset:
         q = fields_at(run, joints["time"].values[None])[0]
-        most = float(np.abs(model.cells.displacement(q)).max())
-        by = 1.0 if model.large_displacements else round_magnification(most / model.structure.size)
-        return draw_displaced(model, q, joints=joints, magnification=by)
+        largest = float(np.abs(model.cells.displacement(q)).max()) / model.structure.size
+        magnification = 1.0 if model.large_displacements else round_magnification(largest)
+        return draw_displaced(model, q, joints=joints, magnification=magnification)
     return draw_structure(model.structure, joints)
 
 
-# Length of an arrow, and its distance from the structure, relative to the structure's size
-REACH, AWAY = 0.11, 0.04
-
-Action = BodyForce | PointLoad | Settlement
-
-
 def draw_loads(
-    axes: Axes, structure: Structure, live: Sequence[Action], *, of: str = "λ ×"
+    axes: Axes, structure: Structure, live: Sequence[Action], *, factor: str = "λ ×"
 ) -> None:
-    """Draw live loads: where they act, which way, and how large they are.
+    """Draw live loads as arrows of one length, with their sizes after a factor.
 
-    A load in proportion to the weights is one arrow beside the structure, at its height; a force
-    stands on the extrados; a movement of a support begins at it.
+    A load in proportion to the weights is one arrow above the structure; a force ends at the
+    extrados; a movement of a support begins at its centroid.
     """
+    length = 0.11 * structure.size
     for number, action in enumerate(live):
-        start, way, words = _arrow(structure, action)
-        tip = start + REACH * structure.size * way
-        axes.annotate(
-            "", tuple(tip), tuple(start), zorder=9,
-            arrowprops={"arrowstyle": "-|>", "color": LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
-        room = [start, tip, start + np.array([0.0, AWAY * structure.size])]
-        axes.update_datalim(np.array(room))
+        start, direction, size = _load_arrow(structure, action, length)
+        tip = start + length * direction
+        arrow = {"arrowstyle": "-|>", "color": Colour.LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tuple(tip), tuple(start), zorder=9, arrowprops=arrow)
+        above = (start[0], start[1] + 0.04 * structure.size)  # room for the text
+        axes.update_datalim([start, tip, above])
         if not number:
-            axes.plot([], [], color=LOAD, lw=2.2, marker=">", ms=5, label="live load")
-        away = (0, 5) if way[1] < 0.5 or abs(way[0]) > 0.5 else (6, 0)
-        where = start if way[1] < -0.5 else 0.5 * (start + tip)
-        axes.annotate(
-            f"{of} {words}".strip(), tuple(where), away, textcoords="offset points", ha="center",
-            va="bottom", fontsize=SMALL, color=LOAD, zorder=9,
-        )  # fmt: skip
+            axes.plot([], [], color=Colour.LOAD, lw=2.2, marker=">", ms=5, label="live load")
+        # the text stands above a steep arrow's tail, beside an upward arrow, else above its middle
+        offset = (0, 5) if direction[1] < 0.5 or abs(direction[0]) > 0.5 else (6, 0)
+        where = start if direction[1] < -0.5 else 0.5 * (start + tip)
+        style = {"ha": "center", "va": "bottom", "color": Colour.LOAD, "zorder": 9}
+        annotate(axes, f"{factor} {size}".strip(), where, offset, **style)
     axes.autoscale_view()
 
 
-def _arrow(structure: Structure, action: Action) -> tuple[Array, Array, str]:
-    """Where an arrow begins (2,) [m], its direction (2,), and what stands beside it."""
+def _load_arrow(structure: Structure, action: Action, length: float) -> tuple[Array, Array, str]:
+    """Return the start of a load's arrow (2,) [m], its direction (2,), and its size in words."""
     if isinstance(action, BodyForce):
-        size = np.array([action.horizontal, action.vertical])
-        way = size / np.linalg.norm(size)
-        points = np.concatenate([block.drawn() for block in structure.blocks])
-        low, high = points.min(axis=0), points.max(axis=0)
-        start = np.array([0.5 * (low[0] + high[0]), high[1] + 2.0 * AWAY * structure.size])
-        start -= 0.5 * REACH * structure.size * way * [1.0, 0.0]
-        share = float(np.linalg.norm(size))
-        return start, way, "weight" if share == 1.0 else f"{share:.3g} weight"
+        acceleration = np.array([action.horizontal, action.vertical])
+        share = float(np.linalg.norm(acceleration))
+        direction = acceleration / share
+        low, high = outline_bounds(structure)
+        start = np.array([0.5 * (low[0] + high[0]), high[1] + 0.08 * structure.size])
+        start[0] -= 0.5 * length * direction[0]
+        return start, direction, "weight" if share == 1.0 else f"{share:.3g} weight"
     if isinstance(action, PointLoad):
         force = np.array(action.force)
-        way = force / np.linalg.norm(force)
-        place = action.place(structure)[1]
-        return place - REACH * structure.size * way, way, f"{np.linalg.norm(force) / 1e3:.3g} kN"
+        size = np.linalg.norm(force)
+        direction = force / size
+        return action.place(structure)[1] - length * direction, direction, f"{size / 1e3:.3g} kN"
     motion = np.array(action.motion)
-    block = structure.blocks[action.place(structure)]
-    start = np.array(block.centroid)
-    if not motion[:2].any():
-        return start, np.array([0.0, 1.0]), f"turn of the support by {motion[2]:.3g} rad"
-    way = motion[:2] / np.linalg.norm(motion[:2])
-    return start, way, f"movement of the support by {np.linalg.norm(motion[:2]):.3g} m"
+    start = np.array(structure.blocks[action.place(structure)].centroid)
+    size = np.linalg.norm(motion[:2])
+    if not size:
+        return start, np.array([0.0, 1.0]), f"rotation of the support by {motion[2]:.3g} rad"
+    return start, motion[:2] / size, f"movement of the support by {size:.3g} m"

@@ -1,176 +1,224 @@
-"""One look for all pictures: colours, sizes, and axes that carry units."""
+"""Common style of all figures: colours, type sizes, axes, titles, legends and annotations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
+from matplotlib.collections import PolyCollection
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import LogFormatter, MaxNLocator
 
 from archfem._files import atomic_write
+from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
-STONE, SUPPORT, EDGE = "#ece7dd", "#b9b3a6", "#6b655a"
-SOIL = "#f6f3ec"
-INK, FAINT, GHOST = "#1b1b1b", "#8d8d8d", "#cfcac0"
-THRUST, HINGE, SLIP = "#0b4f8a", "#d7261e", "#e08a00"
-MOVED = "#009e73"
-LOAD = "#7b3294"
-# Colours of lines that share axes; they stay apart for all common kinds of colour blindness
-LINES = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
 
-# From none to much
-LIGHT_TO_DARK = LinearSegmentedColormap.from_list(
-    "archfem", (STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
+class Colour:
+    """Colours of figures and films, by the thing that they show."""
+
+    STONE, SUPPORT, SOIL = "#ece7dd", "#b9b3a6", "#f6f3ec"
+    EDGE, UNDEFORMED = "#6b655a", "#cfcac0"  # outlines of blocks, and of blocks as built
+    TEXT, GREY = "#1b1b1b", "#8d8d8d"
+    THRUST, HINGE, SLIDING = "#0b4f8a", "#d7261e", "#e08a00"
+    MECHANISM, LOAD = "#009e73", "#7b3294"
+
+
+# Lines that share axes; distinguishable with all common kinds of colour blindness
+LINE_COLOURS = ("#0b4f8a", "#e08a00", "#009e73", "#cc6fa4", "#56b4e9", "#1b1b1b")
+
+COLOUR_MAP = LinearSegmentedColormap.from_list(
+    "archfem", (Colour.STONE, "#bcd9d3", "#7fb8b8", "#4690a3", "#2f6485")
 )
 
-# Percentage of stresses left beyond the scale: the corners on which blocks turn would otherwise
-# take all of it
-BEYOND = 0.5
+# Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
+# rotate would otherwise set the scale
+CLIPPED_PERCENT = 0.5
 
-# Sizes of type [points]: ticks, legends and labels; titles
-SMALL, NORMAL = 8.0, 9.5
+# Font sizes [points]: ticks, legends and labels; titles
+LABEL_SIZE, TITLE_SIZE = 8.0, 9.5
 
-# Width and largest height of a picture [inch]
-COLUMN = 6.4
-
-# Width of a picture of a long structure, or of many panels [inch]
-WIDE = 11.0
-
-# Width over height from which a structure is long; a ring has at most about 3
-LONG = 4.0
-
-
-# Width of a letter, relative to the size of its type in points [inch]
-LETTER = 0.56 / 72.0
-
-# Height of a line of a legend [inch]
-LINE = 0.17
-
-# Room that an entry of a legend takes beside its words [inch]
-SYMBOL = 0.6
+# Width of a figure, and of one of a long structure or of many panels [inch]
+COLUMN_WIDTH, PAGE_WIDTH = 6.4, 11.0
 
 
 class Page(Figure):
-    """A page on which names and titles are words, though they hold a $."""
+    """A figure whose names and titles are plain text, even if they contain a $."""
 
     def draw(self, renderer: RendererBase) -> None:
-        """Draw it."""
-        plain(self)
+        """Draw the figure."""
+        disable_math(self)
         super().draw(renderer)
 
 
-def plain(drawn: Artist) -> None:
-    """Take every text for words, not for mathematics; only powers of ten at an axis are that."""
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size [inch]."""
+    return Page(figsize=(width, height), layout="constrained")
+
+
+def disable_math(drawing: Artist) -> None:
+    """Show all texts as plain text, except the powers of ten at logarithmic axes."""
     powers = {
         label
-        for axes in drawn.findobj(Axes)
+        for axes in drawing.findobj(Axes)
         for axis in (axes.xaxis, axes.yaxis)
         if isinstance(axis.get_major_formatter(), LogFormatter)
         for label in axis.get_ticklabels(which="both")
     }
-    for text in drawn.findobj(Text):
+    for text in drawing.findobj(Text):
         if text not in powers:
             text.set_parse_math(False)
 
 
-def entitle(axes: Axes, words: str) -> None:
-    """Write a title above axes, in as many lines as their part of the page has it take."""
+def text_width(letters: float, size: float = LABEL_SIZE) -> float:
+    """Return the approximate width of a text [inch]; a letter is 0.56 of the font size wide."""
+    return letters * 0.56 * size / 72.0
+
+
+def set_title(axes: Axes, text: str) -> None:
+    """Set the title of axes, wrapped to the width of their part of the figure."""
     place = axes.get_subplotspec()
-    parts = 1 if place is None else place.get_gridspec().ncols
-    letters = int(axes.figure.get_figwidth() / parts / (LETTER * NORMAL))
-    lines = fill(" ".join(words.split()), max(letters, 12), break_long_words=False)
-    axes.set_title(lines, fontsize=NORMAL, color=INK, parse_math=False)
+    columns = 1 if place is None else place.get_gridspec().ncols
+    letters = int(axes.figure.get_figwidth() / columns / text_width(1, TITLE_SIZE))
+    lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
+    axes.set_title(lines, fontsize=TITLE_SIZE, color=Colour.TEXT, parse_math=False)
 
 
-def stand(axes: Axes, structure: Structure) -> None:
-    """Dress axes in which a structure stands, true to scale, with room between ticks."""
-    dress(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
-    wide = np.ptp(np.concatenate([block.drawn()[:, 0] for block in structure.blocks]))
-    broad = scale_of(structure) * wide
-    # room that the label of a tick takes [inch]
-    axes.xaxis.set_major_locator(
-        MaxNLocator(int(np.clip(broad / 0.55, 1, 9)), steps=[1, 2, 2.5, 5, 10])
-    )
-
-
-def dress(axes: Axes, x: str = "", y: str = "") -> None:
-    """Label axes and take away what is not needed."""
-    axes.set_xlabel(x, fontsize=SMALL)
-    axes.set_ylabel(y, fontsize=SMALL)
+def style_axes(axes: Axes, x: str = "", y: str = "", size: float = LABEL_SIZE) -> None:
+    """Label the axes in a font size [points] and apply the common style."""
+    axes.set_xlabel(x, fontsize=size)
+    axes.set_ylabel(y, fontsize=size)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set(color=EDGE, linewidth=0.8)
-    axes.tick_params(labelsize=SMALL, color=EDGE, width=0.8, length=3.0)
+    axes.spines[["left", "bottom"]].set(color=Colour.EDGE, linewidth=0.8)
+    axes.tick_params(labelsize=size, color=Colour.EDGE, width=0.8, length=3.0)
 
 
-def legend(axes: Axes) -> None:
-    """Explain what is labelled: below axes that have a page to themselves, else among the lines."""
+def style_structure_axes(axes: Axes, structure: Structure) -> None:
+    """Style axes that show a structure true to scale."""
+    style_axes(axes, "x [m]", "y [m]")
+    axes.set_aspect("equal")
+    low, high = outline_bounds(structure)
+    # a tick label takes about 0.55 inch
+    ticks = np.clip(drawing_scale(structure) * (high - low)[0] / 0.55, 1, 9)
+    axes.xaxis.set_major_locator(MaxNLocator(int(ticks), steps=[1, 2, 2.5, 5, 10]))
+
+
+def style_colour_bar(bar: Colorbar, label: str, size: float = LABEL_SIZE) -> None:
+    """Label a colour bar and apply the common style."""
+    bar.set_label(label, fontsize=size)
+    bar.ax.tick_params(labelsize=size, color=Colour.EDGE)
+    bar.outline.set(edgecolor=Colour.EDGE, linewidth=0.8)
+
+
+def white_halo(width: float) -> list[withStroke]:
+    """Return path effects that draw a white stroke behind a line or a text."""
+    return [withStroke(linewidth=width, foreground="white")]
+
+
+def annotate(
+    axes: Axes,
+    text: str,
+    point: Array | tuple[float, float],
+    offset: Array | tuple[float, float] = (0.0, 0.0),
+    **style: Any,
+) -> Annotation:
+    """Write a text at an offset [points] from a point."""
+    default = {"textcoords": "offset points", "fontsize": LABEL_SIZE, "color": Colour.TEXT}
+    return axes.annotate(text, tuple(point), tuple(offset), **(default | style))
+
+
+def add_polygons(
+    axes: Axes,
+    outlines: Sequence[Array],
+    face: str | list[str],
+    *,
+    edge: str = Colour.EDGE,
+    width: float = 0.7,
+    zorder: float = 1,
+    **options: Any,
+) -> None:
+    """Add polygons, each (k, 2), with a face and an edge colour, and a width of the edge."""
+    style = {"facecolors": face, "edgecolors": edge, "linewidths": width, "zorder": zorder}
+    axes.add_collection(PolyCollection(outlines, **style, **options))
+
+
+def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
+    """Add a legend below all panels of a figure."""
+    options = {"frameon": False, "fontsize": LABEL_SIZE} | options
+    figure.legend(loc="outside lower center", ncols=columns, **options)
+
+
+def add_legend(axes: Axes) -> None:
+    """Add a legend: below axes that have a figure of their own, else inside the axes."""
     page = axes.figure
     if len(page.axes) == 1 and isinstance(page, Figure) and page.get_layout_engine() is not None:
         labels = axes.get_legend_handles_labels()[1]
         longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
-        fitting = int(page.get_figwidth() / (SYMBOL + longest * LETTER * SMALL))
-        columns = max(1, min(4, fitting))
-        page.legend(loc="outside lower center", ncols=columns, frameon=False, fontsize=SMALL)
+        # the symbol of an entry takes 0.6 inch
+        fitting = int(page.get_figwidth() / (0.6 + text_width(longest)))
+        add_legend_below(page, max(1, min(4, fitting)))
     else:
-        axes.legend(frameon=False, fontsize=SMALL)
-    plain(page)
+        axes.legend(frameon=False, fontsize=LABEL_SIZE)
+    disable_math(page)
 
 
-def renew_legend(page: Figure) -> None:
-    """Explain anew what is labelled, where more was drawn after a page was explained."""
-    for old in page.legends:
-        old.remove()
-    legend(page.axes[0])
-    lines = sum(1 + text.get_text().count("\n") for text in page.legends[0].get_texts())
-    page.set_figheight(page.get_figheight() + LINE * (lines - 1))
-
-
-def canvas(structure: Structure) -> Figure:
-    """Return an empty page that fits a structure, long ones on a wide page."""
+def outline_bounds(structure: Structure) -> tuple[Array, Array]:
+    """Return the lower left and upper right corner of all blocks, each (2,) [m]."""
     points = np.concatenate([block.drawn() for block in structure.blocks])
-    wide, high = np.ptp(points, axis=0)
-    scale = scale_of(structure)
-    size = max(0.5 * COLUMN, scale * wide + 0.8), max(0.35 * COLUMN, scale * high + 1.2)
-    return Page(figsize=size, layout="constrained")
+    return points.min(axis=0), points.max(axis=0)
 
 
-def scale_of(structure: Structure) -> float:
-    """Return how large a structure is drawn on a page of its own, about [inch / m]."""
-    points = np.concatenate([block.drawn() for block in structure.blocks])
-    wide, high = np.ptp(points, axis=0)
-    room = COLUMN if wide < LONG * high else WIDE
-    # width and largest height of a picture [inch]
-    return float(min((room - 0.8) / wide, (6.8 - 1.2) / high))
+def fitting_width(width: float, height: float) -> float:
+    """Return the figure width [inch] for a drawing with these proportions."""
+    # a ring has at most about 3, a bridge more than 4
+    return COLUMN_WIDTH if width < 4.0 * height else PAGE_WIDTH
+
+
+def drawing_scale(structure: Structure) -> float:
+    """Return the approximate scale at which a structure is drawn on its own figure [inch / m]."""
+    low, high = outline_bounds(structure)
+    width, height = high - low
+    # margins: 0.8 inch beside the drawing, 1.2 above and below; a figure is at most 6.8 high
+    return float(min((fitting_width(width, height) - 0.8) / width, (6.8 - 1.2) / height))
+
+
+def structure_figure(structure: Structure) -> Figure:
+    """Return an empty figure that fits a structure."""
+    low, high = outline_bounds(structure)
+    width, height = drawing_scale(structure) * (high - low) + [0.8, 1.2]
+    return new_figure(max(0.5 * COLUMN_WIDTH, width), max(0.35 * COLUMN_WIDTH, height))
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure in one stroke: the suffix says how (.pdf, .svg, .png, …).
+    """Write a figure to a file atomically; the suffix selects the format (.pdf, .svg, .png, …).
 
     Args:
-        figure: what to write.
-        path: the file; folders are made.
+        figure: the figure.
+        path: of the file; missing folders are created.
 
     Returns:
-        The file's path.
+        The path of the file.
 
     Raises:
-        InvalidInput: the suffix is not one of a picture.
+        InvalidInput: the suffix is not that of a picture format.
     """
     target = Path(path)
     kinds = sorted(figure.canvas.get_supported_filetypes())
     kind = target.suffix.removeprefix(".").lower()
     if kind not in kinds:
         raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
-    plain(figure)
+    disable_math(figure)
+    # text stays text, which can be searched and edited
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
     with atomic_write(target) as draft, matplotlib.rc_context(fonts):
         figure.savefig(draft, format=kind, dpi=300)

@@ -1,7 +1,7 @@
-"""Pages of the public names, room by room, from the `__init__.pyi` of the package and its rooms.
+"""Reference pages of the public names, room by room, from the `__init__.pyi` of the package.
 
-The package loads its names when they are first used, so nothing but those lists says what is
-public; they are read, and a page a room written into `docs/api`, before Sphinx begins.
+The package loads its names at first use, so only these lists define the public names. A page for
+each room is written into `docs/api` before Sphinx starts.
 """
 
 import ast
@@ -20,25 +20,26 @@ import archfem
 
 PACKAGE = Path(archfem.__file__).parent
 ROOMS = {
-    "motion": "ground motions: records, made motions, spectra, matching, suites",
-    "masonry": "what stands and what acts on it: blocks, joints, structures, materials, actions",
-    "joints": "how dry joints answer: law, quadrature, resultants, criteria",
-    "limit": "rigid blocks without stiffness: collapse factor, least thickness, mechanisms",
-    "models": "the ladder of models: what may be asked of a structure that moves",
-    "statics": "a model at rest and about rest: dead load, pushover, modes, stress",
-    "dynamics": "a model shaken: schemes, damping, events, histories, falls",
-    "view": "pictures and films",
+    "motion": "ground motions: records, synthetic motions, spectra, matching, suites",
+    "masonry": "structures and loads: blocks, joints, materials, shapes, surveys",
+    "joints": "mechanics of dry joints: contact law, quadrature, resultants, criteria",
+    "limit": "limit analysis of rigid blocks: collapse factor, least thickness, mechanisms",
+    "models": "discrete models of a structure at five fidelities",
+    "statics": "statics of a model: dead load, pushover, modes, stress",
+    "dynamics": "time histories of a model: schemes, damping, events, histories, falls",
+    "view": "figures and films",
     "cases": "analyses as files",
-    "studies": "many cases: sweeps, incremental dynamic analysis, fragility, convergence",
+    "studies": "many cases: parameters, incremental dynamic analysis, fragility, convergence",
     "commands": "the command line",
 }
+# Placeholder of a colon while docstrings are split
 COLON = "\ue000"
-"""Stands for a colon while docstrings are taken apart."""
 
 PLAIN = {
-    "errors": "what can go wrong, one class for each remedy",
-    "units": "multipliers into SI, and quantities as people write them",
+    "errors": "exceptions, one class for each remedy",
+    "units": "factors to SI units, and parsing of quantities",
 }
+# Packages whose names are shown without links, so that a build needs no network
 FOREIGN = (
     "numpy",
     "scipy",
@@ -61,18 +62,17 @@ FOREIGN = (
     "os",
     "dataclasses",
 )
-"""Packages whose names are written out and lead nowhere: pages need no network."""
 
 
 def listed(stub: Path) -> dict[str, str]:
-    """The names that a stub makes public, each with the module it comes from ("" for a room)."""
+    """Return the public names of a stub and the module of each ("" for a room)."""
     tree = ast.parse(stub.read_text(encoding="utf-8"))
     found = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
     return {alias.name: node.module or "" for node in found for alias in node.names}
 
 
 def public() -> dict[str, dict[str, Any]]:
-    """Room by room the values that are public, by the shortest dotted name each is known by."""
+    """Return the public values of each room by their shortest dotted names."""
     top = {name: module for name, module in listed(PACKAGE / "__init__.pyi").items() if module}
     found: dict[str, dict[str, Any]] = {}
     for room in ROOMS:
@@ -96,12 +96,12 @@ def public() -> dict[str, dict[str, Any]]:
 
 
 def title(text: str, under: str = "=") -> list[str]:
-    """A heading."""
+    """Return the lines of a heading."""
     return [text, under * len(text), ""]
 
 
 def table(names: list[str]) -> list[str]:
-    """A summary of names that leads to a page for each."""
+    """Return a summary table of names with links to their pages."""
     rows = [f"   {name}" for name in names]
     return [".. autosummary::", "   :toctree: generated", "   :nosignatures:", "", *rows, ""]
 
@@ -110,7 +110,7 @@ def write_pages(folder: Path) -> None:
     """Write the page of each room, and of `errors` and `units`, into a folder.
 
     Args:
-        folder: is made; a page that has not changed is left as it is.
+        folder: created if missing; unchanged pages are not rewritten.
     """
     folder.mkdir(exist_ok=True)
     for room, values in public().items():
@@ -127,14 +127,14 @@ def write_pages(folder: Path) -> None:
 
 
 def keep(path: Path, lines: list[str]) -> None:
-    """Write a file unless it holds these lines already."""
+    """Write a file unless it contains these lines already."""
     text = "\n".join(lines)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
 
 
 def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
-    """Make a docstring reStructuredText: formulas as they stand, and no mark-up but backticks."""
+    """Convert a docstring to reStructuredText: formulas verbatim, no mark-up but backticks."""
     told, before, outer, inside, section = [], "", 0, 0, False
     for line in without_types(lines):
         indent, blank = len(line) - len(line.lstrip()), not line.strip()
@@ -151,7 +151,7 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
         before = line
     if kind == "data":
         told = [f"A `{type(value).__name__}`."]
-    if kind in {"property", "attribute"}:  # what stands before a colon there is no type
+    if kind in {"property", "attribute"}:  # text before a colon there is not a type
         told = [line.replace(":", COLON) for line in told]
     lines[:] = told
 
@@ -159,12 +159,12 @@ def plain(_app: Sphinx, kind: str, _name: str, value: Any, _options: Any, lines:
 def restored(
     _app: Sphinx, _kind: str, _name: str, _value: Any, _options: Any, lines: list[str]
 ) -> None:
-    """Put back the colons of properties."""
+    """Restore the colons of properties."""
     lines[:] = [line.replace(COLON, ":") for line in lines]
 
 
 def without_types(lines: list[str]) -> list[str]:
-    """Lines in which what is returned is a sentence: a colon in it ends no type."""
+    """Join the first line of a return description to its heading, so that it is not a type."""
     kept: list[str] = []
     for line in lines:
         begins = bool(kept) and kept[-1] in {"Returns:", "Yields:"}
@@ -177,7 +177,7 @@ def without_types(lines: list[str]) -> list[str]:
 
 
 def escaped(line: str) -> str:
-    """A line in which bars, stars and final underscores are just that, but around *words*."""
+    """Escape bars, stars and final underscores of a line, except around *words*."""
     parts = re.split(r"(``[^`]*``|`[^`]*`|(?<!\S)\*[^\W\d][\w ]*\*)", line)
     for k in range(0, len(parts), 2):
         parts[k] = re.sub(r"([|*]|_(?!\w))", r"\\\1", parts[k])
@@ -185,7 +185,7 @@ def escaped(line: str) -> str:
 
 
 def aliases() -> dict[str, str]:
-    """The public name of every public value, by where it is defined, and by its last part."""
+    """Map definitions and last parts of names to the public names."""
     found: dict[str, str] = {}
     for values in public().values():
         for name, value in values.items():
@@ -197,7 +197,7 @@ def aliases() -> dict[str, str]:
 
 
 def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Node) -> nodes.Node | None:
-    """Lead a name to where its value is described, under whatever name it was written."""
+    """Resolve a name to the page of its value."""
     if node.get("refdomain") != "py":
         return None
     target = node["reftarget"].removesuffix("()")
@@ -217,13 +217,13 @@ def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Node) -> nodes.Nod
 
 @cache
 def classes() -> set[str]:
-    """Names of all classes of the package, as annotations name those that are loaded late."""
+    """Return the names of all classes of the package, which annotations may contain."""
     texts = [path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")]
     return {name for text in texts for name in re.findall(r"^class (\w+)", text, re.MULTILINE)}
 
 
 def internal(target: str) -> bool:
-    """Whether a name is one of the package that is not public, or a word of Python's."""
+    """Return whether a name is an internal one of the package, or a Python builtin."""
     if not target.startswith("archfem."):
         return hasattr(__builtins__, target) or target in {"Array", "NDArray", "Any"} | classes()
     module, _, name = target.rpartition(".")
@@ -234,7 +234,7 @@ def internal(target: str) -> bool:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the pages, and have docstrings and names treated as above."""
+    """Write the pages, and register the handlers of docstrings and names."""
     write_pages(Path(app.srcdir) / "api")
     app.archfem_names = aliases()  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", plain, priority=400)

@@ -1,4 +1,4 @@
-"""The table of what tests verify, from `docs/verification.json` to Markdown."""
+"""The verification table, from `docs/verification.json` to Markdown."""
 
 import json
 from itertools import groupby
@@ -9,14 +9,14 @@ from sphinx.application import Sphinx
 
 
 def number(value: object) -> str:
-    """A number, a row of numbers, or words, as a cell shows them."""
+    """Format a number, a list of numbers, or text for a cell."""
     if isinstance(value, list):
         return ", ".join(number(each) for each in value)
     return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def difference(row: dict[str, object]) -> str:
-    """A difference as a cell shows it: a bound where it is round-off."""
+    """Format a difference for a cell: as a bound where it is round-off."""
     value = row["difference"]
     if value is None:
         return ""
@@ -24,21 +24,21 @@ def difference(row: dict[str, object]) -> str:
 
 
 def lines(rows: list[dict[str, object]]) -> list[str]:
-    """The table, under a heading for each file of tests."""
-    told: list[str] = []
+    """Return the table, with a heading for each test file."""
+    text: list[str] = []
     for (test, of), group in groupby(rows, key=lambda row: (row["test"], row["of"])):
-        told += ["", f"**{str(of).rstrip('.')}** (`{test}`)", ""]
-        told += ["| case | reference | source | computed | difference |", "|---|---|---|---|---|"]
+        text += ["", f"**{str(of).rstrip('.')}** (`{test}`)", ""]
+        text += ["| case | reference | source | computed | difference |", "|---|---|---|---|---|"]
         for row in group:
             case = row["case"] + (f" ({row['times']} cases)" if row["times"] != 1 else "")
             cells = [case, number(row["reference"]), row["source"], number(row["computed"])]
             safe = [str(cell).replace("|", "\\|") for cell in [*cells, difference(row)]]
-            told.append(f"| {' | '.join(safe)} |")
-    return told
+            text.append(f"| {' | '.join(safe)} |")
+    return text
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the table where the page includes it from."""
+    """Write the table to the file that the page includes."""
     folder = Path(app.srcdir)
     (folder / "made").mkdir(exist_ok=True)
     rows = json.loads((folder / "verification.json").read_text(encoding="utf-8"))

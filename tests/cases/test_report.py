@@ -108,7 +108,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, undrawn, tmp_path):
     *_, run = af.cases.run_case(case, pairs=["first"])
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
     assert "5 % of critical at 5 Hz, proportional to stiffness" in words
-    assert "kept no displacements" in run.player().scene.data["note"]
+    assert "contains no displacements" in run.player().scene.data["note"]
 
 
 def test_a_history_has_them_too(kept, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from drawn import assert_same, dxf, geojson, layers_of, square
 
 import archfem as af
-from archfem.masonry.survey.drawings import outlines_in
+from archfem.masonry.survey.drawings import read_drawing
 
 
 @pytest.mark.parametrize(
@@ -145,10 +145,10 @@ def test_a_block_is_between_two_centimetres_and_twenty_metres_large(tmp_path, si
     outlines = {"a": square(0, 0, edge), "b": square(0, edge, edge), "c": square(edge, 0, 0.1)}
     path = geojson(tmp_path / "any.geojson", outlines)
     if sound:
-        assert len(outlines_in(path)) == 3
+        assert len(read_drawing(path)) == 3
     else:
         with pytest.raises(af.InvalidInput, match=f"typically {size:.3g} m large: give the unit"):
-            outlines_in(path)
+            read_drawing(path)
 
 
 @pytest.mark.parametrize(
@@ -157,5 +157,5 @@ def test_a_block_is_between_two_centimetres_and_twenty_metres_large(tmp_path, si
 def test_small_blocks_within_the_globe_may_be_in_degrees(tmp_path, place, said):
     path = geojson(tmp_path / "any.geojson", {"a": square(*place, 1e-5)})
     with pytest.raises(af.InvalidInput) as caught:
-        outlines_in(path)
+        read_drawing(path)
     assert ("degrees (CRS84)" in str(caught.value)) is said

@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.survey import outlines
-from archfem.masonry.survey.drawings import part_of, physical_surfaces
+from archfem.masonry.survey.drawings import infer_part, read_physical_surfaces
 
 gmsh = pytest.importorskip("gmsh")
 pytest.importorskip("meshio")
@@ -83,7 +83,7 @@ def test_a_model_on_that_mesh(tmp_path, curve):
 def test_a_surface_in_pieces_is_refused(tmp_path):
     path = own(tmp_path / "own.msh", apart=True)
     with pytest.raises(af.InvalidInput, match="'pier, stone 2' is in pieces or has a hole"):
-        physical_surfaces(path)
+        read_physical_surfaces(path)
 
 
 def test_a_mesh_of_another_structure_is_refused(tmp_path):
@@ -101,7 +101,7 @@ def test_a_mesh_of_another_structure_is_refused(tmp_path):
 
 def test_parts_by_the_names_of_blocks():
     names = ["north arch, voussoir 3", "voussoir 12", "left abutment", "3"]
-    assert [part_of(name) for name in names] == ["north arch", "voussoir", "left abutment", ""]
+    assert [infer_part(name) for name in names] == ["north arch", "voussoir", "left abutment", ""]
 
 
 def test_edges_of_a_mesh_follow_an_arc(tmp_path):
@@ -129,6 +129,6 @@ def test_edges_of_a_mesh_follow_an_arc(tmp_path):
 def test_a_joint_has_the_name_of_a_curve_that_lies_on_it(stack, monkeypatch, ends, off, named):
     """Told by the middles of its edges: all between the joint's ends, and none beside it."""
     middles = np.array([[x, 1.0 + off] for x in ends])
-    monkeypatch.setattr(outlines, "physical_curves", lambda path, factor: [("mine", middles)])
-    found = outlines._named_by_curves(stack, Path("any.msh"), None)
+    monkeypatch.setattr(outlines, "read_physical_curves", lambda path, factor: [("mine", middles)])
+    found = outlines._name_joints(stack, Path("any.msh"), None)
     assert [joint.name == "mine" for joint in found.joints] == [False, named]

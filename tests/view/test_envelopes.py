@@ -25,7 +25,7 @@ def test_envelope_shows_extremes_faces_and_dead_load(run):
 def test_envelopes_of_runs_have_their_own_colours(run):
     figure = draw_envelope({"one": run, "other": run})
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["one", "other", "came apart"]
+    assert names == ["one", "other", "opened"]
     lines = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
     assert lines["one"] != lines["other"]
 

@@ -8,7 +8,7 @@ from glued import glued
 from pictures import history
 
 import archfem as af
-from archfem.view.histories import draw_joint, draw_joints, telling_joints
+from archfem.view.histories import draw_joint, draw_joints, most_stressed_joints
 
 
 def units(axes):
@@ -105,8 +105,8 @@ def test_joints_that_tell_most_are_no_twins(ring):
     found[3:8, 13, 1] = 0.7e4
     found[3:6, 9, 1] = 0.7e4
     dataset = af.joints.joint_dataset(ring, found, time)
-    assert telling_joints(af.History(dataset, ring)) == [4, 9]
-    assert telling_joints(af.History(dataset)) == [4, 13]
+    assert most_stressed_joints(af.History(dataset, ring)) == [4, 9]
+    assert most_stressed_joints(af.History(dataset)) == [4, 13]
 
 
 def test_friction_beyond_the_axis_is_told(ring):

@@ -5,7 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.motion.matching import Match
-from archfem.view.motions import PERIODS, draw_motion, draw_spectra, draw_suite
+from archfem.view.motions import SPECTRUM_PERIODS, draw_motion, draw_spectra, draw_suite
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_spectra_show_horizontal_and_vertical(shaking):
     level, upright = figure.get_axes()
     assert len(level.get_lines()) == 2
     assert len(upright.get_lines()) == 1
-    expected = af.response_spectrum(shaking, PERIODS) / af.units.STANDARD_GRAVITY
+    expected = af.response_spectrum(shaking, SPECTRUM_PERIODS) / af.units.STANDARD_GRAVITY
     assert level.get_lines()[0].get_ydata() == pytest.approx(expected)
     with pytest.raises(af.InvalidInput, match="no motion"):
         draw_spectra([])
@@ -41,8 +41,8 @@ def test_suite_spectra_show_mean_and_target(shaking):
     level, upright = draw_suite(suite, target).get_axes()
     first, _, mean, aim = (line.get_ydata() for line in level.get_lines())
     assert mean == pytest.approx(2.0 * first)
-    assert aim == pytest.approx(target.horizontal(PERIODS))
-    assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(PERIODS))
+    assert aim == pytest.approx(target.horizontal(SPECTRUM_PERIODS))
+    assert upright.get_lines()[-1].get_ydata() == pytest.approx(target.vertical(SPECTRUM_PERIODS))
 
 
 def test_target_is_drawn_where_it_is_defined(shaking):

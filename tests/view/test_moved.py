@@ -5,7 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.view.joint_marks import joint_marks
-from archfem.view.positions import FallingBlocks, turned
+from archfem.view.positions import FallingBlocks, rotate
 
 
 def placed(structure, number, points, pose):
@@ -21,10 +21,10 @@ def test_ends_of_a_joint_lie_between_the_faces_wherever_they_are(column):
     joint = structure.joints[1]
     pivot = np.array(structure.blocks[1].centroid)
     q = np.zeros(column.size)
-    along = turned(np.array(joint.tangent), angle) * slip
+    along = rotate(np.array(joint.tangent), angle) * slip
     for number, shift in ((1, np.zeros(2)), (2, along)):
         centre = np.array(structure.blocks[number].centroid)
-        q[3 * number - 3 : 3 * number - 1] = pivot + turned(centre - pivot, angle) - centre + shift
+        q[3 * number - 3 : 3 * number - 1] = pivot + rotate(centre - pivot, angle) - centre + shift
         q[3 * number - 1] = angle
     ends = structure.ends + column.observer().joint_ends(q)
     lower, higher = (
@@ -42,7 +42,7 @@ def test_ends_of_a_hinge_are_those_of_both_faces(column):
     corner = structure.ends[joint, 1]
     centre = np.array(structure.blocks[3].centroid)
     q = np.zeros(column.size)
-    q[6:8], q[8] = corner + turned(centre - corner, angle) - centre, angle
+    q[6:8], q[8] = corner + rotate(centre - corner, angle) - centre, angle
     ends = structure.ends + column.observer().joint_ends(q)
     np.testing.assert_allclose(ends[joint, 1], corner, atol=1e-12)
     far = placed(structure, 3, structure.ends[joint, 0], q[6:9])

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import archfem as af
-from archfem.view.statics import _apart, _runs, draw_pushover
+from archfem.view.statics import _merge_close_discs, _merge_close_limits, draw_pushover
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 MODEL = af.build(RING, fidelity="rigid", quadrature="lobatto")
@@ -58,11 +58,13 @@ def test_one_to_six_curves_fit_a_picture(push):
 
 
 def test_limits_and_discs_that_are_near_share_a_label():
-    assert _apart({"paper": 0.46, "limit": 0.457, "far": 0.1}, 0.5) == {
+    assert _merge_close_limits({"paper": 0.46, "limit": 0.457, "far": 0.1}, 0.5) == {
         "far: 0.1": 0.1,
         "limit: 0.457, paper: 0.46": 0.46,
     }
     axes = Figure().subplots()
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 1.0))
-    runs = _runs([(1.0, 0.4), (20.0, 0.5), (21.0, 0.5), (23.0, 0.5), (60.0, 0.6)], axes)
+    runs = _merge_close_discs(
+        [(1.0, 0.4), (20.0, 0.5), (21.0, 0.5), (23.0, 0.5), (60.0, 0.6)], axes
+    )
     assert [run[:2] for run in runs] == [(1, 1), (2, 4), (5, 5)]

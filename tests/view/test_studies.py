@@ -28,8 +28,8 @@ def test_medians_are_marks_and_what_was_not_reached_is_an_arrow():
 
 def test_the_level_of_the_reduced_motions_is_named_where_it_is_another():
     for reduction, named in (
-        (1.0, {"whole motions": 1.0}),
-        (4.0, {"whole motions": 1.0, "1 / R, R = 4": 0.25}),
+        (1.0, {"unscaled": 1.0}),
+        (4.0, {"unscaled": 1.0, "1 / R, R = 4": 0.25}),
     ):
         axes = draw_study(FOUND, reduction).axes[0]
         assert {text.get_text(): text.xy[0] for text in axes.texts} == named

@@ -7,7 +7,7 @@ import matplotlib
 import pytest
 
 import archfem as af
-from archfem.view.style import Page, canvas, entitle, save
+from archfem.view.style import Page, save, set_title, structure_figure
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -24,7 +24,7 @@ def test_an_unknown_suffix_is_refused(ring, tmp_path):
 
 
 def test_a_title_is_words_and_no_formula(tmp_path):
-    figure = canvas(af.column(breadth=1.0, heights=[1.0]))
+    figure = structure_figure(af.column(breadth=1.0, heights=[1.0]))
     figure.subplots().set_title("$$ a bridge worth $5 {")
     assert save(figure, tmp_path / "dear.png").stat().st_size > 1000
 
@@ -50,9 +50,9 @@ def test_powers_of_ten_at_an_axis_stay_powers(tmp_path):
 
 
 def test_long_titles_take_several_lines():
-    page = canvas(af.column(breadth=0.2, heights=[1.0, 1.0]))
+    page = structure_figure(af.column(breadth=0.2, heights=[1.0, 1.0]))
     axes = page.subplots()
-    entitle(axes, "a column with a title that is by far too long for a page as slim as its own")
+    set_title(axes, "a column with a title that is by far too long for a page as slim as its own")
     assert axes.get_title().count("\n") >= 1
     page.draw_without_rendering()
     wide = axes.title.get_window_extent().width

@@ -17,7 +17,7 @@ from archfem.models.model import Model
 from archfem.motion.motion import Motion
 from archfem.view.pages.document import FigureBlock, TextBlock
 from archfem.view.pages.player import Player
-from archfem.view.pages.player_data import LARGEST, Scene
+from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def build_player(
     """Return the player of a run; blocks stand still if it has no recorded displacements."""
     model, reason = _rebuild_model(case, run)
     # Players of one page share its size, but each stays legible.
-    max_bytes = max(LARGEST // players, min_bytes)
+    max_bytes = max(MAX_PACKED_BYTES // players, min_bytes)
     return Player(Scene(case.structure, run, model, title, max_bytes, reason))
 
 

@@ -28,7 +28,7 @@ from archfem.view.histories import draw_envelope
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure
-from archfem.view.style import LINES
+from archfem.view.style import LINE_COLOURS
 
 # Kinematic assumption on blocks of each fidelity.
 BLOCK_ASSUMPTIONS = {
@@ -404,7 +404,7 @@ def _build_suite_response(data: ReportData) -> list[Any]:
         Grid([head[0], *head[1:8]], [[row[0], *row[1:8]] for row in rows], caption),
         Grid([], mechanisms, "Mechanism and end of each run"),
     ]
-    pairs, per_figure = list(data.runs.items()), len(LINES)  # as many runs as line styles
+    pairs, per_figure = list(data.runs.items()), len(LINE_COLOURS)  # as many runs as line styles
     for first in range(0, len(pairs), per_figure):
         blocks.append(_build_envelope(dict(pairs[first : first + per_figure]), data))
     return blocks

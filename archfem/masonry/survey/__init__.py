@@ -1,7 +1,7 @@
 """Structures from surveyed outlines in GeoJSON, DXF or gmsh files.
 
-circle_fit  circle through a surveyed ring
-drawings    GeoJSON, DXF and tagged .msh outlines
-outlines    Structure from surveyed outlines
-snapping    closing gaps between outlines
+circle_fit  least-squares circle through surveyed points
+drawings    outlines in GeoJSON, DXF and tagged gmsh files
+outlines    blocks and structure from surveyed outlines
+snapping    closing of small gaps between outlines
 """

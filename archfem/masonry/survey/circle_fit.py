@@ -1,4 +1,4 @@
-"""The circle that comes nearest to surveyed points, as of an intrados."""
+"""Least-squares circle through surveyed points, such as those of an intrados."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,21 +10,15 @@ from archfem._validation import check_numbers, check_sequence
 from archfem.errors import InvalidInput
 from archfem.masonry.block import Point
 
-# Step relative to the radius below which the search for the circle has ended
-STEP_TOLERANCE = 1e-12
-
-# Steps within which it ends, or is given up
-STEPS = 100
-
 
 @dataclass(frozen=True)
 class FittedCircle:
-    """A circle through the midst of points.
+    """A circle fitted to points.
 
     Attributes:
-        centre: of the circle [m].
-        radius: of the circle [m].
-        distances: of each point from the circle, outside positive (n,) [m].
+        centre: coordinates of the centre (x, y) [m].
+        radius: radius [m].
+        distances: signed distances of the points from the circle, positive outside (n,) [m].
         embrace: angle at the centre between the first and the last point [degrees].
     """
 
@@ -35,28 +29,28 @@ class FittedCircle:
 
     @property
     def rms(self) -> float:
-        """Root of the mean square distance of a point [m]."""
+        """Root mean square distance of the points from the circle [m]."""
         return float(np.sqrt(np.mean(self.distances**2)))
 
     @property
     def span(self) -> float:
-        """Chord of the embrace: of an intrados the clear span [m]."""
+        """Chord over the embrace, which is the clear span of an intrados [m]."""
         return 2.0 * self.radius * float(np.sin(np.radians(self.embrace) / 2.0))
 
     @property
     def rise(self) -> float:
-        """Rise over that chord [m]."""
+        """Rise of the arc over its chord [m]."""
         return self.radius * (1.0 - float(np.cos(np.radians(self.embrace) / 2.0)))
 
 
 def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
-    """Return the circle with the least sum of squared distances of surveyed points.
+    """Fit the circle with the least sum of squared distances to surveyed points.
 
-    Distances are measured at right angles to the circle. The search starts from the circle of least
-    algebraic error and goes by Gauss's and Newton's steps.
+    Distances are normal to the circle. The Gauss-Newton iteration starts from the circle of least
+    algebraic error.
 
     Args:
-        points: along an arc, from one springing to the other (n, 2) [m].
+        points: points along an arc, from one springing to the other (n, 2) [m].
 
     Raises:
         InvalidInput: there are fewer than three points, or they lie on a line.
@@ -70,30 +64,32 @@ def fitted_circle(points: Sequence[Point] | Array) -> FittedCircle:
         for k, point in enumerate(check_sequence(points, "points"))
     ]
     places = np.array(rows, dtype=float).reshape(-1, 2)
-    middle = places.mean(axis=0) if len(places) else np.zeros(2)
-    about = places - middle
-    extent = float(np.abs(about).max(initial=0.0))
-    if len(places) < 3 or np.linalg.svd(about, compute_uv=False)[1] <= 1e-6 * extent:
+    mean = places.mean(axis=0) if len(places) else np.zeros(2)
+    centred = places - mean
+    extent = float(np.abs(centred).max(initial=0.0))
+    # the smaller singular value vanishes for points on a line
+    if len(places) < 3 or np.linalg.svd(centred, compute_uv=False)[1] <= 1e-6 * extent:
         raise InvalidInput(f"{len(places)} points on a line, or fewer than three, make no circle")
-    terms = np.column_stack([2.0 * about, np.ones(len(about))])
-    x, y, rest = np.linalg.lstsq(terms, np.sum(about**2, axis=1), rcond=None)[0]
-    found = np.array([x, y, np.sqrt(rest + x * x + y * y)])
-    for _ in range(STEPS):
-        away = about - found[:2]
-        far = np.linalg.norm(away, axis=1)
-        slopes = np.column_stack([-away / far[:, None], -np.ones(len(far))])
-        step = np.linalg.lstsq(slopes, found[2] - far, rcond=None)[0]
-        found = found + step
-        if np.abs(step).max() <= STEP_TOLERANCE * found[2]:
+    # algebraic fit: x² + y² = 2 x_c x + 2 y_c y + (r² - x_c² - y_c²) is linear in its coefficients
+    terms = np.column_stack([2.0 * centred, np.ones(len(centred))])
+    x, y, constant = np.linalg.lstsq(terms, np.sum(centred**2, axis=1), rcond=None)[0]
+    circle = np.array([x, y, np.sqrt(constant + x * x + y * y)])
+    for _ in range(100):
+        offsets = centred - circle[:2]
+        radii = np.linalg.norm(offsets, axis=1)
+        jacobian = np.column_stack([-offsets / radii[:, None], -np.ones(len(radii))])
+        step = np.linalg.lstsq(jacobian, circle[2] - radii, rcond=None)[0]
+        circle = circle + step
+        if np.abs(step).max() <= 1e-12 * circle[2]:  # converged to round-off
             break
     else:
         raise InvalidInput("no circle comes nearest to these points: they hardly bend")
-    away = about - found[:2]
-    turned = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
-    centre = middle + found[:2]
+    offsets = centred - circle[:2]
+    angles = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
+    centre = mean + circle[:2]
     return FittedCircle(
         (float(centre[0]), float(centre[1])),
-        float(found[2]),
-        np.linalg.norm(away, axis=1) - found[2],
-        float(np.degrees(abs(turned[-1] - turned[0]))),
+        float(circle[2]),
+        np.linalg.norm(offsets, axis=1) - circle[2],
+        float(np.degrees(abs(angles[-1] - angles[0]))),
     )

@@ -1,4 +1,4 @@
-"""A user's own polygons: the outlines of a survey as blocks."""
+"""Structures from the surveyed outlines of their blocks."""
 
 import json
 import logging
@@ -23,29 +23,26 @@ from archfem.masonry.materials import (
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
-from archfem.masonry.survey.drawings import Outline, outlines_in, physical_curves
-from archfem.masonry.survey.snapping import NEARLY, snapped
+from archfem.masonry.survey.drawings import Outline, read_drawing, read_physical_curves
+from archfem.masonry.survey.snapping import AMBIGUOUS_GAP_RATIO, close_gaps
 from archfem.units import G, in_unit
 
-# A vertex that turns by more than the one is a corner, by less than the other none
-SHARP, FLAT = np.radians(45.0), np.radians(10.0)
-
-# How the presets of two materials touch
-STONE_AND_SOIL = {"stone/backfill": SOIL_TO_STONE}
+# Contact of blocks of two preset materials
+DEFAULT_CONTACTS = {"stone/backfill": SOIL_TO_STONE}
 
 logger = logging.getLogger("archfem")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layer:
-    """What the outlines on one layer of a drawing are (GeoJSON: of one part).
+    """Properties of the blocks on one layer of a drawing (in GeoJSON, of one part).
 
     Attributes:
-        part: of the structure; by default the layer's own name.
-        role: of the part, "ring", "pier" or "other"; by default as its name says (`infer_role`).
-        material: its name; by default that of the whole survey.
-        fixed: whether they are abutments or foundations.
-        ignore: whether they are none at all.
+        part: part of the structure; by default the name of the layer.
+        role: role of the part, "ring", "pier" or "other"; by default inferred from its name.
+        material: name of the material; by default that of the whole survey.
+        fixed: whether the blocks are abutments or foundations.
+        ignore: whether the layer contains no blocks.
     """
 
     part: str | None = None
@@ -57,11 +54,11 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Blocks of a survey, touching exactly.
+    """Blocks of a survey whose outlines touch exactly.
 
     Attributes:
-        blocks: in the order of the file.
-        moved: largest movement of a vertex that this took [m].
+        blocks: blocks in the order of the file.
+        moved: largest displacement of a vertex by snapping [m].
     """
 
     blocks: tuple[Block, ...]
@@ -78,38 +75,38 @@ def read_outlines(
     material: Material = STONE,
     materials: Mapping[str, Material] = MATERIALS,
 ) -> Survey:
-    """Return the blocks that a drawing outlines, made to touch.
+    """Read the outlines of a drawing as blocks, and close small gaps between them.
 
-    Four-sided blocks get corners, so that their meshes are structured; through the thickness lie
-    the sides across a ring or a pier, otherwise the shorter ones.
+    Four-sided blocks get corners, so that their meshes are structured. The first and third side
+    are those along a ring or pier, otherwise the longer ones.
 
     Args:
-        path: a GeoJSON or DXF file or a mesh of gmsh (see `outlines_in`), y upwards.
-        unit: of its coordinates; by default what a DXF file says, metres in GeoJSON.
+        path: GeoJSON file, DXF file or gmsh mesh of an elevation, y upwards.
+        unit: unit of the coordinates; by default that of the DXF file, and metres otherwise.
         snap: vertices and edges nearer than this are made to touch [m].
-        layers: what is on the layers of the drawing. Where they are given, all must be. What a
-            GeoJSON feature says itself of role, material and fixed comes first.
-        material: of blocks of which neither feature nor layer says one.
-        materials: by name.
+        layers: properties of all layers of the drawing by name. Role, material and fixed of a
+            GeoJSON feature take precedence.
+        material: material of blocks for which neither feature nor layer names one.
+        materials: materials by name.
 
     Raises:
-        InvalidInput: the file is none, or says what is not known.
+        InvalidInput: the file is not a drawing, or names an unknown layer or material.
         InvalidStructure: the outlines overlap, leave gaps or do not bound blocks; or roles are
-            not known or contradict one another.
+            unknown or contradict one another.
     """
     known = layers or {}
     ignored = [name for name, layer in known.items() if layer.ignore]
-    outlines = outlines_in(path, unit, ignored)
+    outlines = read_drawing(path, unit, ignored)
     if layers is not None:
         _check_layers(outlines, layers, path)
     try:
         names = [outline.name for outline in outlines]
-        points, moved = snapped([outline.points for outline in outlines], names, snap)
+        points, moved = close_gaps([outline.points for outline in outlines], names, snap)
         blocks = [
-            _block(outline, own, known.get(outline.layer, Layer()), material, materials)
-            for outline, own in zip(outlines, points, strict=True)
+            _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
+            for outline, polygon in zip(outlines, points, strict=True)
         ]
-        survey = Survey(_cornered(assign_roles(blocks), snap), moved)
+        survey = Survey(_assign_corners(assign_roles(blocks), snap), moved)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
     logger.info("%s: vertices moved by up to %.3g mm", path, 1e3 * moved)
@@ -125,27 +122,27 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     material: Material = STONE,
     materials: Mapping[str, Material] = MATERIALS,
     contact: Contact = STONE_TO_STONE,
-    contacts: Mapping[str, Contact] = STONE_AND_SOIL,
+    contacts: Mapping[str, Contact] = DEFAULT_CONTACTS,
     width: float = 1.0,
     gravity: float = G,
 ) -> Structure:
-    """Return a structure of the outlines in a drawing.
+    """Assemble a structure from the outlines in a drawing.
 
     Args:
-        path: as for `read_outlines`.
-        unit: likewise.
-        snap: likewise [m].
-        layers: likewise.
-        material: likewise.
-        materials: likewise.
-        contact: of blocks of one material.
-        contacts: of blocks of two materials, "stone/backfill".
-        width: out of plane [m].
+        path: drawing, as for `read_outlines`.
+        unit: unit of the coordinates, as for `read_outlines`.
+        snap: vertices and edges nearer than this are made to touch [m].
+        layers: properties of all layers by name, as for `read_outlines`.
+        material: material of blocks for which neither feature nor layer names one.
+        materials: materials by name.
+        contact: contact between blocks of one material.
+        contacts: contacts between blocks of two materials by both names, as "stone/backfill".
+        width: width out of plane [m].
         gravity: acceleration of gravity [m/s²].
 
     Raises:
-        InvalidInput: as `read_outlines`; or nothing is said of how two materials touch.
-        InvalidStructure: likewise; or the blocks do not hang together.
+        InvalidInput: as `read_outlines`; or the contact of two materials is missing.
+        InvalidStructure: as `read_outlines`; or the blocks are not connected.
     """
     survey = read_outlines(
         path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
@@ -157,15 +154,15 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
         gravity=gravity,
         name=Path(path).stem,
     )
-    return (
-        _named_by_curves(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
-    )
+    if Path(path).suffix == ".msh":
+        return _name_joints(structure, Path(path), unit)
+    return structure
 
 
-def _named_by_curves(structure: Structure, path: Path, unit: str | None) -> Structure:
-    """The same with each joint named as the physical curve along it, if there is one."""
+def _name_joints(structure: Structure, path: Path, unit: str | None) -> Structure:
+    """Return the structure with each joint named after the physical curve along it, if any."""
     near, names = CONTACT_TOLERANCE * structure.size, dict[int, str]()
-    for name, middles in physical_curves(path, in_unit(f"1 {unit or 'm'}", "m", "unit")):
+    for name, middles in read_physical_curves(path, in_unit(f"1 {unit or 'm'}", "m", "unit")):
         away = middles[None] - structure.middles[:, None]
         along = np.abs(np.einsum("jpk,jk->jp", away, structure.tangents))
         beside = np.abs(np.einsum("jpk,jk->jp", away, structure.normals))
@@ -179,27 +176,27 @@ def _named_by_curves(structure: Structure, path: Path, unit: str | None) -> Stru
 
 
 def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path) -> None:
-    """Refuse layers of the file that are not told, and layers told that are not in the file."""
+    """Refuse layers of the file without properties, and properties of missing layers."""
     there = {outline.layer for outline in outlines}
     if strange := sorted(there - set(layers)):
         raise InvalidInput(
             f"{path}: of layer '{strange[0]}' nothing is said: name its part, or ignore it"
         )
-    told = {name for name, layer in layers.items() if not layer.ignore}
-    if missing := sorted(told - there):
+    expected = {name for name, layer in layers.items() if not layer.ignore}
+    if missing := sorted(expected - there):
         raise InvalidInput(
             f"{path} has no outlines on layer '{missing[0]}': its layers are {sorted(there)}"
         )
 
 
-def _block(
+def _make_block(
     outline: Outline,
     points: Array,
     layer: Layer,
     material: Material,
     materials: Mapping[str, Material],
 ) -> Block:
-    """A block with what its outline and its layer say."""
+    """Make a block with the properties of its outline, else of its layer."""
     name = outline.material or layer.material
     if name is not None and name not in materials:
         raise InvalidInput(
@@ -216,37 +213,39 @@ def _block(
     )
 
 
-def _cornered(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
-    """Blocks with corners where they are four-sided; none may only just touch."""
+def _assign_corners(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
+    """Return the blocks with corners where four-sided; refuse contacts of ambiguous length."""
     touches = touching(blocks)
     for a, b, line in touches:
         length = float(np.linalg.norm(line[1] - line[0]))
-        if length <= NEARLY * snap:
+        if length <= AMBIGUOUS_GAP_RATIO * snap:
             raise InvalidStructure(
                 f"'{blocks[a].name}' and '{blocks[b].name}' touch along {1e3 * length:.3g} mm "
                 f"only at ({line[0, 0]:.3f}, {line[0, 1]:.3f}): raise snap = {snap:.3g} m above "
                 "that, or correct the drawing"
             )
-    ways = find_directions(blocks, touches)
-    return tuple(replace(each, corners=_corners(each, ways.get(each.part))) for each in blocks)
+    directions = find_directions(blocks, touches)
+    return tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in blocks)
 
 
-def _corners(block: Block, way: Direction | None) -> tuple[int, int, int, int] | None:
-    """Four clear corners, the first and third side along the row or else the longer, or None."""
+def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, int, int] | None:
+    """Return four clear corners, the first and third side along the ring or else the longer."""
     steps = np.roll(block.points, -1, axis=0) - block.points
     before = np.roll(steps, 1, axis=0)
     turns = np.arctan2(
         before[:, 0] * steps[:, 1] - before[:, 1] * steps[:, 0], np.sum(before * steps, axis=1)
     )
-    found = np.flatnonzero(turns > SHARP)
-    if len(found) != 4 or np.any(np.abs(np.delete(turns, found)) > FLAT):
+    # the outline turns by more than 45 degrees at four corners, elsewhere by at most 10 degrees
+    found = np.flatnonzero(turns > np.radians(45.0))
+    if len(found) != 4 or np.any(np.abs(np.delete(turns, found)) > np.radians(10.0)):
         return None
     corners = block.points[found]
     sides = np.roll(corners, -1, axis=0) - corners
-    if way is None:
+    if direction is None:
         measure = np.linalg.norm(sides, axis=1)
     else:
-        measure = -np.abs(sides @ way.outward(block.centroid)) / np.linalg.norm(sides, axis=1)
+        measure = -np.abs(sides @ direction.outward(block.centroid)) / np.linalg.norm(sides, axis=1)
+    # of the two pairs of opposite sides, that of larger measure lies first
     first = int(measure[1] + measure[3] > measure[0] + measure[2])
     a, b, c, d = (int(n) for n in np.roll(found, -first))
     return a, b, c, d
@@ -258,13 +257,13 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
     Arcs become chords. Coordinates are metres in the plane, not degrees.
 
     Args:
-        structure: whose blocks are written, with their parts, roles and names of materials.
-        path: of the file.
+        structure: structure whose blocks are written with part, role and name of the material.
+        path: path of the file.
     """
     features = []
     for block in structure.blocks:
         ring = block.drawn().tolist()
-        told = {
+        properties = {
             "name": block.name,
             "part": block.part,
             "role": block.role,
@@ -272,7 +271,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
             "fixed": block.fixed,
         }
         geometry = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
-        features.append({"type": "Feature", "properties": told, "geometry": geometry})
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
     text = f'{{"type": "FeatureCollection", "features": [\n{lines}\n]}}\n'
     Path(path).write_text(text, encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Outlines that nearly touch, made to touch: surveys never close exactly.
+"""Closing of small gaps between surveyed outlines.
 
-Vertices nearer to one another than a tolerance become one. A vertex that near to another outline's
-edge is put onto it, and a joint between two blocks that bends no more than that is made straight.
-What then still overlaps, or nearly touches, is an error: it is not clear what was meant.
+Vertices nearer to one another than the tolerance `snap` are merged. A vertex within `snap` of an
+edge of another outline is moved onto it. A joint between two blocks that deviates from a line by
+at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguous, hence errors.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,80 +20,84 @@ from archfem.errors import InvalidStructure
 from archfem.masonry.block import check_overlaps, check_simple
 from archfem.masonry.structure import CONTACT_TOLERANCE
 
-# Gaps up to so many times the tolerance are taken for faults of the survey
-NEARLY = 5.0
+# Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
+AMBIGUOUS_GAP_RATIO = 5.0
 
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
 
 
-def snapped(
+def close_gaps(
     outlines: Sequence[Array], names: Sequence[str], snap: float
 ) -> tuple[list[Array], float]:
-    """Make outlines touch that nearly do."""
+    """Return the outlines without gaps below `snap`, and the largest vertex displacement [m]."""
     if not snap > 0.0:
         raise InvalidStructure(f"snap {snap!r} m is not above 0: give e.g. 0.001")
     for name, points in zip(names, outlines, strict=True):
         check_simple(points, name)
-    turned = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
-    given = np.concatenate(turned)
-    places, number = _merged(turned, snap)
-    parts = np.split(number, np.cumsum([len(points) for points in turned])[:-1])
+    # all outlines anticlockwise
+    oriented = [points if _area(points) > 0.0 else points[::-1] for points in outlines]
+    given = np.concatenate(oriented)
+    places, number = _merge_vertices(oriented, snap)
+    parts = np.split(number, np.cumsum([len(points) for points in oriented])[:-1])
+    # merged vertices repeat, inside a boundary and across its end
     boundaries = [[int(n) for n, _ in groupby(part)] for part in parts]
     boundaries = [
         boundary[:-1] if boundary[0] == boundary[-1] else boundary for boundary in boundaries
     ]
-    ties = _ties(boundaries, places, snap)
-    ties |= _bends(boundaries, places, ties, snap)
-    places = _settled(places, ties)
+    ties = _find_ties(boundaries, places, snap)
+    ties |= _find_bends(boundaries, places, ties, snap)
+    places = _place_tied(places, ties)
     moved = np.linalg.norm(places[number] - given, axis=1)
-    owners = [name for name, points in zip(names, turned, strict=True) for _ in points]
+    owners = [name for name, points in zip(names, oriented, strict=True) for _ in points]
     _check_moved(moved, given, owners, snap)
     found = [places[boundary] for boundary in boundaries]
     for name, points, boundary in zip(names, found, boundaries, strict=True):
         if len(boundary) < 3:
             raise InvalidStructure(f"'{name}' is no larger than snap {snap:.3g} m: lower snap")
         check_simple(points, name)
-    check_overlaps(found, names, NEARLY * snap)
+    check_overlaps(found, names, AMBIGUOUS_GAP_RATIO * snap)
     _check_gaps(places, boundaries, names, snap)
     return found, float(moved.max())
 
 
 def _area(points: Array) -> float:
-    """Area of a polygon, positive anticlockwise."""
+    """Return the area of a polygon, positive if anticlockwise [m²]."""
     x, y = (points - points[0]).T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
-    """Number of a boundary, and the two points of each edge of it."""
+    """Yield the boundary number and the two points of every edge."""
     for number, boundary in enumerate(boundaries):
         for a, b in zip(boundary, boundary[1:] + boundary[:1], strict=True):
             yield number, a, b
 
 
-def _beside(places: Array, a: int, b: int) -> tuple[Array, Array, float]:
-    """How far all places lie along and to the left of an edge, and its length."""
+def _project(places: Array, a: int, b: int) -> tuple[Array, Array, float]:
+    """Return coordinates of all places along and to the left of an edge, and its length [m]."""
     step = places[b] - places[a]
     length = float(np.linalg.norm(step))
     x, y = (places - places[a]).T
     return (x * step[0] + y * step[1]) / length, (step[0] * y - step[1] * x) / length, length
 
 
-def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
-    """Places where vertices are made one (n, 2), and the number of each vertex's place."""
+def _merge_vertices(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
+    """Return merged vertices, the places (n, 2) [m], and the place number of each vertex."""
     points = np.concatenate(outlines)
     pairs = [cKDTree(points).query_pairs(snap, output_type="ndarray")]
     starts = np.cumsum([0, *map(len, outlines)])
     owner = np.repeat(np.arange(len(outlines)), [len(points) for points in outlines])
     vertices = [list(range(a, b)) for a, b in pairwise(starts)]
     for number, a, b in _edges(vertices):
-        along, off, length = _beside(points, a, b)
+        along, off, length = _project(points, a, b)
         near = (np.abs(off) <= snap) & (owner != number)
+        # a vertex beside the end of an edge merges with that end, else it would make a sliver
         for end, away in ((a, along), (b, length - along)):
             others = np.flatnonzero(near & (away >= 0.0) & (away <= snap))
             pairs.append(np.column_stack([others, np.full(len(others), end)]))
     one, two = np.concatenate(pairs).T
+    # chains of near vertices merge into their mean
     graph = sparse.coo_matrix((np.ones(len(one)), (one, two)), (len(points), len(points)))
     count, number = connected_components(graph, directed=False)
     sums = np.array([np.bincount(number, weights=x, minlength=count) for x in points.T])
@@ -101,11 +105,11 @@ def _merged(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]:
     return places, number
 
 
-def _ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, Edge]:
-    """Places near the edge of an outline they do not belong to, and the nearest such edge."""
+def _find_ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, Edge]:
+    """Return the places near edges of other outlines, each with its nearest such edge."""
     best: dict[int, tuple[float, Edge]] = {}
     for number, a, b in _edges(boundaries):
-        along, off, length = _beside(places, a, b)
+        along, off, length = _project(places, a, b)
         inside = (np.abs(off) <= snap) & (along > 0.0) & (along < length)
         for place in set(np.flatnonzero(inside).tolist()) - set(boundaries[number]):
             found = (float(abs(off[place])), (a, b))
@@ -113,17 +117,19 @@ def _ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, Edge]
     return {place: edge for place, (_, edge) in best.items()}
 
 
-def _bends(
+def _find_bends(
     boundaries: Boundaries, places: Array, ties: dict[int, Edge], snap: float
 ) -> dict[int, Edge]:
-    """Places in the middle of a joint that is straight but for the tolerance, and its ends."""
+    """Return the inner places of joints straight to the tolerance, each with the joint ends."""
     on: dict[frozenset[int], list[int]] = {}
     for place, edge in ties.items():
         on.setdefault(frozenset(edge), []).append(place)
+    # boundaries with the places tied to their edges
     whole: Boundaries = [[] for _ in boundaries]
     for number, a, b in _edges(boundaries):
-        along = _beside(places, a, b)[0]
+        along = _project(places, a, b)[0]
         whole[number] += [a, *sorted(on.get(frozenset((a, b)), []), key=lambda n: along[n])]
+    # a joint is a run of edges that one other boundary has in the opposite direction
     across = {(a, b): number for number, a, b in _edges(whole)}
     found: dict[int, Edge] = {}
     for boundary in whole:
@@ -131,6 +137,7 @@ def _bends(
             across.get((b, a), -1)
             for a, b in zip(boundary, boundary[1:] + boundary[:1], strict=True)
         ]
+        # start where the neighbour changes, so that no joint is split by the start of the list
         turn = next((k for k in range(len(boundary)) if beyond[k] != beyond[k - 1]), 0)
         nodes, beyond = boundary[turn:] + boundary[:turn], beyond[turn:] + beyond[:turn]
         for other, run in groupby(range(len(boundary)), beyond.__getitem__):
@@ -138,18 +145,19 @@ def _bends(
             ends = nodes[which[0]], nodes[(which[-1] + 1) % len(nodes)]
             middle = [nodes[k] for k in which[1:]]
             if other >= 0 and middle and ends[0] != ends[1]:
-                _, off, _ = _beside(places, *ends)
+                _, off, _ = _project(places, *ends)
                 if np.abs(off[middle]).max() <= snap:
                     found |= {place: ends for place in middle if place not in ties}
     return found
 
 
-def _settled(places: Array, ties: dict[int, Edge]) -> Array:
-    """Places with those tied put onto their edges, whose ends may be tied to others in turn."""
+def _place_tied(places: Array, ties: dict[int, Edge]) -> Array:
+    """Move tied places onto their edges, whose ends may be tied in turn."""
+    # rows of tied places: x = (1 - s) x_a + s x_b; one solve satisfies chains of ties
     hold = sparse.identity(len(places), format="lil")
     free = places.copy()
     for place, (a, b) in ties.items():
-        along, _, length = _beside(places, a, b)
+        along, _, length = _project(places, a, b)
         share = along[place] / length
         hold[place, a], hold[place, b] = share - 1.0, -share
         free[place] = 0.0
@@ -157,7 +165,7 @@ def _settled(places: Array, ties: dict[int, Edge]) -> Array:
 
 
 def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float) -> None:
-    """Refuse to move vertices by much more than the tolerance, in steps below it."""
+    """Refuse vertex displacements above twice the tolerance, which short steps may add up to."""
     worst = int(np.argmax(moved))
     if moved[worst] > 2.0 * snap:
         x, y = given[worst]
@@ -170,7 +178,7 @@ def _check_moved(moved: Array, given: Array, owners: Sequence[str], snap: float)
 
 
 def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], snap: float) -> None:
-    """Refuse blocks that nearly touch."""
+    """Refuse blocks with a narrow gap between them."""
     import shapely
 
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
@@ -183,12 +191,13 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     }
     found = []
     for number, a, b in _edges(boundaries):
-        along, off, length = _beside(places, a, b)
-        beside = (off < -near) & (off >= -NEARLY * snap)
+        along, off, length = _project(places, a, b)
+        beside = (off < -near) & (off >= -AMBIGUOUS_GAP_RATIO * snap)
         beside &= (along > -near) & (along < length + near)
         for place in set(np.flatnonzero(beside).tolist()) - set(boundaries[number]):
             foot = places[a] + along[place] / length * (places[b] - places[a])
             middle = shapely.Point(0.5 * (foot + places[place]))
+            # a gap filled by a third block is none
             if not len(tree.query(middle, predicate="within")):
                 found.append((float(-off[place]), number, place))
     if not found:
@@ -199,5 +208,5 @@ def _check_gaps(places: Array, boundaries: Boundaries, names: Sequence[str], sna
     raise InvalidStructure(
         f"'{names[first[place]]}' and '{names[number]}' are {1e3 * width:.3g} mm apart at "
         f"({x:.3f}, {y:.3f}){more}, just more than snap: raise snap = {snap:.3g} m above that if "
-        f"they touch; if not, draw a gap of more than {NEARLY * snap:.3g} m"
+        f"they touch; if not, draw a gap of more than {AMBIGUOUS_GAP_RATIO * snap:.3g} m"
     )

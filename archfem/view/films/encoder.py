@@ -1,4 +1,4 @@
-"""Films, written in one stroke."""
+"""Video files."""
 
 from collections.abc import Generator, Iterable
 from contextlib import closing
@@ -15,48 +15,44 @@ from archfem.errors import InvalidInput
 
 Image = NDArray[np.uint8]
 
-SUFFIXES = (".mp4", ".gif")
 
-# Of flat colours and thin lines: as small as slower presets make it, in less than half their time
-ENCODING = ["-preset", "veryfast", "-crf", "13", "-x264-params", "subme=1:weightp=0"]
-
-
-def write_film(path: Path, shots: Iterable[Image], fps: float) -> Path:
-    """Write a film; a killed one leaves the old file or none."""
+def write_film(path: Path, images: Iterable[Image], fps: float) -> Path:
+    """Write a film atomically: an interrupted one does not replace an older file."""
     write = _write_gif if path.suffix == ".gif" else _write_mp4
     with atomic_write(path) as draft:
-        write(draft, shots, fps)
+        write(draft, images, fps)
     return path
 
 
 def film_path(path: str | Path) -> Path:
-    """Return the file, if its suffix is one of a film."""
-    if Path(path).suffix not in SUFFIXES:
-        raise InvalidInput(f"{path} has suffix '{Path(path).suffix}': use one of {SUFFIXES}")
+    """Return the path of a film after a check of its suffix."""
+    suffixes = (".mp4", ".gif")
+    if Path(path).suffix not in suffixes:
+        raise InvalidInput(f"{path} has suffix '{Path(path).suffix}': use one of {suffixes}")
     return Path(path)
 
 
-def _write_gif(path: Path, shots: Iterable[Image], fps: float) -> None:
-    """Write a film that repeats itself for ever."""
+def _write_gif(path: Path, images: Iterable[Image], fps: float) -> None:
+    """Write a film that repeats for ever."""
     with closing(imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)) as film:
-        for shot in shots:
-            film.append_data(shot[..., :3])
+        for image in images:
+            film.append_data(image[..., :3])
 
 
-def _write_mp4(path: Path, shots: Iterable[Image], fps: float) -> None:
-    """Pipe pictures as they are to an encoder in a process of its own."""
+def _write_mp4(path: Path, images: Iterable[Image], fps: float) -> None:
+    """Pipe the raw images to an encoder process."""
     film = None
     try:
-        for shot in shots:
-            film = film or _encoder(path, shot.shape, fps)
-            film.send(np.ascontiguousarray(shot))
+        for image in images:
+            film = film or _start_encoder(path, image.shape, fps)
+            film.send(np.ascontiguousarray(image))
     finally:
         if film is not None:
             film.close()
 
 
-def _encoder(path: Path, shape: tuple[int, ...], fps: float) -> Generator[None, Any, None]:
-    """Start an encoder of pictures of a shape, to which they are sent."""
+def _start_encoder(path: Path, shape: tuple[int, ...], fps: float) -> Generator[None, Any, None]:
+    """Start an encoder for images of a shape."""
     encoder: Generator[None, Any, None] = write_frames(
         str(path),
         (shape[1], shape[0]),
@@ -65,7 +61,8 @@ def _encoder(path: Path, shape: tuple[int, ...], fps: float) -> Generator[None, 
         codec="libx264",
         quality=None,
         macro_block_size=2,
-        output_params=ENCODING,
+        # for flat colours and thin lines: files as small as by slower presets in half the time
+        output_params=["-preset", "veryfast", "-crf", "13", "-x264-params", "subme=1:weightp=0"],
     )
     encoder.send(None)
     return encoder

@@ -1,6 +1,7 @@
-"""What single pictures show: a model while its joints hold, its blocks once they are loose.
+"""Content of single frames of a film, and their timing.
 
-Which instants a film shows, and how fast: evenly, or in slow motion around what matters.
+Until blocks come loose, frames show the model and its joints, afterwards blocks alone. Frames are
+evenly spaced in time, or in slow motion around the decisive instant.
 """
 
 from collections.abc import Iterator, Sequence
@@ -8,141 +9,122 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.units import mm
-from archfem.view.films.settings import Setup, shade
-from archfem.view.joint_marks import NO_MARKS, TOLD, Marker, Marks, joint_marks
+from archfem.view.films.settings import Setup, colour_values
+from archfem.view.joint_marks import MARKED_QUANTITIES, Marker, Marks, joint_marks
 from archfem.view.positions import FallingBlocks
 
-NOWHERE = np.zeros((0, 2))
-
-# Flags of joints that fail, and what such joints are
-FAILING = {"hinge": "hinging", "slide": "sliding", "open": "open"}
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """What one picture shows."""
-
-    places: Array  # points of the cells, as drawn (m, 2) [m]
-    shades: Array  # what the blocks are coloured by, by point (m,) or by cell
-    time: float | None = None  # of the picture [s]; None where it is not known
-    words: Sequence[str] = ()  # how many joints fail, and how, or that blocks are loose
-    marks: Marks = NO_MARKS  # of the joints, as moved
-    # where hinges have been, as moved (n, 2) [m]
-    past: Array = field(default_factory=lambda: NOWHERE)
-    outlines: Sequence[Array] = ()  # of blocks as a mechanism moves them, each (k, 2) [m]
-
-
-def still(setup: Setup, q: Array, joints: xr.Dataset) -> Frame:
-    """Return what a picture of a state shows."""
-    model = setup.model
-    shift = setup.magnification * model.observer().joint_ends(q)
-    return Frame(
-        *_blocks(setup, q),
-        time=float(joints["time"]) if "time" in joints.coords else None,
-        words=_failing(_counts(joints)),
-        marks=joint_marks(model.structure, joints, shift=shift),
-    )
-
-
-def moving(setup: Setup, run: History, times: Array, fields: Array) -> Iterator[Frame]:
-    """Yield what the pictures of a run show, while its joints hold."""
-    structure, carried, joints = (
-        setup.model.structure,
-        setup.model.observer().joint_ends,
-        run.joints,
-    )
-    steps = joints.indexes["time"].get_indexer(times, method="nearest")
-    told = {key: joints[key].transpose("time", "joint").values for key in TOLD}
-    marker, been, counts = (
-        Marker(structure, joints["judged"].values),
-        _been(joints),
-        _counts(joints),
-    )
-    for time, step, q in zip(times, steps, fields, strict=True):
-        shift = setup.magnification * carried(q)
-        yield Frame(
-            *_blocks(setup, q),
-            time=float(time),
-            words=_failing(counts[step]),
-            marks=marker.at({key: values[step] for key, values in told.items()}, shift),
-            past=(structure.ends + shift)[been[step]],
-            outlines=setup.outlines if time >= setup.since else (),
-        )
-
-
-def falling(setup: Setup, falls: FallingBlocks, times: Array) -> Iterator[Frame]:
-    """Yield what the pictures of a fall show: blocks alone, to scale, as rigid as they are then."""
-    cells = setup.model.cells
-    for time in times:
-        places = falls.places(cells.places, cells.block, float(time))
-        shades = np.linalg.norm(places - cells.places, axis=1) / mm
-        if setup.scale.colour == "stress":  # of blocks in flight nobody knows it
-            shades = np.zeros(len(cells.polygons))
-        yield Frame(places, shades, float(time), ["blocks are loose"])
-
-
-def _blocks(setup: Setup, q: Array) -> tuple[Array, Array]:
-    """Where the points of the blocks are drawn, and what the blocks are coloured by."""
-    cells = setup.model.cells
-    places = cells.places + setup.magnification * cells.displacement(q)
-    return places, shade(cells, q, setup.scale.colour)
-
-
-def _been(joints: xr.Dataset) -> NDArray[np.bool_]:
-    """Return whether ends of judged joints have been hinges by each step (steps, n_joints, 2)."""
-    side = joints["hinge"].transpose("time", "joint").values * joints["judged"].values
-    return np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
-
-
-def _counts(joints: xr.Dataset) -> NDArray[np.intp]:
-    """How many judged joints fail in each of the ways `FAILING` (…, 3)."""
-    own = joints["judged"].values
-    flags = (joints[key].transpose(..., "joint").values for key in FAILING)
-    return np.stack([(own & (each != 0)).sum(axis=-1) for each in flags], axis=-1)
-
-
-def _failing(counts: NDArray[np.intp]) -> list[str]:
-    """How many joints hinge, slide or are open, in words."""
-    pairs = zip(counts.tolist(), FAILING.values(), strict=True)
-    return [f"{count} {word}" for count, word in pairs if count]
-
-
-# Where a film is in slow motion: "auto", from when until when [s], or nowhere
+# Slow motion of a film: "auto", its start and end [s], or none
 Window = str | tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
-class FrameTiming:
-    """What a film shows when."""
+class Frame:
+    """Content of one frame."""
 
-    times: Array  # of its frames (frames,) [s]
-    speeds: Array  # at which each is shown, relative to the real one (frames,) [-]
-    fps: float  # frames that a second shows
+    places: Array  # displaced points of the cells (m, 2) [m]
+    shades: Array  # values of the colour scale, by point (m,) or by cell
+    time: float | None = None  # [s]; None for a state without time
+    words: Sequence[str] = ()  # numbers of failed joints, or that blocks are loose
+    marks: Marks = field(default_factory=Marks)  # of the joints, displaced
+    # places where hinges were before, displaced (n, 2) [m]
+    past: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    outlines: Sequence[Array] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
 
 
-def even(known: Array, fps: float, seconds: float | None) -> FrameTiming:
-    """Return even times, in as many frames as the film lasts for, and no more than fields."""
-    for key, value in (("fps", fps), ("seconds", seconds)):
-        if value is not None and not 0.0 < value < 1e4:
-            raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
-    lasting = seconds or max(float(known[-1] - known[0]), 1.0 / fps)
-    count = min(len(known), max(1, round(lasting * fps)))
-    speed = float(known[-1] - known[0]) / lasting or 1.0
-    return FrameTiming(
-        np.linspace(known[0], known[-1], count), np.full(count, speed), count / lasting
+def frame_of_state(setup: Setup, q: Array, joints: xr.Dataset) -> Frame:
+    """Return the frame of a single state."""
+    model = setup.model
+    shift = setup.magnification * model.observer().joint_ends(q)
+    return Frame(
+        *_places_and_values(setup, q),
+        time=float(joints["time"]) if "time" in joints.coords else None,
+        words=_count_failures(joints.expand_dims("step"))[0],
+        marks=joint_marks(model.structure, joints, shift=shift),
     )
 
 
-def slowed(known: Array, fps: float, window: tuple[float, float]) -> FrameTiming:
-    """Return the times of a film in real time, but in slow motion from one instant to another."""
-    real = even(known, fps, None)
+def frames_of_run(setup: Setup, run: History, times: Array, fields: Array) -> Iterator[Frame]:
+    """Yield the frames of a run, while no block is loose."""
+    structure, joint_ends = setup.model.structure, setup.model.observer().joint_ends
+    joints = run.joints.transpose("time", "joint", ...)
+    judged = joints["judged"].values
+    steps = joints.indexes["time"].get_indexer(times, method="nearest")
+    values = {key: joints[key].values for key in MARKED_QUANTITIES}
+    side = joints["hinge"].values * judged
+    # ends of joints that have been hinges up to each step (steps, n_joints, 2)
+    hinged = np.maximum.accumulate(np.stack([side < 0, side > 0], axis=-1), axis=0)
+    marker, words = Marker(structure, judged), _count_failures(joints)
+    for time, step, q in zip(times, steps, fields, strict=True):
+        shift = setup.magnification * joint_ends(q)
+        yield Frame(
+            *_places_and_values(setup, q),
+            time=float(time),
+            words=words[step],
+            marks=marker.at({key: each[step] for key, each in values.items()}, shift),
+            past=(structure.ends + shift)[hinged[step]],
+            outlines=setup.outlines if time >= setup.since else (),
+        )
+
+
+def frames_of_fall(setup: Setup, falls: FallingBlocks, times: Array) -> Iterator[Frame]:
+    """Yield the frames of loose blocks, which are rigid and drawn true to scale."""
+    cells = setup.model.cells
+    for time in times:
+        places = falls.places(cells.places, cells.block, float(time))
+        shades = np.linalg.norm(places - cells.places, axis=1) / mm
+        if setup.scale.colour == "stress":  # loose blocks are rigid: stress is not computed
+            shades = np.zeros(len(cells.polygons))
+        yield Frame(places, shades, float(time), ["blocks are loose"])
+
+
+def _places_and_values(setup: Setup, q: Array) -> tuple[Array, Array]:
+    """Return the displaced points of the blocks, and their values of the colour scale."""
+    cells = setup.model.cells
+    places = cells.places + setup.magnification * cells.displacement(q)
+    return places, colour_values(cells, q, setup.scale.colour)
+
+
+def _count_failures(joints: xr.Dataset) -> list[list[str]]:
+    """Return for each step how many judged joints hinge, slide and are open, in words."""
+    adjectives = {"hinge": "hinging", "slide": "sliding", "open": "open"}
+    judged = joints["judged"]
+    counts = [((joints[key] != 0) & judged).sum("joint").values for key in adjectives]
+    return [
+        [f"{count} {word}" for count, word in zip(step, adjectives.values(), strict=True) if count]
+        for step in np.stack(counts, axis=-1).tolist()
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTiming:
+    """Times of the frames of a film."""
+
+    times: Array  # of the frames (frames,) [s]
+    speeds: Array  # of the film relative to real time (frames,) [-]
+    fps: float  # frames per second
+
+
+def even_timing(known: Array, fps: float, seconds: float | None) -> FrameTiming:
+    """Return evenly spaced times for a film of some length, at most one for each known field."""
+    for key, value in (("fps", fps), ("seconds", seconds)):
+        if value is not None and not 0.0 < value < 1e4:
+            raise InvalidInput(f"{key} {value:.4g} is not between 0 and 10000")
+    length = float(known[-1] - known[0])
+    seconds = seconds or max(length, 1.0 / fps)
+    count = min(len(known), max(1, round(seconds * fps)))
+    times = np.linspace(known[0], known[-1], count)
+    return FrameTiming(times, np.full(count, length / seconds or 1.0), count / seconds)
+
+
+def slow_motion_timing(known: Array, fps: float, window: tuple[float, float]) -> FrameTiming:
+    """Return times in real time, with slow motion inside a window [s]."""
+    real = even_timing(known, fps, None)
     start, end = np.clip(window, known[0], known[-1])
     if not start < end:
         raise InvalidInput(
@@ -150,47 +132,45 @@ def slowed(known: Array, fps: float, window: tuple[float, float]) -> FrameTiming
             "of it, the earlier first, or 'auto'"
         )
     inside = known[(known >= start) & (known <= end)]
-    apart = float(np.median(np.diff(inside))) if len(inside) > 1 else float(end - start)
-    # speed of slow motion, relative to the real one, and pictures between two kept fields at most:
-    # what happens between them is not known
-    speed = float(np.clip(apart * real.fps / 4.0, 0.1, 1.0))
+    spacing = float(np.median(np.diff(inside))) if len(inside) > 1 else float(end - start)
+    # a tenth of real time, but at most four frames between two fields: between them displacements
+    # are interpolated
+    speed = float(np.clip(spacing * real.fps / 4.0, 0.1, 1.0))
     marks = np.array([known[0], start, end, known[-1]])
-    shown = np.append(0.0, np.cumsum(np.diff(marks) / [1.0, speed, 1.0]))
-    times = np.interp(
-        np.linspace(0.0, shown[-1], max(1, round(shown[-1] * real.fps))), shown, marks
-    )
+    film_time = np.append(0.0, np.cumsum(np.diff(marks) / [1.0, speed, 1.0]))
+    count = max(1, round(film_time[-1] * real.fps))
+    times = np.interp(np.linspace(0.0, film_time[-1], count), film_time, marks)
     slow = (times >= start) & (times < end)
     return FrameTiming(times, np.where(slow, speed, 1.0), real.fps)
 
 
-def decisive(run: History, falls: FallingBlocks | None) -> tuple[float, float]:
-    """Return the time around what matters most in a run [s].
+def decisive_window(run: History, falls: FallingBlocks | None) -> tuple[float, float]:
+    """Return the time around the decisive instant of a run [s].
 
-    That is where blocks come loose, or else the first mechanism by count, or else where a joint's
-    thrust comes nearest to a face.
+    It is the instant of collapse, or else of the first mechanism by count, or else of the largest
+    |e| of a joint.
     """
     if falls is not None:
         instant = float(falls.times[0])
     elif run.mechanism is not None and run.mechanism.time is not None:
         instant = run.mechanism.time
     else:
-        tilt = abs(assessed_joints(run.joints)["eccentricity"]).max("joint")
-        instant = float(run.time[int(tilt.fillna(0.0).argmax("time"))])
-    # how long before and after the instant that matters a film is in slow motion [s]
+        e = abs(assessed_joints(run.joints)["eccentricity"]).max("joint")
+        instant = float(run.time[int(e.fillna(0.0).argmax("time"))])
     return instant - 0.25, instant + 0.75
 
 
-def pace_of(
+def frame_timing(
     run: History, falls: FallingBlocks | None, known: Array, fps: float, seconds: float | None,
     window: Window,
 ) -> FrameTiming:  # fmt: skip
-    """Return which instants of a run its film shows, and how fast."""
+    """Return the times of the frames of a run's film."""
     if window is None:
-        return even(known, fps, seconds)
+        return even_timing(known, fps, seconds)
     if seconds is not None:
         raise InvalidInput(f"seconds {seconds:g} and window {window}: give one of the two")
     if isinstance(window, str):
         if window != "auto":
             raise InvalidInput(f"window '{window}': give 'auto', or two times in seconds")
-        window = decisive(run, falls)
-    return slowed(known, fps, window)
+        window = decisive_window(run, falls)
+    return slow_motion_timing(known, fps, window)

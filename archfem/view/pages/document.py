@@ -1,4 +1,4 @@
-"""Documents for a browser and for paper: sections of words, tables, figures and players."""
+"""HTML documents of sections with text, tables, figures and players."""
 
 from base64 import b64encode
 from collections.abc import Sequence
@@ -13,16 +13,17 @@ import matplotlib
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+
+from archfem.view.style import disable_math
 
 
 @dataclass(frozen=True)
 class TextBlock:
-    """A paragraph, or lines of text as they are."""
+    """A paragraph, or preformatted text."""
 
-    text: str  # the words; they are escaped, and what stands between ` is set as code
-    # "plain", "missing" for what the results do not hold, "doubt" for what is to be looked at, or
-    # "lines" for text whose columns matter
+    text: str  # escaped; a part between ` is set as code
+    # "plain"; "missing" for results that do not exist; "doubt" for warnings; "lines" for
+    # preformatted text
     manner: str = "plain"
 
     kind = "words"
@@ -32,8 +33,8 @@ class TextBlock:
 class Grid:
     """A table."""
 
-    head: Sequence[str]  # titles of the columns; none for a list of terms and what they are
-    rows: Sequence[Sequence[str]]  # as many cells each
+    head: Sequence[str]  # titles of the columns; none for a list of terms and explanations
+    rows: Sequence[Sequence[str]]  # cells of each row
     caption: str = ""  # above the table
 
     kind = "grid"
@@ -43,17 +44,16 @@ class Grid:
 class FigureBlock:
     """A figure."""
 
-    source: str  # the picture itself, as a data URI
-    caption: str  # below it
-    inches: float  # its width; it is made smaller where the page is narrower
+    source: str  # the picture as a data URI
+    caption: str  # below the figure
+    inches: float  # width of the figure; it shrinks with a narrower page
 
     kind = "plate"
 
     @classmethod
     def of(cls, figure: Figure, caption: str) -> "FigureBlock":
-        """Return a figure as lines that stay sharp at any size."""
-        for text in figure.findobj(Text):  # names and titles are words, though they hold a $
-            text.set_parse_math(False)
+        """Return a matplotlib figure as a vector graphic."""
+        disable_math(figure)
         buffer = BytesIO()
         with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
@@ -61,10 +61,10 @@ class FigureBlock:
 
     @classmethod
     def read(cls, path: Path, caption: str) -> "FigureBlock":
-        """Return a picture that was written earlier."""
+        """Return a picture from a PNG file."""
         content = path.read_bytes()
-        pixels = int.from_bytes(content[16:20], "big")  # where the header of the format has it
-        # dots per inch of the pictures that `archfem.view.save` writes
+        pixels = int.from_bytes(content[16:20], "big")  # width in the PNG header
+        # `archfem.view.save` writes 300 dots per inch
         return cls(_uri("image/png", content), caption, round(pixels / 300.0, 2))
 
 
@@ -72,36 +72,36 @@ class FigureBlock:
 class Section:
     """A chapter of a document."""
 
-    title: str  # its heading
-    pieces: Sequence[Any]  # `Words`, `Grid`, `Plate`, `Player`
-    level: int = 2  # 2, or 3 for a part of the chapter before
+    title: str  # heading
+    pieces: Sequence[Any]  # `TextBlock`, `Grid`, `FigureBlock`, `Player`
+    level: int = 2  # of the heading: 2, or 3 for a subsection
 
 
 @dataclass(frozen=True)
 class Document:
-    """A whole document."""
+    """An HTML document."""
 
-    title: str  # of all
-    subtitle: str  # below it
-    facts: Sequence[tuple[str, str]]  # what is to be seen at once: a name and a value each
+    title: str  # of the document
+    subtitle: str  # beside the title
+    facts: Sequence[tuple[str, str]]  # name and value of the main results
     sections: Sequence[Section]  # in order
-    foot: str = ""  # at the end
+    foot: str = ""  # last line
 
     @property
     def page(self) -> str:
-        """The document as one page, with all that it needs."""
-        return rendered("document.html", document=self)
+        """The complete page (HTML), without references to other files."""
+        return render("document.html", document=self)
 
 
-def rendered(template: str, **values: Any) -> str:
-    """Return a template of this room filled in; words are escaped."""
+def render(template: str, **values: Any) -> str:
+    """Fill in a template of this package; values are escaped."""
     return _templates().get_template(template).render(**values)
 
 
 @cache
 def _templates() -> Environment:
-    """The templates, to which a file of style or script is given as it is."""
-    found = Environment(
+    """Return the environment of the templates, which may include style and script files."""
+    environment = Environment(
         loader=PackageLoader("archfem.view.pages"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -109,19 +109,19 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    assert found.loader is not None
-    source = found.loader.get_source
-    found.globals["plain"] = lambda name: Markup(source(found, name)[0])
-    found.globals["raw"] = Markup
-    found.filters["typeset"] = _typeset
-    return found
+    assert environment.loader is not None
+    source = environment.loader.get_source
+    environment.globals["plain"] = lambda name: Markup(source(environment, name)[0])
+    environment.globals["raw"] = Markup
+    environment.filters["typeset"] = _typeset
+    return environment
 
 
 def _typeset(cell: str) -> str:
-    """A cell with the minus of a number, and the dash of what there is not, as print has them."""
+    """Return a cell with typographic minus signs, and dashes for missing values."""
     return "–" if cell == "-" else sub(r"^-(?=\d)", "−", cell)
 
 
 def _uri(media: str, content: bytes) -> str:
-    """A data URI."""
+    """Return a data URI."""
     return f"data:{media};base64,{b64encode(content).decode('ascii')}"

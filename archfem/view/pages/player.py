@@ -1,4 +1,4 @@
-"""The player: a run in a browser or a notebook, with a slider over time."""
+"""Player of a run in a browser or a notebook, with a slider over time."""
 
 from dataclasses import dataclass
 from html import escape
@@ -8,53 +8,51 @@ from archfem._files import atomic_write
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Model
-from archfem.view.pages.document import rendered
-from archfem.view.pages.player_data import LARGEST, Scene
+from archfem.view.pages.document import render
+from archfem.view.pages.player_data import Scene
 
 
 @dataclass(frozen=True, eq=False)
 class Player:
-    """A run that can be played: in a notebook it shows itself, elsewhere `save` writes a page.
+    """Interactive page of a run, shown in a notebook or written by `save`.
 
-    The structure with its thrust line, hinges, sliding and open joints; a slider over time, one for
-    the magnification of displacements; the ground's acceleration with a cursor; and of a joint that
-    one clicks e and V / N over time.
+    It shows the structure with its thrust line, hinges, sliding and open joints; sliders for the
+    time and for the magnification of displacements; the ground acceleration with a cursor; and e
+    and V / N over time of the joint that is clicked on.
 
     Attributes:
-        scene: what it shows.
+        scene: the data shown.
+        kind: name of this block in the templates of documents.
     """
 
     scene: Scene
 
-    @property
-    def kind(self) -> str:
-        """What it is in a document."""
-        return "player"
+    kind = "player"
 
     @property
     def page(self) -> str:
-        """A whole page, in one file."""
-        return rendered("player_page.html", title=self.scene.data["title"], player=self)
+        """The complete page (HTML), without references to other files."""
+        return render("player_page.html", title=self.scene.data["title"], player=self)
 
     def save(self, path: str | Path) -> Path:
-        """Write a page in one stroke.
+        """Write the page to a file atomically.
 
         Args:
-            path: the file, .html; folders are made.
+            path: of the file, .html; missing folders are created.
 
         Returns:
-            The file.
+            The path of the file.
+
+        Raises:
+            InvalidInput: the suffix is not that of a page.
         """
         return write_page(path, self.page)
 
     def _repr_html_(self) -> str:
-        """The player in a frame of its own, so that a notebook's style and its own stay apart."""
+        """The page in a frame, which keeps its style apart from that of a notebook."""
         low, high = self.scene.box
-        # height of the picture at most, of all that is around it, and the width of a notebook
-        # [pixels]
+        # a notebook is about 900 pixels wide; the controls and diagrams take 550 in height
         picture = min(540.0, 900.0 * float((high[1] - low[1]) / (high[0] - low[0])))
-        # height of the picture at most, of all that is around it, and the width of a notebook
-        # [pixels]
         style = f"width:100%;height:{picture + 550.0:.0f}px;border:0"
         return f'<iframe srcdoc="{escape(self.page)}" style="{style}"></iframe>'
 
@@ -63,34 +61,35 @@ def player(run: History, model: Model | None = None, *, title: str = "") -> Play
     """Return a player of a run.
 
     Args:
-        run: with fields, where blocks are to move; its structure is drawn.
-        model: that made the run; needed where it has fields.
-        title: above the picture; by default the run's own.
+        run: the history, also of large displacements and of loose blocks; blocks move if it
+            contains fields.
+        model: the model of the run; required if the run contains fields.
+        title: above the structure; by default the title of the run.
 
     Returns:
-        The player; it also works on histories of large displacements, and follows what falls.
+        The player.
 
     Raises:
-        InvalidInput: the run does not know its structure and no model is given, it has fields and
-            no model is given, or the model is another's.
+        InvalidInput: no model is given, and the run contains fields or no structure; or the model
+            is not that of the run.
     """
     if model is None and run.structure is None:
         raise InvalidInput(
-            "this history does not know its structure, so that there is nothing to draw: read it "
-            "with History.read(path, structure), or give the model that made it"
+            "this history does not contain its structure, so that there is nothing to draw: read "
+            "it with History.read(path, structure), or give the model that made it"
         )
     if model is None and "q" in run.dataset:
         raise InvalidInput(
-            "this history has displacements, and only its model knows how blocks move by them: "
-            "give the model that made it, player(run, model)"
+            "this history has displacements, and the motion of the blocks follows from its model: "
+            "give the model of the run, player(run, model)"
         )
     structure = model.structure if model is not None else run.structure
     assert structure is not None
-    return Player(Scene(structure, run, model, title, LARGEST))
+    return Player(Scene(structure, run, model, title))
 
 
 def write_page(path: str | Path, text: str) -> Path:
-    """Write a page in one stroke."""
+    """Write a page atomically."""
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise InvalidInput(f"{target} has suffix '{target.suffix}': a page is .html")

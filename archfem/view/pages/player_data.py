@@ -1,20 +1,12 @@
-"""What the player shows of a run: a structure, its displacements and its joints, packed.
+"""Data of the player of a run: structure, displacements and joint histories, packed as text.
 
-Displacements and resultants are kept, no frames: the page draws them. Where all would be too much,
-every second step is left out, or three of four, and so on; the page says so.
-
-Points of the blocks that a page draws, and how they move.
-
-Arrays over time as text in a page: whole numbers of a quantum, differences, deflate, base64.
-
-Neighbours in time are alike, so that their differences are small whole numbers, which deflate packs
-well: bytes of like weight stand together. A browser undoes it in a few lines.
+The page draws frames from displacements and joint histories. If they exceed the size limit, every
+second step is left out, or three of four, and so on; the page shows by how much it was thinned.
 """
 
 import json
 import zlib
-from base64 import b64decode, b64encode
-from collections.abc import Mapping
+from base64 import b64encode
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -29,122 +21,117 @@ from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints, sliding_limits
 from archfem.masonry.block import Block
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
-from archfem.models.model import Model, check_model
-from archfem.view.joint_marks import SWING, linked
-from archfem.view.positions import FallingBlocks, kept_fields
+from archfem.models.model import Model, check_coordinate_count, check_model
+from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs
+from archfem.view.positions import FallingBlocks, block_kinds, ground_acceleration, recorded_fields
+
+# Default size of the packed part of a player [bytes]
+MAX_PACKED_BYTES = 3_000_000
+
+# Largest V / N in a player [-]; a joint with more is about to open
+MAX_FRICTION_RATIO = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Outlines:
-    """Corners of all blocks, one block after another, arcs as chords."""
+    """Corners of all blocks, one block after another; arcs are replaced by chords."""
 
-    structure: Structure  # whose blocks they are
+    structure: Structure  # structure of the blocks
 
     @cached_property
     def rings(self) -> list[Array]:
         """Outline of each block (k, 2) [m]."""
-        # distance of a chord from its arc that is not seen, relative to the size of the structure
-        near = 2e-4 * self.structure.size
-        return [block.drawn(_chords(block, near)) for block in self.structure.blocks]
+        # a smaller distance of a chord from its arc cannot be seen
+        tolerance = 2e-4 * self.structure.size
+        return [block.drawn(_count_chords(block, tolerance)) for block in self.structure.blocks]
 
     @cached_property
     def points(self) -> Array:
-        """All of them (p, 2) [m]."""
+        """Corners of all blocks (p, 2) [m]."""
         return np.concatenate(self.rings)
 
     @cached_property
     def block(self) -> NDArray[np.intp]:
-        """Number of the block that each point belongs to (p,)."""
+        """Number of the block of each corner (p,)."""
         return np.repeat(np.arange(len(self.rings)), [len(ring) for ring in self.rings])
 
-    @cached_property
-    def kinds(self) -> list[str]:
-        """What each block is drawn as: "support", "soil" or "stone"."""
-        soil = find_yielding_blocks(self.structure)
-        return [
-            "support" if block.fixed else "soil" if number in soil else "stone"
-            for number, block in enumerate(self.structure.blocks)
-        ]
-
-    def moved(self, model: Model, fields: Array) -> Array:
-        """Return displacements of the points (frames, p, 2) [m]."""
-        follow, still = self._following(model), self._of_supports(model)
-        frames = [follow @ model.cells.displacement(q).ravel() for q in fields]
-        return np.array(frames).reshape(len(fields), -1, 2) + still
-
-    def _following(self, model: Model) -> sparse.csr_matrix:
-        """Matrix from displacements of the cells' points to those of the outlines.
-
-        A point beside an edge turns with it, which is exact where the block is rigid, however far
-        it turns.
-        """
-        cells, rows = model.cells, []
-        still, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
-        for point, number in zip(self.points, self.block.tolist(), strict=True):
-            if self.structure.blocks[number].fixed:
-                rows.append(still)
-                continue
-            edge, share, away = cells.nearest_edge(number, point)
-            along = cells.places[edge[1]] - cells.places[edge[0]]
-            across = np.array([-along[1], along[0]])
-            turning = np.outer(away, along) + np.outer([-away[1], away[0]], across)
-            turned = turning / float(along @ along)
-            entries = np.hstack([(1.0 - share) * one - turned, share * one + turned])
-            columns = np.repeat(2 * edge, 2) + np.tile([0, 1], 2)
-            place = np.repeat([0, 1], 4), np.tile(columns, 2)
-            rows.append(sparse.csr_matrix((entries.ravel(), place), still.shape))
-        return sparse.vstack(rows, format="csr")
-
-    def _of_supports(self, model: Model) -> Array:
-        """Displacements of the points of supports that have moved (p, 2) [m]; 0 of the others."""
-        moved = np.zeros_like(self.points)
+    def displacements(self, model: Model, fields: Array) -> Array:
+        """Return displacements of the corners in each field (frames, p, 2) [m]."""
+        matrix, supports = self._interpolation(model), np.zeros_like(self.points)
         for number, block in enumerate(self.structure.blocks):
             if block.fixed:
                 own = self.block == number
                 motion = rigid_motion_matrix(self.points[own], block.centroid)
-                moved[own] = motion @ model.support_motion[number]
-        return moved
+                supports[own] = motion @ model.support_motion[number]
+        frames = [matrix @ model.cells.displacement(q).ravel() for q in fields]
+        return np.array(frames).reshape(len(fields), -1, 2) + supports
+
+    def _interpolation(self, model: Model) -> sparse.csr_matrix:
+        """Return the matrix from displacements of the cells' points to those of the corners.
+
+        A corner rotates with the nearest edge; this is exact for rigid blocks, even for large
+        rotations.
+        """
+        cells, rows = model.cells, []
+        zero, one = sparse.csr_matrix((2, 2 * len(cells.places))), np.eye(2)
+        for point, number in zip(self.points, self.block.tolist(), strict=True):
+            if self.structure.blocks[number].fixed:
+                rows.append(zero)
+                continue
+            edge, share, away = cells.nearest_edge(number, point)
+            along = cells.places[edge[1]] - cells.places[edge[0]]
+            across = np.array([-along[1], along[0]])
+            # components of the offset from the edge, along and across it, rotate with the edge
+            product = np.outer(away, along) + np.outer([-away[1], away[0]], across)
+            rotation = product / float(along @ along)
+            entries = np.hstack([(1.0 - share) * one - rotation, share * one + rotation])
+            columns = np.repeat(2 * edge, 2) + np.tile([0, 1], 2)
+            place = np.repeat([0, 1], 4), np.tile(columns, 2)
+            rows.append(sparse.csr_matrix((entries.ravel(), place), zero.shape))
+        return sparse.vstack(rows, format="csr")
 
 
-def _chords(block: Block, near: float) -> int:
-    """Chords of each arc of a block that do not leave it farther than that; 1 of a polygon."""
+def _count_chords(block: Block, tolerance: float) -> int:
+    """Return the number of chords that keep within a distance [m] of an arc; 1 for a polygon."""
     if block.centre is None:
         return 1
     arms = block.points - np.array(block.centre)
-    radius = float(np.linalg.norm(arms, axis=1).max())
-    corners = [arms[side : side + 2] for side in (0, 2)]
-    angle = max(float(np.arccos(np.clip(_cosine(*pair), -1.0, 1.0))) for pair in corners)
-    return max(1, int(np.ceil(angle / np.sqrt(8.0 * near / radius))))
-
-
-def _cosine(one: Array, other: Array) -> float:
-    """Cosine of the angle between two arms."""
-    return float(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)))
-
-
-# Stands for an undefined value (NaN)
-NOTHING = -(2**29)
+    length = np.linalg.norm(arms, axis=1)
+    cosines = [arms[k] @ arms[k + 1] / (length[k] * length[k + 1]) for k in (0, 2)]
+    angle = float(np.arccos(np.clip(min(cosines), -1.0, 1.0)))
+    # a chord of the angle α lies at most r α² / 8 from its arc
+    return max(1, int(np.ceil(angle / np.sqrt(8.0 * tolerance / length.max()))))
 
 
 @dataclass
 class PackedArrays:
-    """Arrays that are being packed."""
+    """Arrays over time as text: integers of a quantum, differences, deflate, base64.
 
-    # of each array its shape (series, samples) and its quantum, in the order of the bytes
+    Consecutive values are similar, so that their differences are small integers. Bytes of equal
+    significance stand together, because deflate compresses them better.
+    """
+
+    # name, shape (series, samples) and quantum of each array, in the order of the bytes
     head: list[dict[str, Any]] = field(default_factory=list)
     _planes: list[bytes] = field(default_factory=list)
 
-    def add(self, name: str, values: Array, quantum: float) -> None:
-        """Add an array."""
+    def add(self, name: str, values: Array, quantum: float = 0.0) -> None:
+        """Add an array (series, samples); the default quantum is 1/4000 of its largest value."""
+        quantum = quantum or float(np.nanmax(np.abs(values), initial=0.0)) / 4000 or 1.0
         values = np.asarray(values, float)
         known = np.isfinite(values)
-        whole = np.where(known, np.rint(np.where(known, values, 0.0) / quantum), NOTHING)
-        steps = np.diff(whole.astype(np.int64), axis=1, prepend=0)
+        integers = np.rint(np.where(known, values, 0.0) / quantum)
+        # the page reads this number as undefined
+        integers = np.where(known, integers, -(2**29)).astype(np.int64)
+        steps = np.diff(integers, axis=1, prepend=0)
         folded = ((steps << 1) ^ (steps >> 63)).astype("<u4")  # 0, -1, 1, -2, … as 0, 1, 2, 3, …
         self._planes.append(folded.ravel().view(np.uint8).reshape(-1, 4).T.tobytes())
         self.head.append({"name": name, "shape": list(values.shape), "quantum": quantum})
+
+    def add_times(self, name: str, times: Array) -> None:
+        """Add times [s], to a microsecond."""
+        self.add(name, times[None], 1e-6)
 
     @property
     def text(self) -> str:
@@ -152,101 +139,51 @@ class PackedArrays:
         return b64encode(zlib.compress(b"".join(self._planes), 6)).decode("ascii")
 
 
-def quantum_of(values: Array, levels: int) -> float:
-    """Return the quantum that splits the largest size of some values into so many levels."""
-    largest = float(np.nanmax(np.abs(values), initial=0.0))
-    return largest / levels or 1.0
-
-
-def unpacked(head: list[Mapping[str, Any]], text: str) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of a pack by name, as a page reads them."""
-    raw = np.frombuffer(zlib.decompress(b64decode(text)), np.uint8)
-    found, start = {}, 0
-    for each in head:
-        count = int(np.prod(each["shape"]))
-        planes = raw[start : start + 4 * count].reshape(4, count)
-        folded = np.ascontiguousarray(planes.T).view("<u4").reshape(each["shape"]).astype(np.int64)
-        whole = np.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
-        found[each["name"]] = np.where(whole == NOTHING, np.nan, whole * each["quantum"])
-        start += 4 * count
-    return found
-
-
-# Levels of displacements and forces; quantum of e and V / N [-], and of times [s]
-FINE, RATIO, INSTANT = 4000, 1e-3, 1e-6
-
-# V / N beyond which a joint is all but open: it is kept as this [-]
-MOST = 5.0
-
-
-# Size of the packed part of a player, unless less is asked for [bytes]
-LARGEST = 3_000_000
-
-# Room around the structure, relative to its size
-ROOM = 0.04
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What the player shows of a run."""
+    """Content of the player of a run."""
 
-    structure: Structure  # that was shaken
-    run: History  # what happened
-    # that made the run; None where the run kept no fields, or nobody has the model: blocks are
-    # then drawn where they stand
+    structure: Structure  # structure of the run
+    run: History  # the history shown
+    # model of the run; without it or recorded fields, blocks are drawn undeformed
     model: Model | None = None
-    title: str = ""  # above the picture
-    largest: int = LARGEST  # size of the packed part [bytes]
-    why_still: str = ""  # why there are no displacements, where there are none
+    title: str = ""  # above the structure
+    max_bytes: int = MAX_PACKED_BYTES  # size limit of the packed part
+    missing_reason: str = ""  # why there are no displacements, if there are none
 
     def __post_init__(self) -> None:
-        """Refuse what does not go together."""
+        """Refuse a run of another structure or model."""
         if self.run.joints.sizes["joint"] != len(self.structure.joints):
             raise InvalidInput(
                 f"the run has {self.run.joints.sizes['joint']} joints, and the structure "
-                f"{len(self.structure.joints)}: give the structure, or model, that was shaken"
+                f"{len(self.structure.joints)}: give the structure, or model, of the run"
             )
-        if self.model is None or "q" not in self.run.dataset:
-            return
-        check_model(self.model)
-        kept = self.run.dataset.sizes["coordinate"]
-        if kept != self.model.size:
-            raise InvalidInput(
-                f"the run has {kept} coordinates, and the model {self.model.size}: give the model "
-                "that made the run"
-            )
+        if self.model is not None and "q" in self.run.dataset:
+            check_model(self.model)
+            check_coordinate_count(self.model, self.run.dataset.sizes["coordinate"])
 
     @cached_property
     def outlines(self) -> Outlines:
-        """Of the blocks."""
+        """Outlines of the blocks."""
         return Outlines(self.structure)
 
     @cached_property
     def falls(self) -> FallingBlocks | None:
-        """Where loose blocks are; None where none came loose."""
+        """Positions of loose blocks; None if no block came loose."""
         return FallingBlocks.of(self.structure, self.run)
-
-    @cached_property
-    def _frames(self) -> tuple[Array, Array] | None:
-        """Times (f,) and coordinates (f, n) of the frames that are worth keeping."""
-        if self.model is None or "q" not in self.run.dataset:
-            return None
-        times, fields = kept_fields(self.run)
-        between = (times[-1] - times[0]) / max(len(times) - 1, 1)
-        # frames that are worth keeping for each second [Hz]
-        every = max(1, int(1.0 / (40.0 * between))) if between > 0.0 else 1
-        chosen = np.unique(np.append(np.arange(0, len(times), every), len(times) - 1))
-        return times[chosen], fields[chosen]
 
     @cached_property
     def moved(self) -> tuple[Array, Array, Array] | None:
         """Times (f,) and displacements of outlines (f, p, 2) and joint ends (f, n_joints, 2, 2)."""
-        if self._frames is None or self.model is None:
+        if self.model is None or "q" not in self.run.dataset:
             return None
-        times, fields = self._frames
-        carried = self.model.observer().joint_ends
-        ends = np.array([carried(q) for q in fields])
-        return times, self.outlines.moved(self.model, fields), ends
+        times, fields = recorded_fields(self.run)
+        between = (times[-1] - times[0]) / max(len(times) - 1, 1)
+        # more than 40 frames per second cannot be distinguished
+        chosen = _thin_out(len(times), int(1.0 / (40.0 * between)) if between > 0.0 else 1)
+        joint_ends = self.model.observer().joint_ends
+        ends = np.array([joint_ends(q) for q in fields[chosen]])
+        return times[chosen], self.outlines.displacements(self.model, fields[chosen]), ends
 
     @cached_property
     def fallen(self) -> tuple[Array, Array] | None:
@@ -257,18 +194,14 @@ class Scene:
         places = [self.falls.places(points, block, float(time)) for time in self.falls.times]
         return self.falls.times, np.array(places) - points
 
-    @property
-    def true_scale(self) -> bool:
-        """Whether displacements are drawn as they are, unless the reader asks otherwise."""
-        return self.model is not None and self.model.large_displacements
-
     @cached_property
     def magnification(self) -> float:
-        """A round number by which displacements are seen well [-]."""
-        if self.true_scale:
+        """Default magnification: a round number that makes displacements visible [-]."""
+        if self.model is not None and self.model.large_displacements:
             return 1.0
         if self.moved is not None:
-            largest, aim = float(np.abs(self.moved[1]).max()), SWING * self.structure.size
+            largest = float(np.abs(self.moved[1]).max())
+            aim = DRAWN_DISPLACEMENT * self.structure.size
         elif "opening" in self.run.joints:
             joints = assessed_joints(self.run.joints)
             largest = float(joints["opening"].max())
@@ -280,171 +213,146 @@ class Scene:
         return float(fits[-1]) if largest > 0.0 and len(fits) else 1.0
 
     @cached_property
-    def still(self) -> float:
-        """The instant shown at first, and on paper [s]: the first mechanism, or the gravest e."""
+    def initial_time(self) -> float:
+        """Time shown at first, and in print [s]: of the first mechanism, or the largest |e|."""
         if self.run.mechanism is not None and self.run.mechanism.time is not None:
             return float(self.run.mechanism.time)
-        tilt = abs(assessed_joints(self.run.joints)["eccentricity"]).max("joint").fillna(0.0)
-        return float(self.run.time[int(tilt.argmax("time"))])
+        e = abs(assessed_joints(self.run.joints)["eccentricity"]).max("joint").fillna(0.0)
+        return float(self.run.time[int(e.argmax("time"))])
 
     @cached_property
-    def gravest(self) -> int:
-        """Number of the joint shown at first: that which leans most, or opens."""
+    def initial_joint(self) -> int:
+        """Number of the joint shown at first: that of the largest |e|, or one that opens."""
         joints = assessed_joints(self.run.joints)
-        worst = abs(joints["eccentricity"]).max("time").where(~joints["open"].any("time"), 0.5)
-        return int(joints["joint"].values[int(worst.fillna(0.5).argmax("joint"))])
+        largest = abs(joints["eccentricity"]).max("time").where(~joints["open"].any("time"), 0.5)
+        return int(joints["joint"].values[int(largest.fillna(0.5).argmax("joint"))])
 
     @cached_property
     def packed(self) -> tuple[PackedArrays, int]:
-        """Arrays over time, as fine as there is room for; and of how many steps one is kept."""
+        """Arrays over time, thinned until they fit, and the number of steps per stored step."""
         every = 1
         while True:
             pack = self._pack(every)
-            if len(pack.text) <= self.largest or every >= len(self.run.time):
+            if len(pack.text) <= self.max_bytes or every >= len(self.run.time):
                 return pack, every
             every *= 2
 
     def _pack(self, every: int) -> PackedArrays:
-        """Pack one of so many steps, and of frames no more than are as dense."""
-        pack, joints = PackedArrays(), self.run.joints.isel(time=self._kept(every))
-        pack.add("time", joints["time"].values[None], INSTANT)
+        """Pack one of so many steps, and frames at most as dense."""
+        times = self.run.time
+        steps = np.append(_thin_out(len(times), every), np.argmin(abs(times - self.initial_time)))
+        pack, joints = PackedArrays(), self.run.joints.isel(time=np.unique(steps))
+        pack.add_times("time", joints["time"].values)
         e, ratio, normal = (joints[key].values.T for key in ("eccentricity", "friction", "N"))
-        pack.add("e", e, RATIO)
-        pack.add("ratio", np.minimum(ratio, MOST), RATIO)
-        pack.add("normal", normal, quantum_of(normal, FINE))
+        pack.add("e", e, 1e-3)
+        pack.add("ratio", np.minimum(ratio, MAX_FRICTION_RATIO), 1e-3)
+        pack.add("normal", normal)
         if "opening" in joints:
-            opening = joints["opening"].values.T
-            pack.add("opening", opening, quantum_of(opening, FINE))
-        pack.add("flags", _flags(joints).T, 1.0)
-        ground, times = self.run.dataset["ground"].values, self.run.time
-        if "fall_ground" in self.run.dataset:
-            data = self.run.dataset
-            times = np.append(times, data["fall_time"].values[1:])
-            ground = np.concatenate([ground, data["fall_ground"].values[1:]])
-        pack.add("ground_time", times[None], INSTANT)
-        pack.add("ground", ground.T, quantum_of(ground, FINE))
-        self._pack_motion(pack, max(1, every // 2))
+            pack.add("opening", joints["opening"].values.T)
+        pack.add("flags", _encode_flags(joints).T, 1.0)
+        times, ground = ground_acceleration(self.run)
+        pack.add_times("ground_time", times)
+        pack.add("ground", ground.T)
+        for name, motion in (("frame", self.moved), ("fall", self.fallen)):
+            if motion is not None:
+                frames = _thin_out(len(motion[0]), every // 2)
+                pack.add_times(f"{name}_time", motion[0][frames])
+                for places, values in zip(("points", "ends"), motion[1:], strict=False):
+                    pack.add(f"{name}_{places}", values[frames].reshape(len(frames), -1).T)
         return pack
-
-    def _pack_motion(self, pack: PackedArrays, every: int) -> None:
-        """Pack displacements: of outlines and joint ends, then of outlines in the fall."""
-        for name, found in (("frame", self.moved), ("fall", self.fallen)):
-            if found is None:
-                continue
-            times = found[0]
-            chosen = np.unique(np.append(np.arange(0, len(times), every), len(times) - 1))
-            pack.add(f"{name}_time", times[chosen][None], INSTANT)
-            for what, values in zip(("points", "ends"), found[1:], strict=False):
-                rows = values[chosen].reshape(len(chosen), -1).T
-                pack.add(f"{name}_{what}", rows, quantum_of(rows, FINE))
-
-    def _kept(self, every: int) -> NDArray[np.intp]:
-        """Numbers of the records that are kept, the last and that of the still among them."""
-        count = len(self.run.time)
-        shown = int(np.argmin(np.abs(self.run.time - self.still)))
-        kept: NDArray[np.intp] = np.append(np.arange(0, count, every), [shown, count - 1])
-        return np.unique(kept)
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Corners, low and high, of what is seen (2,) [m]."""
-        points = self.outlines.points
-        spread = [points]
+        """Lower left and upper right corner of the visible region (2,) [m]."""
+        points, size = self.outlines.points, self.structure.size
+        margin, visible = 0.04 * size, [points]
         if self.moved is not None:
-            by = 1.2 * self.magnification
-            spread += [points + by * self.moved[1].min(axis=0)]
-            spread += [points + by * self.moved[1].max(axis=0)]
-        size = self.structure.size
-        low, high = _around(spread, ROOM * size)
+            # the reader may magnify displacements somewhat more
+            scaled = 1.2 * self.magnification * self.moved[1]
+            visible += [points + scaled.min(axis=0), points + scaled.max(axis=0)]
+        low, high = _bounds(np.concatenate(visible), margin)
         if self.fallen is not None and self.falls is not None:
-            fell = points + self.fallen[1]
-            wide, up = _around([fell.min(axis=0), fell.max(axis=0)], ROOM * size)
-            low = np.minimum(low, np.maximum(wide, low - 0.5 * size))
-            high = np.maximum(high, np.minimum(up, high + 0.5 * size))
-            low[1] = min(low[1], self.falls.level - ROOM * size)
+            # loose blocks are shown up to half a structure's size away
+            fall_low, fall_high = _bounds((points + self.fallen[1]).reshape(-1, 2), margin)
+            low = np.minimum(low, np.maximum(fall_low, low - 0.5 * size))
+            high = np.maximum(high, np.minimum(fall_high, high + 0.5 * size))
+            low[1] = min(low[1], self.falls.level - margin)
         return low, high
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """All of it, as a page takes it."""
+        """All data of the page."""
         pack, every = self.packed
-        low, high = self.box
         run, structure, falls = self.run, self.structure, self.falls
         mechanism = run.mechanism
         return {
             "title": self.title or str(run.dataset.attrs.get("title", structure.name)),
-            "box": _short([low, high]),
-            "points": _short(self.outlines.points),
-            "blocks": _blocks(self.outlines),
+            "box": _round(self.box),
+            "points": _round(self.outlines.points),
+            "blocks": [
+                {"name": block.name, "kind": kind, "count": len(ring)}
+                for block, kind, ring in zip(
+                    structure.blocks, block_kinds(structure), self.outlines.rings, strict=True
+                )
+            ],
             "joints": _joints(structure, run.joints),
-            "links": linked(structure, run.joints["judged"].values).tolist(),
+            "links": joint_pairs(structure, run.joints["judged"].values).tolist(),
             "hinge": run.criteria.hinge,
             "magnification": self.magnification,
-            "still": self.still,
-            "chosen": self.gravest,
+            "still": self.initial_time,
+            "chosen": self.initial_joint,
             "every": every,
-            "most": MOST,
+            "most": MAX_FRICTION_RATIO,
             "end": float(run.time[-1] if falls is None else falls.times[-1]),
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
-            "note": "" if self.moved is not None else self.why_still or _still(run),
+            "note": "" if self.moved is not None else self.missing_reason or _default_note(run),
             "pack": pack.head,
             "bytes": pack.text,
         }
 
     @property
     def text(self) -> str:
-        """The same as JSON that may stand in a page: nothing in it ends the element around it."""
+        """Data as JSON for a script element: no text can end the element."""
         return json.dumps(self.data, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def _still(run: History) -> str:
-    """What a reader is told where blocks do not move."""
+def _thin_out(count: int, every: int) -> NDArray[np.intp]:
+    """Return every so many of the numbers below a count, and the last."""
+    return np.unique(np.append(np.arange(0, count, max(1, every)), count - 1))
+
+
+def _default_note(run: History) -> str:
+    """Return the note in a page without displacements."""
     opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
     return (
-        f"The run kept no displacements: stones are drawn where they stand{opening}. With "
-        "save_fields_every = 8 in [output] of its case it keeps them."
+        f"The run contains no displacements: blocks are drawn undeformed{opening}. Set "
+        "save_fields_every = 8 in [output] of its case to record them."
     )
 
 
-def _around(points: list[Array], room: float) -> tuple[Array, Array]:
-    """Corners of a box around points, with room."""
-    every = np.concatenate(points)
-    return every.min(axis=0) - room, every.max(axis=0) + room
+def _bounds(points: Array, margin: float) -> tuple[Array, Array]:
+    """Return the corners of a box around points (n, 2), with a margin."""
+    return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 
-def _flags(joints: xr.Dataset) -> Array:
-    """Flags as one whole number: hinge + 1, and 4 slides, 8 open, 16 V > 0, 32 rotation > 0."""
-    number = joints["hinge"].values.astype(float) + 1.0
-    turned = joints["rotation"].values > 0.0 if "rotation" in joints else np.zeros(number.shape)
-    for bit, flag in (
-        (4, joints["slide"].values),
-        (8, joints["open"].values),
-        (16, joints["V"].values > 0.0),
-        (32, turned),
-    ):
-        number += bit * flag
-    return number
-
-
-def _blocks(outlines: Outlines) -> list[dict[str, Any]]:
-    """Name, kind and number of points of each block."""
-    blocks = outlines.structure.blocks
-    return [
-        {"name": block.name, "kind": kind, "count": len(ring)}
-        for block, kind, ring in zip(blocks, outlines.kinds, outlines.rings, strict=True)
-    ]
+def _encode_flags(joints: xr.Dataset) -> Array:
+    """Return flags as integers: hinge + 1, and 4 slides, 8 open, 16 V > 0, 32 rotation > 0."""
+    hinge = joints["hinge"].values.astype(float)
+    positive = joints["rotation"].values > 0.0 if "rotation" in joints else np.zeros(hinge.shape)
+    slide, opened, shear = (joints[key].values for key in ("slide", "open", "V"))
+    return hinge + 1.0 + 4 * slide + 8 * opened + 16 * (shear > 0.0) + 32 * positive
 
 
 def _joints(structure: Structure, joints: xr.Dataset) -> list[dict[str, Any]]:
-    """Name, ends, normal and limit of each joint, and whether it is judged."""
+    """Return name, ends, normal and friction limit of each joint, and whether it is judged."""
     limits = sliding_limits(joints.isel(time=0), History(joints).criteria)
     return [
         {
             "name": joint.name,
-            "ends": _short(joint.ends),
-            "normal": _short(normal),
+            "ends": _round(joint.ends),
+            "normal": _round(normal),
             "judged": bool(shown),
             "limit": round(float(limit), 4) if np.isfinite(limit) else None,
         }
@@ -454,6 +362,6 @@ def _joints(structure: Structure, joints: xr.Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def _short(values: Any) -> Any:
-    """Coordinates as lists, to a tenth of a millimetre."""
+def _round(values: Any) -> Any:
+    """Return coordinates [m] as lists, rounded to a tenth of a millimetre."""
     return np.round(np.asarray(values, float), 4).tolist()

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.view.films.frames import decisive, even, pace_of, slowed
+from archfem.view.films.frames import (
+    decisive_window,
+    even_timing,
+    frame_timing,
+    slow_motion_timing,
+)
 from archfem.view.positions import FallingBlocks
 
 KEPT = np.linspace(0.0, 10.0, 401)
@@ -13,35 +18,35 @@ KEPT = np.linspace(0.0, 10.0, 401)
 def test_slow_motion_is_slow_there_and_real_time_elsewhere():
     """Steps between frames: 1/20 s, and a tenth of it within a second; so it lasts 9 s longer."""
     fine = np.linspace(0.0, 10.0, 4001)
-    pace = slowed(fine, 20.0, (4.0, 5.0))
-    steps, slow = np.diff(pace.times), pace.speeds[:-1] < 1.0
-    assert pace.fps == 20.0
-    assert len(pace.times) / pace.fps == pytest.approx(10.0 + 9.0, abs=0.06)
+    timing = slow_motion_timing(fine, 20.0, (4.0, 5.0))
+    steps, slow = np.diff(timing.times), timing.speeds[:-1] < 1.0
+    assert timing.fps == 20.0
+    assert len(timing.times) / timing.fps == pytest.approx(10.0 + 9.0, abs=0.06)
     assert np.median(steps[slow]) == pytest.approx(0.005, rel=0.01)
     assert np.median(steps[~slow]) == pytest.approx(0.05, rel=0.01)
-    assert ((pace.times[:-1] >= 4.0) & (pace.times[:-1] < 5.0)).tolist() == slow.tolist()
+    assert ((timing.times[:-1] >= 4.0) & (timing.times[:-1] < 5.0)).tolist() == slow.tolist()
 
 
 def test_few_fields_allow_of_little_slow_motion():
     """A field each 25 ms at 20 frames a second: four frames between two make 1/8."""
-    assert slowed(KEPT, 20.0, (4.0, 5.0)).speeds.min() == pytest.approx(0.125)
-    assert slowed(KEPT[::8], 5.0, (4.0, 5.0)).speeds.min() == pytest.approx(0.25)
+    assert slow_motion_timing(KEPT, 20.0, (4.0, 5.0)).speeds.min() == pytest.approx(0.125)
+    assert slow_motion_timing(KEPT[::8], 5.0, (4.0, 5.0)).speeds.min() == pytest.approx(0.25)
 
 
 def test_a_film_of_another_length_tells_its_speed():
-    assert even(KEPT, 20.0, None).speeds == pytest.approx(1.0)
-    assert even(KEPT, 20.0, 40.0).speeds == pytest.approx(0.25)
+    assert even_timing(KEPT, 20.0, None).speeds == pytest.approx(1.0)
+    assert even_timing(KEPT, 20.0, 40.0).speeds == pytest.approx(0.25)
 
 
 def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
     falls = FallingBlocks.of(column.structure, toppled)
-    start, end = decisive(toppled, falls)
+    start, end = decisive_window(toppled, falls)
     assert start < falls.times[0] < end
-    start, end = decisive(run, None)
+    start, end = decisive_window(run, None)
     assert start < run.mechanism.time < end
     calm = run.with_criteria(af.Criteria(failures=17))
     tilt = abs(run.joints["eccentricity"]).max("joint")
-    start, end = decisive(calm, None)
+    start, end = decisive_window(calm, None)
     assert start < float(tilt["time"][int(tilt.argmax("time"))]) < end
 
 
@@ -56,4 +61,4 @@ def test_what_matters_is_the_mechanism_or_the_fall(run, column, toppled):
 )
 def test_windows_that_cannot_be_meant_are_refused(run, options, said):
     with pytest.raises(af.InvalidInput, match=said):
-        pace_of(run, None, KEPT, 20.0, **{"seconds": None, "window": None, **options})
+        frame_timing(run, None, KEPT, 20.0, **{"seconds": None, "window": None, **options})

@@ -7,13 +7,13 @@ import xarray as xr
 
 import archfem as af
 from archfem.view.films.film import film, picture
-from archfem.view.films.frames import even
+from archfem.view.films.frames import even_timing
 from archfem.view.positions import fields_at
-from archfem.view.style import HINGE, MOVED
+from archfem.view.style import Colour
 
 SIZE = (640, 400)  # small: rendering takes the time
-RED = np.array([int(HINGE[k : k + 2], 16) for k in (1, 3, 5)])
-GREEN = np.array([int(MOVED[k : k + 2], 16) for k in (1, 3, 5)])
+RED = np.array([int(Colour.HINGE[k : k + 2], 16) for k in (1, 3, 5)])
+GREEN = np.array([int(Colour.MECHANISM[k : k + 2], 16) for k in (1, 3, 5)])
 
 
 def reds(image):
@@ -57,7 +57,7 @@ def test_frames_follow_at_even_times_whatever_the_steps(model):
     run = af.History(
         xr.Dataset({"q": (("frame", "coordinate"), q)}, {"frame_time": ("frame", kept)})
     )
-    pace = even(kept, 20.0, None)
+    pace = even_timing(kept, 20.0, None)
     times, fps = pace.times, pace.fps
     assert fps == 20.0
     assert np.diff(times) == pytest.approx(1.0 / 19.0)
@@ -71,7 +71,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     run = af.time_history(model, motion, record=af.Record(fields_every=2))
     steps = np.diff(run.dataset["frame_time"].values)
     assert steps.max() > 5.0 * steps.min()
-    times = even(run.dataset["frame_time"].values, 100.0, None).times
+    times = even_timing(run.dataset["frame_time"].values, 100.0, None).times
     fields = fields_at(run, times)
     assert np.diff(times) == pytest.approx(times[1] - times[0])
     nearest = run.dataset["q"].values[
@@ -91,7 +91,7 @@ def test_a_picture_knows_what_joints_remember_or_says_that_it_does_not(coarse, c
     assert not caplog.records
     assert (of_state == of_joints).all()
     picture(coarse, dead.q, size=SIZE)
-    assert "does not remember how far they had slid" in caplog.text
+    assert "does not contain their slip" in caplog.text
     with pytest.raises(af.InvalidInput, match="of the 18 joints of this structure"):
         picture(coarse, dead, joints=dead.joints.isel(joint=slice(3)), size=SIZE)
 

@@ -6,7 +6,7 @@ import pytest
 
 import archfem as af
 from archfem.view.films.film import film
-from archfem.view.films.frames import falling, moving
+from archfem.view.films.frames import frames_of_fall, frames_of_run
 from archfem.view.films.settings import Setup
 from archfem.view.positions import FallingBlocks, fields_at
 
@@ -54,9 +54,9 @@ def test_what_flies_far_is_not_followed(setup, falls, column):
 
 def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
     times = np.array([0.1, 0.3, falls.times[0] - 1e-3])
-    held = list(moving(setup, toppled, times, fields_at(toppled, times)))
+    held = list(frames_of_run(setup, toppled, times, fields_at(toppled, times)))
     assert all(len(shot.marks.links) for shot in held)
-    (loose,) = falling(setup, falls, falls.times[-1:])
+    (loose,) = frames_of_fall(setup, falls, falls.times[-1:])
     assert list(loose.words) == ["blocks are loose"]
     assert not len(loose.marks.links)
     assert not len(loose.past)
@@ -65,8 +65,8 @@ def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
 def test_pictures_pass_over_into_the_fall(setup, toppled, falls):
     """The last state that was kept is that in which blocks came loose."""
     time = falls.times[:1]
-    (before,) = moving(setup, toppled, time, fields_at(toppled, time))
-    (after,) = falling(setup, falls, time)
+    (before,) = frames_of_run(setup, toppled, time, fields_at(toppled, time))
+    (after,) = frames_of_fall(setup, falls, time)
     np.testing.assert_allclose(before.places, after.places, atol=1e-9)
     np.testing.assert_allclose(before.shades, after.shades, atol=1e-6)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from archfem.models.model import Cells
-from archfem.view.films.renderer import Triangles
+from archfem.view.triangles import Triangles
 
 
 def cells_of(*outlines):

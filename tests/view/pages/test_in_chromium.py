@@ -39,7 +39,7 @@ def test_the_player_draws_what_the_history_says(rocked, tmp_path):
         pictures = set()
         for frame in (20, 40):
             driver.execute_script(SET, "time", float(run.dataset["frame_time"][frame]))
-            moved = outlines.moved(model, run.dataset["q"].values[frame][None])[0]
+            moved = outlines.displacements(model, run.dataset["q"].values[frame][None])[0]
             pictures.add(driver.find_element("css selector", ".player-stage").screenshot_as_base64)
             for block in range(len(model.structure.blocks)):
                 found, by, time, scale = corners(driver, block)

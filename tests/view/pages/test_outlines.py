@@ -5,6 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.view.pages.player_data import Outlines
+from archfem.view.positions import block_kinds
 
 
 def test_chords_stay_near_their_arcs(ring):
@@ -18,8 +19,8 @@ def test_chords_stay_near_their_arcs(ring):
                 middles = np.linalg.norm(0.5 * (arc[1:] + arc[:-1]) - centre, axis=1)
                 assert np.ptp(radii) < 1e-9
                 assert radii[0] - middles.min() < 2e-4 * ring.size
-    assert outlines.kinds.count("support") == 2
-    assert outlines.kinds.count("stone") == 17
+    assert block_kinds(ring).count("support") == 2
+    assert block_kinds(ring).count("stone") == 17
 
 
 @pytest.mark.parametrize("displacements", ["small", "large"])
@@ -27,7 +28,7 @@ def test_corners_of_rigid_blocks_turn_with_them(ring, displacements):
     """q holds u, v and θ of each centroid, in the order of the blocks that move."""
     model, outlines = af.build(ring, fidelity="rigid", displacements=displacements), Outlines(ring)
     q = np.random.default_rng(0).normal(size=model.size) * 0.3
-    moved = outlines.moved(model, q[None])[0]
+    moved = outlines.displacements(model, q[None])[0]
     for k, number in enumerate(ring.free):
         u, v, turn = q[3 * k : 3 * k + 3]
         own = outlines.block == number
@@ -43,7 +44,7 @@ def test_corners_of_rigid_blocks_turn_with_them(ring, displacements):
 def test_corners_of_meshed_blocks_are_nodes(stack):
     model, outlines = af.build(stack, fidelity="full", cells=(1, 1)), Outlines(stack)
     cells, q = model.cells, np.random.default_rng(0).normal(size=model.size)
-    moved = outlines.moved(model, q[None])[0]
+    moved = outlines.displacements(model, q[None])[0]
     nodes = cells.displacement(q)
     for point, number, found in zip(outlines.points, outlines.block, moved, strict=True):
         if stack.blocks[number].fixed:
@@ -59,6 +60,6 @@ def test_supports_that_moved_are_drawn_where_they_are(stack):
     motions = np.zeros((len(stack.blocks), 3))
     motions[base] = [0.1, -0.2, 0.0]
     outlines = Outlines(stack)
-    moved = outlines.moved(model.with_support_motion(motions), np.zeros((1, model.size)))[0]
+    moved = outlines.displacements(model.with_support_motion(motions), np.zeros((1, model.size)))[0]
     assert np.allclose(moved[outlines.block == base], [0.1, -0.2])
     assert not moved[outlines.block != base].any()

@@ -31,9 +31,9 @@ def test_a_notebook_shows_it_in_a_frame(rocked):
 
 def test_what_a_player_needs_is_asked_for(rocked, tmp_path):
     model, run = rocked
-    with pytest.raises(af.InvalidInput, match="does not know its structure"):
+    with pytest.raises(af.InvalidInput, match="does not contain its structure"):
         af.view.player(af.History(run.dataset))
-    with pytest.raises(af.InvalidInput, match="only its model knows"):
+    with pytest.raises(af.InvalidInput, match="the blocks follows from its model"):
         af.view.player(run)
     with pytest.raises(af.InvalidInput, match=r"has suffix '.png': a page is .html"):
         af.view.player(run, model).save(tmp_path / "player.png")

@@ -4,14 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from pages import unpack
 
 import archfem as af
-from archfem.view.pages.player_data import Outlines, Scene, unpacked
+from archfem.view.pages.player_data import Outlines, Scene
 
 
 def arrays(scene):
     data = json.loads(scene.text)
-    return data, unpacked(data["pack"], data["bytes"])
+    return data, unpack(data["pack"], data["bytes"])
 
 
 def test_a_page_holds_the_history_to_its_quantum(rocked):
@@ -29,7 +30,7 @@ def test_a_page_holds_the_history_to_its_quantum(rocked):
     hinge = (found["flags"].astype(int) & 3) - 1
     assert np.array_equal(hinge, run.joints["hinge"].values.T)
     assert np.array_equal(found["flags"].astype(int) & 4 > 0, run.joints["slide"].values.T)
-    moved = Outlines(model.structure).moved(model, run.dataset["q"].values)
+    moved = Outlines(model.structure).displacements(model, run.dataset["q"].values)
     rows = moved.reshape(len(moved), -1).T
     assert np.abs(found["frame_points"] - rows).max() <= quantum["frame_points"]
     assert np.allclose(found["frame_time"][0], run.dataset["frame_time"].values, atol=1e-6)
@@ -50,7 +51,7 @@ def test_points_of_the_thrust_line_are_those_of_the_history(rocked):
 def test_where_there_is_little_room_steps_are_left_out(rocked):
     model, run = rocked
     room = len(Scene(model.structure, run, model).packed[0].text) * 2 // 3
-    data, found = arrays(Scene(model.structure, run, model, largest=room))
+    data, found = arrays(Scene(model.structure, run, model, max_bytes=room))
     assert data["every"] > 1
     assert len(data["bytes"]) <= room
     assert found["time"][0, -1] == pytest.approx(run.time[-1], abs=1e-6)
@@ -60,7 +61,7 @@ def test_where_there_is_little_room_steps_are_left_out(rocked):
 def test_without_displacements_blocks_stand_still(rocked):
     model, run = rocked
     data, found = arrays(Scene(model.structure, af.History(run.dataset.drop_vars("q"))))
-    assert "kept no displacements" in data["note"]
+    assert "contains no displacements" in data["note"]
     assert "frame_points" not in found
 
 
@@ -69,5 +70,5 @@ def test_scenes_of_another_structure_or_model_are_refused(rocked, ring):
     with pytest.raises(af.InvalidInput, match="has 2 joints, and the structure 18"):
         Scene(ring, run)
     dataset = run.dataset.isel(coordinate=slice(3)).drop_vars(["last_q"])
-    with pytest.raises(af.InvalidInput, match="has 3 coordinates, and the model 6"):
+    with pytest.raises(af.InvalidInput, match="there are 3 coordinates, and the model has 6"):
         Scene(model.structure, af.History(dataset), model)

@@ -196,8 +196,8 @@
         this.by = Number((this.most ** Number(by.value)).toPrecision(2));
         this.show(this.time);
       });
-      const told = [scene.note, scene.every > 1 ? `Of the recorded steps, one in ${scene.every} is shown here.` : ""].filter(Boolean);
-      if (told.length) { note.textContent = told.join(" "); note.hidden = false; }
+      const messages = [scene.note, scene.every > 1 ? `Of the recorded steps, one in ${scene.every} is shown here.` : ""].filter(Boolean);
+      if (messages.length) { note.textContent = messages.join(" "); note.hidden = false; }
     }
 
     /** The ground's acceleration. */
@@ -341,11 +341,11 @@
         const value = arrays[name].row(this.chosen)[record] * factor;
         return Number.isNaN(value) ? "open" : words(Number(value.toFixed(digits)));
       };
-      const told = [["e", number("e", 3)], ["V / N", number("ratio", 3) + (joint.limit === null ? "" : ` of ${words(joint.limit)}`)], ["N", `${number("normal", 1, 1 / KILO)} kN`]];
-      if (arrays.opening) told.push(["open by", `${number("opening", 2, KILO)} mm`]);
+      const values = [["e", number("e", 3)], ["V / N", number("ratio", 3) + (joint.limit === null ? "" : ` of ${words(joint.limit)}`)], ["N", `${number("normal", 1, 1 / KILO)} kN`]];
+      if (arrays.opening) values.push(["open by", `${number("opening", 2, KILO)} mm`]);
       const readout = this.find("readout"), name = document.createElement("b");
       name.textContent = joint.name;
-      readout.replaceChildren(name, ...(falling ? [] : told).map(([label, value]) => {
+      readout.replaceChildren(name, ...(falling ? [] : values).map(([label, value]) => {
         const item = document.createElement("span"), bold = document.createElement("b");
         bold.textContent = value;
         item.append(`${label} = `, bold);
@@ -374,13 +374,13 @@
   }
 
   async function begin(root) {
-    const told = root.querySelector(".player-state");
+    const status = root.querySelector(".player-state");
     try {
       const scene = JSON.parse(root.querySelector("script").textContent);
       root.player = new Player(root, scene, await unpack(scene.pack, scene.bytes));
       root.dataset.ready = "yes";
     } catch (error) {
-      told.textContent = typeof DecompressionStream === "undefined" ? "this browser is too old for the player (no DecompressionStream)" : `the player failed: ${error.message}`;
+      status.textContent = typeof DecompressionStream === "undefined" ? "this browser is too old for the player (no DecompressionStream)" : `the player failed: ${error.message}`;
       throw error;
     }
   }
