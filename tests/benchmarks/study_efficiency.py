@@ -73,7 +73,7 @@ def timed(study: af.Study, workers: int) -> tuple[float, float, int]:
     with tempfile.TemporaryDirectory() as folder, patch(serially, alone):
         begun, spent = time.monotonic(), processor()
         failed = int((study.run(folder, workers=workers)["error"] != "").sum())
-        # The workers' time counts once their fork server has ended, which else serves later studies.
+        # The time of workers counts once their fork server has ended: it would serve later studies.
         forkserver._forkserver._stop()
         return time.monotonic() - begun, processor() - spent, failed
 
