@@ -10,7 +10,7 @@ from archfem.dynamics.fall import CollapseState
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
-    failed_joints,
+    find_failed_joints,
     longest_duration,
     step_lengths,
     with_failure_flags,
@@ -183,7 +183,7 @@ def _follow(
             words += f"; moving: {join_names([blocks[k] for k in mechanism.blocks], '; ')}"
         return DetectedMechanism(mechanism, lasting.duration, lasting.opening, words)
     own = joints.isel(joint=np.isin(joints["joint"].values, mechanism.joints))
-    begin = float(joints["time"][failed_joints(own).any("joint").values.argmax()])
+    begin = float(joints["time"][find_failed_joints(own).any("joint").values.argmax()])
     assert mechanism.time is not None
     duration = mechanism.time - begin
     opening = float(own["opening"].max()) if "opening" in own else None

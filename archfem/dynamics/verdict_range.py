@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.stats import binomtest, rankdata
 
 from archfem._display import ResultDisplay
@@ -31,12 +32,12 @@ class VerdictRange(ResultDisplay):
     dataset: xr.Dataset
 
     @property
-    def falls(self) -> Array:
+    def falls(self) -> NDArray[np.bool_]:
         """Whether the structure partly or wholly falls, by run (runs,)."""
         return np.isin(self.dataset["outcome"].values, FALLEN_STATES)
 
     @property
-    def answered(self) -> Array:
+    def answered(self) -> NDArray[np.bool_]:
         """Whether a run has an answer (runs,)."""
         return self.dataset["error"].values == ""
 
@@ -180,10 +181,12 @@ class Condition(NamedTuple):
     name: str
     value: Any
     below: bool | None
-    holds: Array  # (runs,)
+    holds: NDArray[np.bool_]  # (runs,)
 
 
-def _list_conditions(rows: xr.Dataset, names: Sequence[str], among: Array) -> Iterator[Condition]:
+def _list_conditions(
+    rows: xr.Dataset, names: Sequence[str], among: NDArray[np.bool_]
+) -> Iterator[Condition]:
     """Yield all conditions that split some runs."""
     for name in names:
         values = rows[name].values
@@ -197,13 +200,13 @@ def _list_conditions(rows: xr.Dataset, names: Sequence[str], among: Array) -> It
                 yield Condition(name, str(value), None, values == value)
 
 
-def _separation(falls: Array, chosen: Array) -> float:
+def _separation(falls: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> float:
     """Return how well chosen runs and runs that fall agree: F1, the mean of both shares [-]."""
     inside = float(falls[chosen].sum())
     return 2.0 * inside / max(float(chosen.sum() + falls.sum()), 1.0)
 
 
-def _group_values(values: Array, groups: int = 3) -> list[tuple[str, Array]]:
+def _group_values(values: Array, groups: int = 3) -> list[tuple[str, NDArray[np.bool_]]]:
     """Return labels and members of the groups of a property: values, or thirds of numbers."""
     if values.dtype.kind != "f" or len(np.unique(values)) <= groups:
         return [

@@ -25,7 +25,7 @@ class DeepenedBlocks(RigidBlocks):
     factor: float = 1.0
 
     @property
-    def balance(self) -> sparse.csr_matrix:  # type: ignore[override]
+    def balance(self) -> sparse.csr_matrix:
         """Balance of the free blocks with forces at the ends of the deeper joints."""
         count = len(self.structure.depths)
         # an end at ± f h/2 is the sum of (1 ± f)/2 of the forces at the ends at ± h/2

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import chain, product
 from math import isfinite, log2
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy import stats
@@ -225,7 +225,23 @@ class Point:
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def model_key(point: Point) -> str:
+class StudyPoint(Protocol):
+    """A point that workers evaluate: what its model is built from, and the changes to it."""
+
+    @property
+    def base(self) -> Any:
+        """Settings that points share; points of one model have the same object."""
+
+    @property
+    def changes(self) -> tuple[tuple[str, Any], ...]:
+        """Changed settings by name."""
+
+    @property
+    def case(self) -> Any:
+        """The argument of the evaluator."""
+
+
+def model_key(point: StudyPoint) -> str:
     """Return a key that points of one model share, as a rule."""
     changes = [each for each in point.changes if each[0].partition(".")[0] in MODEL_SECTIONS]
     return f"{id(point.base)} {changes!r}"

@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 from archfem.cases.provenance import describe_version
 from archfem.errors import ArchfemError, InvalidInput, StudyStopped
 from archfem.studies.evaluators import Evaluator
-from archfem.studies.parameter_space import Point, model_key
+from archfem.studies.parameter_space import StudyPoint, model_key
 
 # Evaluated point: `found`, a flat table; `error`, its text or ""; `ours`, whether the error is one
 # of archfem's, which the same case would raise again
@@ -45,7 +45,7 @@ def make_row(found: dict[str, Any], error: str = "", *, ours: bool = True) -> Ro
     return {"found": found, "error": error, "ours": ours}
 
 
-def evaluate_point(point: Point, evaluator: Evaluator) -> Row:
+def evaluate_point(point: StudyPoint, evaluator: Evaluator) -> Row:
     """Return the row of a point, also if its evaluation raises an error."""
     try:
         return make_row(evaluator.evaluate(point.case))
@@ -56,7 +56,7 @@ def evaluate_point(point: Point, evaluator: Evaluator) -> Row:
 
 
 def evaluate_batch(
-    points: Sequence[tuple[int, Point]], evaluator: Evaluator, version: str
+    points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator, version: str
 ) -> tuple[str, list[tuple[int, Row]]]:
     """Evaluate points in a process that may have threads; no rows if its version differs."""
     own_version = describe_version()
@@ -68,7 +68,7 @@ def evaluate_batch(
 
 
 def evaluate_serially(
-    points: Sequence[tuple[int, Point]], evaluator: Evaluator
+    points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator
 ) -> Iterator[tuple[int, Row]]:
     """Evaluate points in this process, one after another."""
     for number, point in points:
@@ -76,7 +76,7 @@ def evaluate_serially(
 
 
 def evaluate_on_processes(
-    points: Sequence[tuple[int, Point]],
+    points: Sequence[tuple[int, StudyPoint]],
     evaluator: Evaluator,
     workers: int,
     log: Path | None = None,
@@ -103,7 +103,7 @@ class Task(NamedTuple):
 class TaskQueue:
     """Points to be evaluated, in their order, grouped by model."""
 
-    def __init__(self, points: Sequence[tuple[int, Point]], evaluator: Evaluator) -> None:
+    def __init__(self, points: Sequence[tuple[int, StudyPoint]], evaluator: Evaluator) -> None:
         self._tasks: dict[str, deque[Task]] = {}
         for number, point in points:
             task = Task(number, _pickle_task(point, evaluator), model_key(point))
@@ -277,7 +277,7 @@ def _end_with_driver() -> None:
     os._exit(1)
 
 
-def _pickle_task(point: Point, evaluator: Evaluator) -> bytes:
+def _pickle_task(point: StudyPoint, evaluator: Evaluator) -> bytes:
     """Pickle a point and its evaluator for another process."""
     name = getattr(evaluator.find, "__qualname__", repr(evaluator.find))
     try:

@@ -36,7 +36,7 @@ def test_a_block_on_a_slope_needs_the_friction_of_its_angle():
 
 
 def test_a_block_that_leans_out_needs_a_bed_up_to_its_centroid():
-    """A parallelogram whose centroid is 0.8 m from the middle of its bed, half a bed being 0.5 m."""
+    """A parallelogram, its centroid 0.8 m from the middle of a bed of half a metre to each side."""
     leaning = [[0.0, 0.0], [1.0, 0.0], [2.6, 2.0], [1.6, 2.0]]
     text = explain_instability(on_a_bed(leaning))
     assert value(r"if they are ([\d.]+) times as deep", text) == pytest.approx(1.6, rel=0.01)

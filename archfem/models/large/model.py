@@ -43,7 +43,7 @@ from archfem.models.large.joints import (
     initial_segment_measures,
     joint_orientation,
 )
-from archfem.models.model import Cells, Model, ModelStep, Observer
+from archfem.models.model import Model, ModelStep, Observer
 
 
 class LargeDisplacementModel(Model):
