@@ -9,47 +9,23 @@ gradient of an energy, and the problem is not symmetric. Iterations solve
 
     (1 - λ′ F) μ = λ(z̄ + F λ) - λ
 
-for the correction μ of λ, by a dense factor where the rows are few, else by generalised minimal
-residuals in single precision (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856): an
-iteration only leads to the next one. Rows are active where joints open or slide, and where openings
-press on those. They are predicted before the step, and checked at the gaps that result.
+for the correction μ of λ, by a dense factor where the equations are few, else by stabilised
+biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) to a coarse
+tolerance: the next iteration takes up what remains. Rows are active where joints open or slide, and
+where openings press on those. They are predicted before the step, and checked at the gaps that
+result.
+
+F of the whole structure is too large for the cache of the processor. A problem copies the rows that
+it needs: those of rows with a force or a derivative, about half of its rows.
 """
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import kernel, summing_kernel
-from archfem.dynamics.solvers.active_compliance import (
-    BEFORE,
-    CHANGE,
-    COLUMN,
-    COLUMN_ROW,
-    FORCE,
-    FREE,
-    GUESS,
-    MARK,
-    MAX_KRYLOV_VECTORS,
-    NEAR,
-    NUMBER,
-    PIVOT,
-    PLACE,
-    RELEASED,
-    RESIDUAL,
-    ROW_COLUMN,
-    TRIAL,
-    add_columns,
-    add_gaps,
-    begin_problem,
-    clear_problem,
-    line,
-    padded,
-    padded_square,
-    products,
-    square,
-    update_columns,
-)
-from archfem.dynamics.solvers.joint_law import GUESS as Z_GUESS
+from archfem._numba import kernel, summing_kernel, view_kernel
+from archfem._typing import Array
 from archfem.dynamics.solvers.joint_law import (
-    START,
     collect_derivatives,
     collect_released,
     evaluate_openings,
@@ -57,17 +33,91 @@ from archfem.dynamics.solvers.joint_law import (
     largest_force,
     predict_gaps,
 )
-from archfem.dynamics.solvers.linear_step import LAMBDA, SPARE, Z_BEFORE, Z
+from archfem.dynamics.solvers.supernodal_lu import Indices
 
-# Rows up to which a problem is solved by its factor
+# Equations up to which a problem is solved by its factor
 MAX_DIRECT_ROWS = 100
 
 
+class ActiveRows(NamedTuple):
+    """F of a structure, and the workspace of dense problems in some of its rows.
+
+    Workspaces have room for all rows of the structure; pages that are never touched cost no memory.
+    They are allocated once, as allocation in every iteration is slower than the arithmetic.
+    """
+
+    full: Array  # F (p, p), symmetric, filled for rows that have been active
+    filled: Any  # whether a row is filled in F (p,)
+    near: Any  # whether a row is in the problem at hand (p,)
+    marks: Any  # scratch, False between uses (p,)
+    sizes: Indices  # number of rows, and of equations (2,)
+    numbers: Indices  # of the rows in the structure (p,)
+    place: Indices  # place of each row of the structure among them, -1 for none (p,)
+    copied: Any  # whether a row of F is in `entries` (p,)
+    entries: Array  # of F in the rows of the problem, row by row (p²,)
+    unknowns: Indices  # rows that have an equation (p,)
+    equation: Indices  # equation of each row, -1 for none (p,)
+    matrix: Array  # of the equations, then its factor (p²,)
+    pivots: Indices  # row exchanges of the factor (p,)
+    columns: Indices  # rows with a force (p,)
+    force: Array  # λ (p,)
+    released: Array  # λ(z) (p,)
+    before: Array  # λ(z) before an iteration (p,)
+    change: Array  # residual of λ, then its correction (p,)
+    trial: Array  # λ that is tried (p,)
+    free: Array  # gaps if nothing were released (p,)
+    gap: Array  # gaps that λ yields (p,)
+    guess: Array  # of the gaps (p,)
+    solution: Array  # of equations (p,)
+    directions: Array  # of biconjugate gradients (6, p)
+    segments: Indices  # numbers of segments in the problem (s,)
+    slips: Indices  # numbers of slip rows in the problem (p,)
+    derivatives: tuple[Indices, Array]  # places of λ′, with its pair, and values (m, 3), (m,)
+
+    @classmethod
+    def of(cls, size: int, segments: int, pairs: int) -> "ActiveRows":
+        """Return the workspace for a structure of some rows, segments and pairs of rows."""
+
+        def flags() -> Any:
+            return np.zeros(size, bool)
+
+        def integers(value: int = 0) -> Indices:
+            return np.full(size, value, np.int64)
+
+        return cls(
+            full=np.empty((size, size)),
+            filled=flags(),
+            near=flags(),
+            marks=flags(),
+            sizes=np.zeros(2, np.int64),
+            numbers=integers(),
+            place=integers(-1),
+            copied=flags(),
+            entries=np.empty(size**2),
+            unknowns=integers(),
+            equation=integers(-1),
+            matrix=np.empty(size**2),
+            pivots=integers(),
+            columns=integers(),
+            **{name: np.zeros(size) for name in cls._fields[14:23]},
+            directions=np.empty((6, size)),
+            segments=np.empty(segments, np.int64),
+            slips=integers(),
+            derivatives=(np.zeros((pairs, 3), np.int64), np.zeros(pairs)),
+        )
+
+
+@view_kernel
+def _square(entries, size):  # type: ignore
+    """Return a square matrix in an array that may be larger (k, k)."""
+    return entries[: size**2].reshape((size, size))
+
+
 @kernel
-def predict_active_rows(law, compliance, values):  # type: ignore
+def predict_active_rows(law, active, work):  # type: ignore
     """Mark in `near` the rows that are active, or soon will be at the rates of the gaps."""
-    near, marks, openings = compliance.flags[NEAR], compliance.flags[MARK], law.openings
-    gap, before, force, ahead = values[Z], values[Z_BEFORE], values[LAMBDA], values[SPARE]
+    near, marks, openings = active.near, active.marks, law.openings
+    gap, before, force, ahead = work.gap, work.gap_before, work.force, work.spare
     predict_gaps(law, gap, before)
     for row in range(len(gap)):
         near[row] = force[row] != 0.0
@@ -75,14 +125,14 @@ def predict_active_rows(law, compliance, values):  # type: ignore
         opens = row < openings and gap[row] + 2.0 * (gap[row] - before[row]) > 0.0
         marks[row] = near[row] or opens
         # the end of the path on which the law sees the gaps
-        base = law.rows[START, row] if law.gain > 0.0 else gap[row]
-        ahead[row] = base + 2.0 * (law.rows[Z_GUESS, row] - base)
+        base = law.start[row] if law.gain > 0.0 else gap[row]
+        ahead[row] = base + 2.0 * (law.guess[row] - base)
     for segment in law.segments:
         if marks[segment.near] or marks[segment.far]:
             near[segment.near] = near[segment.far] = True
     for row in range(len(gap)):
         marks[row] = False
-    _add_active(law, compliance, ahead, near, True)
+    _add_active(law, active, ahead, near, True)
     _add_slips_near_limit(law, near)
     _add_pressing(law, near)
 
@@ -111,29 +161,29 @@ def _add_pressing(law, near):  # type: ignore
 
 
 @kernel
-def check_active_rows(law, compliance, gap, near):  # type: ignore
+def check_active_rows(law, active, gap, near):  # type: ignore
     """Return whether λ fits the gaps of the whole structure; adds rows that are active, too.
 
     λ of the rows fits the guess of their gaps: so these need only be equal, to ten times the
     tolerance of the iterations, as rounding of the whole structure adds to theirs.
     """
-    guess, error = law.rows[Z_GUESS], 0.0
+    guess, error = law.guess, 0.0
     for row in range(len(gap)):
         if near[row]:
             error = max(error, law.stiffness[row] * abs(gap[row] - guess[row]))
         guess[row] = gap[row]
     everywhere = error > 1e-11 * largest_force(law, gap)
-    return _add_active(law, compliance, gap, near, everywhere) and not everywhere
+    return _add_active(law, active, gap, near, everywhere) and not everywhere
 
 
 @kernel
-def _add_active(law, compliance, gap, near, everywhere):  # type: ignore
+def _add_active(law, active, gap, near, everywhere):  # type: ignore
     """Add rows that are active at some gaps; returns whether there are none.
 
     Evaluates all rows, or only those that are not near.
     """
     openings, more, count, slip_count = law.openings, False, 0, 0
-    segments, slips = compliance.segments, compliance.slips
+    segments, slips = active.segments, active.slips
     for number in range(len(law.segments)):
         segment = law.segments[number]
         if everywhere or not (near[segment.near] and near[segment.far]):
@@ -159,135 +209,146 @@ def _add_active(law, compliance, gap, near, everywhere):  # type: ignore
 
 
 @kernel
-def subtract_released(compliance, rows, force, gap):  # type: ignore
-    """Subtract from gaps of some rows what released forces contribute, z̄ = z - F λ."""
-    begin_problem(compliance, rows)
-    own, released, moved = (
-        compliance.indices[NUMBER],
-        compliance.vectors[FORCE],
-        compliance.vectors[FREE],
-    )
+def begin_problem(active, rows):  # type: ignore
+    """Begin a problem in some rows (k,)."""
+    for k in range(active.sizes[0]):
+        active.place[active.numbers[k]] = -1
+    active.sizes[0] = len(rows)
     for k in range(len(rows)):
-        released[k], moved[k] = force[own[k]], 0.0
-    add_columns(compliance, released[: len(rows)], compliance.derivatives[0], 0)
-    add_gaps(compliance, released, moved[: len(rows)])
-    for k in range(len(rows)):
-        gap[own[k]] -= moved[k]
+        active.numbers[k], active.place[rows[k]], active.copied[k] = rows[k], k, False
 
 
 @kernel
-def solve_active_rows(law, start, rows, compliance, force, tolerance):  # type: ignore
-    """Solve for λ of some rows from the guess of their gaps."""
-    some = False
-    for row in range(len(force)):
-        some = some or force[row] != 0.0
-    if not some:  # so that histories do not depend on what was solved before
-        clear_problem(compliance)
-    begin_problem(compliance, rows)
-    count, vectors, own, iterations = len(rows), compliance.vectors, compliance.indices[NUMBER], -1
-    inside, slip_count = _select_joints(law, compliance, count)
-    selection = (
-        compliance.indices[PLACE],
-        compliance.segments[:inside],
-        compliance.slips[:slip_count],
-    )
+def _copy_row(active, k):  # type: ignore
+    """Copy a row of F in the rows of the problem, unless it has been."""
+    if not active.copied[k]:
+        active.copied[k], size = True, active.sizes[0]
+        own, full = _square(active.entries, size)[k], active.full[active.numbers[k]]
+        for j in range(size):
+            own[j] = full[active.numbers[j]]
+
+
+@summing_kernel
+def add_gaps(active, force, gaps):  # type: ignore
+    """Add F λ to the gaps of the rows (k,)."""
+    size, entries, columns, count = active.sizes[0], active.entries, active.columns, 0
+    for k in range(size):
+        if force[k] != 0.0:
+            _copy_row(active, k)
+            columns[count] = k
+            count += 1
+    # F is symmetric: four of its rows at a time, as each gap is loaded once for all of them
+    for c in range(0, count - count % 4, 4):
+        e, f, g, h = columns[c], columns[c + 1], columns[c + 2], columns[c + 3]
+        a, b, u, v = force[e], force[f], force[g], force[h]
+        p, q = entries[e * size : (e + 1) * size], entries[f * size : (f + 1) * size]
+        r, s = entries[g * size : (g + 1) * size], entries[h * size : (h + 1) * size]
+        for k in range(size):
+            gaps[k] += a * p[k] + b * q[k] + u * r[k] + v * s[k]
+    for c in range(count - count % 4, count):
+        own, value = _square(entries, size)[columns[c]], force[columns[c]]
+        for k in range(size):
+            gaps[k] += value * own[k]
+
+
+@kernel
+def subtract_released(active, force, gap):  # type: ignore
+    """Subtract from gaps of the rows what released forces contribute, z̄ = z - F λ."""
+    for k in range(active.sizes[0]):
+        active.force[k], active.gap[k] = force[active.numbers[k]], 0.0
+    add_gaps(active, active.force, active.gap)
+    for k in range(active.sizes[0]):
+        gap[active.numbers[k]] -= active.gap[k]
+
+
+@kernel
+def solve_active_rows(law, start, active, force, tolerance):  # type: ignore
+    """Solve for λ of the rows from the guess of their gaps; returns iterations, or -1."""
+    count, own, iterations = active.sizes[0], active.numbers, -1
+    inside, slip_count = _select_joints(law, active)
+    selection = active.place, active.segments[:inside], active.slips[:slip_count]
     for full_steps in (4, 1):
         for k in range(count):
             # a second try restarts from the guess, with a line search from its begin
             if full_steps > 1:
-                vectors[GUESS][k] = law.rows[Z_GUESS, own[k]]
-            law.rows[Z_GUESS, own[k]] = vectors[GUESS][k]
-            vectors[FORCE][k], vectors[FREE][k] = force[own[k]], start[own[k]]
-        iterations = _iterate(law, compliance, selection, tolerance, full_steps)
+                active.guess[k] = law.guess[own[k]]
+            law.guess[own[k]] = active.guess[k]
+            active.force[k], active.free[k] = force[own[k]], start[own[k]]
+        iterations = _iterate(law, active, selection, tolerance, full_steps)
         if iterations > 0:
             break
     for k in range(count):
-        force[own[k]] = vectors[FORCE][k]
+        force[own[k]] = active.force[k]
     return iterations
 
 
 @kernel
-def _select_joints(law, compliance, count):  # type: ignore
+def _select_joints(law, active):  # type: ignore
     """List the segments and the slip rows of a problem; returns how many there are of each."""
-    place, segments, slips = compliance.indices[PLACE], compliance.segments, compliance.slips
-    inside, slip_count = 0, 0
+    place, inside, slip_count = active.place, 0, 0
     for number in range(len(law.segments)):
         if place[law.segments[number].near] >= 0 and place[law.segments[number].far] >= 0:
-            segments[inside] = number
+            active.segments[inside] = number
             inside += 1
-    for k in range(count):
-        if compliance.indices[NUMBER, k] >= law.openings:
-            slips[slip_count] = compliance.indices[NUMBER, k]
+    for k in range(active.sizes[0]):
+        if active.numbers[k] >= law.openings:
+            active.slips[slip_count] = active.numbers[k]
             slip_count += 1
     return inside, slip_count
 
 
 @kernel
-def _iterate(law, compliance, selection, tolerance, full_steps):  # type: ignore
+def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
     """Take Newton iterations from the guess; returns how many, or -1.
 
     The first residual is that of the gaps, later ones are those of λ. The equations serve again
-    where the last iteration promises that they suffice for the next, and no row was added.
+    where the last iteration promises that they suffice for the next.
     """
-    size, error, vectors, rows = (
-        compliance.sizes[0],
-        np.inf,
-        compliance.vectors,
-        compliance.indices[NUMBER],
-    )
-    force, released = vectors[FORCE][:size], vectors[RELEASED][:size]
-    residual, change = vectors[RESIDUAL][:size], vectors[CHANGE][:size]
-    places, values = compliance.derivatives
-    _evaluate(law, selection, released)
-    count = collect_derivatives(law, selection, compliance.derivatives)
-    update_columns(compliance, force, released, places, count)
+    size, error, (places, values) = active.sizes[0], np.inf, active.derivatives
+    force, released, change, gap = active.force, active.released, active.change, active.gap
+    _evaluate(law, selection, released[:size])
+    count = collect_derivatives(law, selection, active.derivatives)
     for k in range(size):
         force[k] = released[k]
-        residual[k], change[k] = vectors[FREE][k] - law.rows[Z_GUESS, rows[k]], 0.0
-    prepare_equations(compliance, count)
+        gap[k], change[k] = active.free[k] - law.guess[active.numbers[k]], 0.0
+    prepare_equations(active, count)
     # right side λ′ (z̄ + F λ - z) of the first iteration
-    add_gaps(compliance, released, residual)
+    add_gaps(active, released, gap)
     for k in range(count):
-        change[places[k, 0]] += values[k] * residual[places[k, 1]]
+        change[places[k, 0]] += values[k] * gap[places[k, 1]]
     for iteration in range(1, 17):
-        solve_equations(change, compliance, count)
-        last, error = error, _go(law, compliance, selection, iteration >= full_steps)
+        solve_equations(change, active, count)
+        last, error = error, _go(law, active, selection, iteration >= full_steps)
         if error <= tolerance or last <= error <= 10.0 * tolerance:
             return iteration
         if not error < np.inf:
             return -1
-        add_columns(compliance, released, places, 0)
-        added = compliance.sizes[1] > compliance.sizes[3]
-        if iteration == 1 or added or error**2 > last * tolerance:
-            count = collect_derivatives(law, selection, compliance.derivatives)
-            add_columns(compliance, released, places, count)
-            prepare_equations(compliance, count)
+        if iteration == 1 or error**2 > last * tolerance:
+            count = collect_derivatives(law, selection, active.derivatives)
+            prepare_equations(active, count)
         for k in range(size):
             change[k] = released[k] - force[k]
     return -1
 
 
 @kernel
-def _go(law, compliance, selection, search):  # type: ignore
+def _go(law, active, selection, search):  # type: ignore
     """Change λ by its correction, or with a line search by a share; returns its residual [N]."""
-    size, vectors, share = compliance.sizes[0], compliance.vectors, 1.0
-    force, released = vectors[FORCE][:size], vectors[RELEASED][:size]
-    change = vectors[CHANGE][:size]
-    before, trial, z = vectors[BEFORE][:size], vectors[TRIAL][:size], vectors[RESIDUAL][:size]
-    square = 0.0
+    size, share, square, change = active.sizes[0], 1.0, 0.0, active.change
+    force, released, before, trial = active.force, active.released, active.before, active.trial
     for k in range(size):
         before[k] = released[k]
         square += (released[k] - force[k]) ** 2
     while True:
         for k in range(size):
-            trial[k], z[k] = force[k] + share * change[k], vectors[FREE][k]
+            trial[k], active.gap[k] = force[k] + share * change[k], active.free[k]
             # points that would reverse their slip are held: no derivative sees where they stick
             if before[k] * trial[k] < 0.0:
                 trial[k] = 0.0
-        add_gaps(compliance, trial, z)
+        add_gaps(active, trial, active.gap)
         for k in range(size):
-            law.rows[Z_GUESS, compliance.indices[NUMBER, k]] = z[k]
-        _evaluate(law, selection, released)
+            law.guess[active.numbers[k]] = active.gap[k]
+        _evaluate(law, selection, released[:size])
         error, now = 0.0, 0.0
         for k in range(size):
             off = abs(released[k] - trial[k])
@@ -305,65 +366,62 @@ def _go(law, compliance, selection, search):  # type: ignore
 @kernel
 def _evaluate(law, selection, released):  # type: ignore
     """Evaluate λ of the rows at the guess of their gaps."""
-    evaluate_openings(law, law.rows[Z_GUESS], selection[1])
-    evaluate_slips(law, law.rows[Z_GUESS], selection[2])
+    evaluate_openings(law, law.guess, selection[1])
+    evaluate_slips(law, law.guess, selection[2])
     collect_released(law, selection, released)
 
 
 @kernel
-def prepare_equations(compliance, count):  # type: ignore
-    """Fill the equations 1 - λ′ F of the columns, and factorise them where they are few."""
-    compliance.sizes[3] = size = compliance.sizes[1]
-    if size <= MAX_DIRECT_ROWS:
-        _factorise_equations(compliance, count)
-    else:
-        _fill_equations(compliance, count, padded_square(compliance.single, size))
+def prepare_equations(active, count):  # type: ignore
+    """List the rows that need an equation, and factorise these where they are few.
+
+    Without a derivative, and with λ equal to λ(z), the correction of a row is zero.
+    """
+    places, _ = active.derivatives
+    for k in range(active.sizes[0]):
+        active.equation[k] = 0 if active.released[k] != active.force[k] else -1
+    for entry in range(count):
+        active.equation[places[entry, 0]] = 0
+    active.sizes[1] = 0
+    for k in range(active.sizes[0]):
+        if active.equation[k] == 0:
+            active.equation[k], active.unknowns[active.sizes[1]] = active.sizes[1], k
+            active.sizes[1] += 1
+    if active.sizes[1] <= MAX_DIRECT_ROWS:
+        _factorise_equations(active, count)
 
 
 @kernel
-def _factorise_equations(compliance, count):  # type: ignore
-    """Factorise 1 - λ′ F of the columns."""
-    matrix = square(compliance.matrix, compliance.sizes[3])
-    _fill_equations(compliance, count, matrix)
-    factorise_dense(matrix, compliance.indices[PIVOT])
-
-
-@summing_kernel
-def _fill_equations(compliance, count, matrix):  # type: ignore
-    """Fill 1 - λ′ F of the columns, by two derivatives at a time where these share a row."""
-    (places, values), (size, wide), entry = compliance.derivatives, matrix.shape, 0
+def _factorise_equations(active, count):  # type: ignore
+    """Fill and factorise the equations 1 - λ′ F."""
+    size, (places, values) = active.sizes[1], active.derivatives
+    matrix = _square(active.matrix, size)
     for i in range(size):
-        for k in range(wide):
+        for k in range(size):
             matrix[i, k] = 0.0
         matrix[i, i] = 1.0
-    while entry < count:
-        row, value = places[entry, 0], values[entry]
-        own, other = matrix[compliance.indices[ROW_COLUMN, row]], line(compliance, places[entry, 1])
-        entry += 1
-        if entry < count and places[entry, 0] == row:
-            second, further = values[entry], line(compliance, places[entry, 1])
-            for k in range(wide):
-                own[k] -= value * other[k] + second * further[k]
-            entry += 1
-        else:
-            for k in range(wide):
-                own[k] -= value * other[k]
+    for entry in range(count):
+        _copy_row(active, places[entry, 1])
+        own = matrix[active.equation[places[entry, 0]]]
+        other = _square(active.entries, active.sizes[0])[places[entry, 1]]
+        for k in range(size):
+            own[k] -= values[entry] * other[active.unknowns[k]]
+    factorise_dense(matrix, active.pivots)
 
 
 @kernel
-def solve_equations(change, compliance, count):  # type: ignore
-    """Solve (1 - λ′ F) μ = d in place; in rows without a column μ is d."""
-    size = compliance.sizes[3]
-    own = compliance.vectors[COLUMN][:size]
+def solve_equations(change, active, count):  # type: ignore
+    """Solve (1 - λ′ F) μ = d in place; in rows without an equation μ is d."""
+    size, own = active.sizes[1], active.solution
+    if size > MAX_DIRECT_ROWS:
+        if _solve_by_gradients(active, change, count):
+            return
+        _factorise_equations(active, count)
     for k in range(size):
-        own[k] = change[compliance.indices[COLUMN_ROW, k]]
-    if size > MAX_DIRECT_ROWS and not minimise_residual(compliance, own):
-        _factorise_equations(compliance, count)
-        solve_dense(square(compliance.matrix, size), compliance.indices[PIVOT], own)
-    elif size <= MAX_DIRECT_ROWS:
-        solve_dense(square(compliance.matrix, size), compliance.indices[PIVOT], own)
+        own[k] = change[active.unknowns[k]]
+    solve_dense(_square(active.matrix, size), active.pivots, own)
     for k in range(size):
-        change[compliance.indices[COLUMN_ROW, k]] = own[k]
+        change[active.unknowns[k]] = own[k]
 
 
 @kernel
@@ -395,7 +453,7 @@ def factorise_dense(matrix, pivots):  # type: ignore
 @summing_kernel
 def solve_dense(matrix, pivots, right):  # type: ignore
     """Solve in place by the factor of `factorise_dense`."""
-    size = len(right)
+    size = len(matrix)
     for k in range(size):
         best = pivots[k]
         right[k], right[best] = right[best], right[k]
@@ -411,78 +469,54 @@ def solve_dense(matrix, pivots, right):  # type: ignore
         right[k] = total * matrix[k, k]
 
 
-@summing_kernel
-def minimise_residual(compliance, right):  # type: ignore
-    """Solve in place by minimal residuals; returns False if that takes too many products."""
-    size, square_sum, basis = len(right), 0.0, compliance.basis
-    rotations, triangle, wide = compliance.rotations, compliance.triangle, padded(size)
+@kernel
+def _solve_by_gradients(active, right, count):  # type: ignore
+    """Solve in place by biconjugate gradients; returns False if that takes as long as a factor."""
+    size, directions = active.sizes[0], active.directions
+    residual, shadow, along = directions[0][:size], directions[1][:size], directions[2][:size]
+    image, product, solution = directions[3][:size], directions[4][:size], directions[5][:size]
     for k in range(size):
-        square_sum += right[k] ** 2
-    rotations[0, 2] = first = np.sqrt(square_sum)
-    if first == 0.0:
-        return True
-    for k in range(size):
-        basis[0, k] = right[k] / first
-    for k in range(size, wide):
-        basis[0, k] = 0.0
-    for step in range(MAX_KRYLOV_VECTORS):
-        # Arnoldi: the next vector of the basis, orthogonal to all before
-        products(compliance.single, wide, basis[step][:wide], basis[step + 1][:size])
-        for k in range(size, wide):
-            basis[step + 1, k] = 0.0
-        norm = _orthogonalise(basis, step + 1, wide, triangle[step])
-        _rotate(triangle[step], step, norm, rotations)
-        # the next Newton iteration takes up what remains
-        if abs(rotations[step + 1, 2]) <= 3e-4 * first:
-            _combine(basis, step + 1, compliance, right)
+        residual[k] = shadow[k] = right[k]
+        along[k] = image[k] = solution[k] = 0.0
+    square, angle, step, damping = _dot(residual, residual), 1.0, 1.0, 1.0
+    limit = 1e-7 * square
+    for _ in range(24):
+        if _dot(residual, residual) <= limit:
+            for k in range(size):
+                right[k] = solution[k]
             return True
+        last, angle = angle, _dot(shadow, residual)
+        factor = angle / last * step / damping
+        for k in range(size):
+            along[k] = residual[k] + factor * (along[k] - damping * image[k])
+        _apply_equations(active, along, image, count)
+        step = angle / _dot(shadow, image)
+        for k in range(size):
+            residual[k] -= step * image[k]
+        _apply_equations(active, residual, product, count)
+        square = _dot(product, product)
+        damping = _dot(product, residual) / square if square > 0.0 else 1.0
+        for k in range(size):
+            solution[k] += step * along[k] + damping * residual[k]
+            residual[k] -= damping * product[k]
     return False
 
 
-@summing_kernel
-def _orthogonalise(basis, number, size, shares):  # type: ignore
-    """Subtract from a vector its components along those before it, and scale it; its norm."""
-    own, square_sum, zero = basis[number], 0.0, np.float32(0.0)
-    for j in range(number):
-        other, share = basis[j], zero
-        for k in range(size):
-            share += other[k] * own[k]
-        shares[j] = share
-        for k in range(size):
-            own[k] -= share * other[k]
-    for k in range(size):
-        square_sum += own[k] * own[k]
-    norm = np.sqrt(square_sum)
-    inverse = np.float32(1.0 / norm if norm > 0.0 else 0.0)
-    for k in range(size):
-        own[k] *= inverse
-    return norm
-
-
 @kernel
-def _rotate(column, step, norm, rotations):  # type: ignore
-    """Bring a column of the Hessenberg matrix into a triangle by Givens rotations."""
-    for j in range(step):
-        above, cosine, sine = column[j], rotations[j, 0], rotations[j, 1]
-        column[j] = cosine * above + sine * column[j + 1]
-        column[j + 1] = cosine * column[j + 1] - sine * above
-    length = np.sqrt(column[step] ** 2 + norm**2)
-    cosine, sine = column[step] / length, norm / length
-    rotations[step, 0], rotations[step, 1], column[step] = cosine, sine, length
-    rotations[step + 1, 2] = -sine * rotations[step, 2]
-    rotations[step, 2] *= cosine
+def _apply_equations(active, vector, image, count):  # type: ignore
+    """Multiply the equations by a vector, (1 - λ′ F) x."""
+    (places, values), moved = active.derivatives, active.gap
+    for k in range(active.sizes[0]):
+        image[k], moved[k] = vector[k], 0.0
+    add_gaps(active, vector, moved)
+    for entry in range(count):
+        image[places[entry, 0]] -= values[entry] * moved[places[entry, 1]]
 
 
 @summing_kernel
-def _combine(basis, count, compliance, right):  # type: ignore
-    """Combine the vectors of the basis by back substitution in the triangle."""
-    triangle, rotations = compliance.triangle, compliance.rotations
-    for k in range(len(right)):
-        right[k] = 0.0
-    for step in range(count - 1, -1, -1):
-        rotations[step, 2] /= triangle[step, step]
-        for j in range(step):
-            rotations[j, 2] -= rotations[step, 2] * triangle[step, j]
-        own = basis[step]
-        for k in range(len(right)):
-            right[k] += rotations[step, 2] * own[k]
+def _dot(a, b):  # type: ignore
+    """Return the inner product of two vectors."""
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total

@@ -153,12 +153,6 @@ def _distinct_rows(rows: Array) -> tuple[Any, Any]:
     return np.array(distinct), number
 
 
-# Rows of `JointLaw.rows`: gaps of the undisplaced structure, gaps at the start of the step, their
-# change per step at the rates there, and z at which forces were evaluated last. The law has few
-# arrays, as each takes time to pass to a compiled function, and to compile.
-OFFSET, START, SPEED, GUESS = range(4)
-
-
 class JointLaw(NamedTuple):
     """The joint law for one length of step, with the joints' state at the start of the step."""
 
@@ -175,7 +169,10 @@ class JointLaw(NamedTuple):
     members: Any  # points sorted by their slip rows (p,)
     slips: Array  # released force of each slip row [N], and its derivative there [N/m] (g, 2)
     stiffness: Array  # of openings the largest, of slips the sum of their points (r,) [N/m]
-    rows: Array  # values of all rows of gaps, as named below (4, r) [m]
+    offset: Array  # gaps of the undisplaced structure (r,) [m]
+    start: Array  # gaps at the start of the step (r,) [m]
+    speed: Array  # their change per step at the rates there (r,) [m]
+    guess: Array  # z at which forces were evaluated last (r,) [m]
 
 
 def joint_law(
@@ -197,8 +194,6 @@ def joint_law(
     members = members[gaps.group[members] >= 0]
     first = np.append(0, np.cumsum(gaps.sizes))
     pairs, pair = _derivative_pairs(segments, law_points["segment"], members, first, gaps.openings)
-    rows = np.zeros((4, len(gaps.offset)))
-    rows[OFFSET] = gaps.offset
     law = JointLaw(
         facets,
         numbers.gain if conserving else 0.0,
@@ -213,7 +208,8 @@ def joint_law(
         members,
         np.zeros((len(gaps.sizes), 2)),
         _row_stiffness(gaps, stiffness, points.shear_spring),
-        rows,
+        gaps.offset,
+        *np.zeros((3, len(gaps.offset))),
     )
     return law, gaps.rows, pairs
 
@@ -288,15 +284,15 @@ def predict_gaps(law, gap, before):  # type: ignore
     """Predict z from its rate, or at an instant from its change in the step before."""
     for row in range(len(gap)):
         if law.gain > 0.0:
-            law.rows[GUESS, row] = law.rows[START, row] + law.rows[SPEED, row] / law.gain
+            law.guess[row] = law.start[row] + law.speed[row] / law.gain
         else:
-            law.rows[GUESS, row] = 2.0 * gap[row] - before[row]
+            law.guess[row] = 2.0 * gap[row] - before[row]
 
 
 @kernel
 def evaluate_openings(law, gap, segments):  # type: ignore
     """Evaluate normal and released forces of some segments at z, into their states."""
-    half, facets, start, points = 0.5 * law.gain, law.facets, law.rows[START], law.points
+    half, facets, start, points = 0.5 * law.gain, law.facets, law.start, law.points
     step, area = (2, 0.5) if facets else (1, 1.0)
     for number in segments:
         segment, state = law.segments[number], law.segment_states[number]
@@ -359,7 +355,7 @@ def between(ends, share):  # type: ignore
 @kernel
 def evaluate_slips(law, gap, rows):  # type: ignore
     """Evaluate shear and released forces of some slip rows at z, after `evaluate_openings`."""
-    first, start, gain, late = law.groups[0], law.rows[START], law.gain, law.damping_lag
+    first, start, gain, late = law.groups[0], law.start, law.gain, law.damping_lag
     for row in rows:
         slip, released, rate = gain * (gap[row] - start[row]), 0.0, 0.0
         group = row - law.openings
