@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 
 import pytest
 from matplotlib.figure import Figure

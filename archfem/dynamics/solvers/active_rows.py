@@ -15,8 +15,8 @@ tolerance: the next iteration takes up what remains. Rows are active where joint
 where openings press on those. They are predicted before the step, and checked at the gaps that
 result.
 
-F of the whole structure is too large for the cache of the processor. A problem copies the rows that
-it needs: those of rows with a force or a derivative, about half of its rows.
+F of the whole structure is too large for the cache of the processor. A problem copies the columns
+that it needs: those of rows with a force or a derivative, about half of its rows.
 """
 
 from typing import Any, NamedTuple
@@ -38,6 +38,12 @@ from archfem.dynamics.solvers.supernodal_lu import Indices
 # Equations up to which a problem is solved by its factor
 MAX_DIRECT_ROWS = 100
 
+# Steps of biconjugate gradients, of two products each, after which a factor takes no longer
+MAX_GRADIENT_STEPS = 24
+
+# Entries of a row that are taken at once: each has room for a multiple of these
+ROW_PADDING = 16
+
 
 class ActiveRows(NamedTuple):
     """F of a structure, and the workspace of dense problems in some of its rows.
@@ -50,26 +56,26 @@ class ActiveRows(NamedTuple):
     filled: Any  # whether a row is filled in F (p,)
     near: Any  # whether a row is in the problem at hand (p,)
     marks: Any  # scratch, False between uses (p,)
-    sizes: Indices  # number of rows, and of equations (2,)
+    sizes: Indices  # number of rows, of columns and of equations (3,)
     numbers: Indices  # of the rows in the structure (p,)
     place: Indices  # place of each row of the structure among them, -1 for none (p,)
-    copied: Any  # whether a row of F is in `entries` (p,)
-    entries: Array  # of F in the rows of the problem, row by row (p²,)
-    unknowns: Indices  # rows that have an equation (p,)
-    equation: Indices  # equation of each row, -1 for none (p,)
+    row_of: Indices  # row of each column (p,)
+    column_of: Indices  # column of each row, -1 for none (p,)
+    entries: Array  # of F in these, row by row (p q,), q the room of a row of p
+    single: Array  # of the equations in single precision (p q,)
     matrix: Array  # of the equations, then its factor (p²,)
     pivots: Indices  # row exchanges of the factor (p,)
-    columns: Indices  # rows with a force (p,)
-    force: Array  # λ (p,)
-    released: Array  # λ(z) (p,)
-    before: Array  # λ(z) before an iteration (p,)
-    change: Array  # residual of λ, then its correction (p,)
-    trial: Array  # λ that is tried (p,)
-    free: Array  # gaps if nothing were released (p,)
-    gap: Array  # gaps that λ yields (p,)
-    guess: Array  # of the gaps (p,)
-    solution: Array  # of equations (p,)
-    directions: Array  # of biconjugate gradients (6, p)
+    force: Array  # λ (q,)
+    released: Array  # λ(z) (q,)
+    before: Array  # λ(z) before an iteration (q,)
+    change: Array  # residual of λ, then its correction (q,)
+    trial: Array  # λ that is tried (q,)
+    free: Array  # gaps if nothing were released (q,)
+    gap: Array  # gaps that λ yields (q,)
+    guess: Array  # of the gaps (q,)
+    column: Array  # λ or a right side of the columns (q,)
+    image: Array  # product with F (q,)
+    directions: Array  # of biconjugate gradients in single precision (6, q)
     segments: Indices  # numbers of segments in the problem (s,)
     slips: Indices  # numbers of slip rows in the problem (p,)
     derivatives: tuple[Indices, Array]  # places of λ′, with its pair, and values (m, 3), (m,)
@@ -84,33 +90,56 @@ class ActiveRows(NamedTuple):
         def integers(value: int = 0) -> Indices:
             return np.full(size, value, np.int64)
 
+        room = size + -size % ROW_PADDING
         return cls(
-            full=np.empty((size, size)),
-            filled=flags(),
-            near=flags(),
-            marks=flags(),
-            sizes=np.zeros(2, np.int64),
-            numbers=integers(),
-            place=integers(-1),
-            copied=flags(),
-            entries=np.empty(size**2),
-            unknowns=integers(),
-            equation=integers(-1),
-            matrix=np.empty(size**2),
-            pivots=integers(),
-            columns=integers(),
-            **{name: np.zeros(size) for name in cls._fields[14:23]},
-            directions=np.empty((6, size)),
-            segments=np.empty(segments, np.int64),
-            slips=integers(),
-            derivatives=(np.zeros((pairs, 3), np.int64), np.zeros(pairs)),
+            np.empty((size, size)),
+            *(flags(), flags(), flags()),
+            np.zeros(3, np.int64),
+            *(integers(), integers(-1), integers(), integers()),
+            np.zeros(size * room),
+            np.zeros(size * room, np.float32),
+            np.empty(size**2),
+            integers(),
+            *np.zeros((10, room)),
+            np.zeros((6, room), np.float32),
+            np.empty(segments, np.int64),
+            integers(),
+            (np.zeros((pairs, 3), np.int64), np.zeros(pairs)),
         )
 
 
 @view_kernel
-def _square(entries, size):  # type: ignore
-    """Return a square matrix in an array that may be larger (k, k)."""
-    return entries[: size**2].reshape((size, size))
+def _padded(count):  # type: ignore
+    """Return the room of a row of some entries."""
+    return (count + ROW_PADDING - 1) // ROW_PADDING * ROW_PADDING
+
+
+@view_kernel
+def _rows(entries, count, size):  # type: ignore
+    """Return some rows of a matrix, with the room of rows of a size."""
+    return entries[: count * _padded(size)].reshape((count, _padded(size)))
+
+
+@summing_kernel
+def _multiply(matrix, vector, images):  # type: ignore
+    """Multiply rows of a matrix by a vector (c,) into images (k,)."""
+    count, zero = len(images), vector.dtype.type(0.0)
+    tail = count % 4
+    # four rows at a time: each entry of the vector is loaded once for all of them
+    for row in range(0, count - tail, 4):
+        a, b, c, d = matrix[row], matrix[row + 1], matrix[row + 2], matrix[row + 3]
+        p, q, r, s = zero, zero, zero, zero
+        for k in range(len(vector)):
+            p += a[k] * vector[k]
+            q += b[k] * vector[k]
+            r += c[k] * vector[k]
+            s += d[k] * vector[k]
+        images[row], images[row + 1], images[row + 2], images[row + 3] = p, q, r, s
+    for row in range(count - tail, count):
+        own, p = matrix[row], zero
+        for k in range(len(vector)):
+            p += own[k] * vector[k]
+        images[row] = p
 
 
 @kernel
@@ -210,45 +239,47 @@ def _add_active(law, active, gap, near, everywhere):  # type: ignore
 
 @kernel
 def begin_problem(active, rows):  # type: ignore
-    """Begin a problem in some rows (k,)."""
+    """Begin a problem in some rows (k,), without columns."""
     for k in range(active.sizes[0]):
         active.place[active.numbers[k]] = -1
-    active.sizes[0] = len(rows)
+    active.sizes[0], active.sizes[1] = len(rows), 0
     for k in range(len(rows)):
-        active.numbers[k], active.place[rows[k]], active.copied[k] = rows[k], k, False
+        active.numbers[k], active.place[rows[k]], active.column_of[k] = rows[k], k, -1
 
 
 @kernel
-def _copy_row(active, k):  # type: ignore
-    """Copy a row of F in the rows of the problem, unless it has been."""
-    if not active.copied[k]:
-        active.copied[k], size = True, active.sizes[0]
-        own, full = _square(active.entries, size)[k], active.full[active.numbers[k]]
-        for j in range(size):
-            own[j] = full[active.numbers[j]]
-
-
-@summing_kernel
-def add_gaps(active, force, gaps):  # type: ignore
-    """Add F λ to the gaps of the rows (k,)."""
-    size, entries, columns, count = active.sizes[0], active.entries, active.columns, 0
-    for k in range(size):
+def add_columns(active, force, count):  # type: ignore
+    """Add the columns of rows with λ, or with one of some derivatives."""
+    for k in range(active.sizes[0]):
         if force[k] != 0.0:
-            _copy_row(active, k)
-            columns[count] = k
-            count += 1
-    # F is symmetric: four of its rows at a time, as each gap is loaded once for all of them
-    for c in range(0, count - count % 4, 4):
-        e, f, g, h = columns[c], columns[c + 1], columns[c + 2], columns[c + 3]
-        a, b, u, v = force[e], force[f], force[g], force[h]
-        p, q = entries[e * size : (e + 1) * size], entries[f * size : (f + 1) * size]
-        r, s = entries[g * size : (g + 1) * size], entries[h * size : (h + 1) * size]
-        for k in range(size):
-            gaps[k] += a * p[k] + b * q[k] + u * r[k] + v * s[k]
-    for c in range(count - count % 4, count):
-        own, value = _square(entries, size)[columns[c]], force[columns[c]]
-        for k in range(size):
-            gaps[k] += value * own[k]
+            _add_column(active, k)
+    for entry in range(count):
+        _add_column(active, active.derivatives[0][entry, 0])
+
+
+@kernel
+def _add_column(active, row):  # type: ignore
+    """Make a row the next column, unless it is one."""
+    if active.column_of[row] < 0:
+        column, full = active.sizes[1], active.full[active.numbers[row]]
+        active.column_of[row], active.row_of[column] = column, row
+        entries = _rows(active.entries, active.sizes[0], active.sizes[0])
+        for k in range(active.sizes[0]):
+            entries[k, column] = full[active.numbers[k]]
+        active.sizes[1] += 1
+
+
+@kernel
+def add_gaps(active, force, gaps):  # type: ignore
+    """Add F λ to the gaps of the rows (k,); all λ that are not zero have a column."""
+    size, count, own, image = active.sizes[0], active.sizes[1], active.column, active.image
+    for j in range(count):
+        own[j] = force[active.row_of[j]]
+    for j in range(count, _padded(count)):
+        own[j] = 0.0
+    _multiply(_rows(active.entries, size, size), own[: _padded(count)], image[:size])
+    for k in range(size):
+        gaps[k] += image[k]
 
 
 @kernel
@@ -256,6 +287,7 @@ def subtract_released(active, force, gap):  # type: ignore
     """Subtract from gaps of the rows what released forces contribute, z̄ = z - F λ."""
     for k in range(active.sizes[0]):
         active.force[k], active.gap[k] = force[active.numbers[k]], 0.0
+    add_columns(active, active.force, 0)
     add_gaps(active, active.force, active.gap)
     for k in range(active.sizes[0]):
         gap[active.numbers[k]] -= active.gap[k]
@@ -308,6 +340,7 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
     force, released, change, gap = active.force, active.released, active.change, active.gap
     _evaluate(law, selection, released[:size])
     count = collect_derivatives(law, selection, active.derivatives)
+    add_columns(active, released, count)
     for k in range(size):
         force[k] = released[k]
         gap[k], change[k] = active.free[k] - law.guess[active.numbers[k]], 0.0
@@ -323,8 +356,10 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
             return iteration
         if not error < np.inf:
             return -1
+        add_columns(active, released, 0)
         if iteration == 1 or error**2 > last * tolerance:
             count = collect_derivatives(law, selection, active.derivatives)
+            add_columns(active, released, count)
             prepare_equations(active, count)
         for k in range(size):
             change[k] = released[k] - force[k]
@@ -373,55 +408,60 @@ def _evaluate(law, selection, released):  # type: ignore
 
 @kernel
 def prepare_equations(active, count):  # type: ignore
-    """List the rows that need an equation, and factorise these where they are few.
-
-    Without a derivative, and with λ equal to λ(z), the correction of a row is zero.
-    """
-    places, _ = active.derivatives
-    for k in range(active.sizes[0]):
-        active.equation[k] = 0 if active.released[k] != active.force[k] else -1
-    for entry in range(count):
-        active.equation[places[entry, 0]] = 0
-    active.sizes[1] = 0
-    for k in range(active.sizes[0]):
-        if active.equation[k] == 0:
-            active.equation[k], active.unknowns[active.sizes[1]] = active.sizes[1], k
-            active.sizes[1] += 1
-    if active.sizes[1] <= MAX_DIRECT_ROWS:
+    """Fill the equations 1 - λ′ F of the columns, and factorise them where they are few."""
+    active.sizes[2] = size = active.sizes[1]
+    if size <= MAX_DIRECT_ROWS:
         _factorise_equations(active, count)
+    else:
+        _fill_equations(active, count, _rows(active.single, size, size))
 
 
 @kernel
 def _factorise_equations(active, count):  # type: ignore
-    """Fill and factorise the equations 1 - λ′ F."""
-    size, (places, values) = active.sizes[1], active.derivatives
-    matrix = _square(active.matrix, size)
+    """Factorise 1 - λ′ F of the columns."""
+    size = active.sizes[2]
+    matrix = active.matrix[: size**2].reshape((size, size))
+    _fill_equations(active, count, matrix)
+    factorise_dense(matrix, active.pivots)
+
+
+@summing_kernel
+def _fill_equations(active, count, matrix):  # type: ignore
+    """Fill 1 - λ′ F of the columns, by two derivatives at a time where these share a row."""
+    (places, values), (size, wide), entry = active.derivatives, matrix.shape, 0
+    entries = _rows(active.entries, active.sizes[0], active.sizes[0])
     for i in range(size):
-        for k in range(size):
+        for k in range(wide):
             matrix[i, k] = 0.0
         matrix[i, i] = 1.0
-    for entry in range(count):
-        _copy_row(active, places[entry, 1])
-        own = matrix[active.equation[places[entry, 0]]]
-        other = _square(active.entries, active.sizes[0])[places[entry, 1]]
-        for k in range(size):
-            own[k] -= values[entry] * other[active.unknowns[k]]
-    factorise_dense(matrix, active.pivots)
+    while entry < count:
+        row, value = places[entry, 0], values[entry]
+        own, other = matrix[active.column_of[row]], entries[places[entry, 1]]
+        entry += 1
+        if entry < count and places[entry, 0] == row:
+            second, further = values[entry], entries[places[entry, 1]]
+            for k in range(wide):
+                own[k] -= value * other[k] + second * further[k]
+            entry += 1
+        else:
+            for k in range(wide):
+                own[k] -= value * other[k]
 
 
 @kernel
 def solve_equations(change, active, count):  # type: ignore
     """Solve (1 - λ′ F) μ = d in place; in rows without an equation μ is d."""
-    size, own = active.sizes[1], active.solution
-    if size > MAX_DIRECT_ROWS:
-        if _solve_by_gradients(active, change, count):
-            return
+    size, own = active.sizes[2], active.column
+    for k in range(size):
+        own[k] = change[active.row_of[k]]
+    direct = size <= MAX_DIRECT_ROWS
+    if not (direct or solve_by_gradients(active, own[:size])):
         _factorise_equations(active, count)
+        direct = True
+    if direct:
+        solve_dense(active.matrix[: size**2].reshape((size, size)), active.pivots, own)
     for k in range(size):
-        own[k] = change[active.unknowns[k]]
-    solve_dense(_square(active.matrix, size), active.pivots, own)
-    for k in range(size):
-        change[active.unknowns[k]] = own[k]
+        change[active.row_of[k]] = own[k]
 
 
 @kernel
@@ -469,19 +509,23 @@ def solve_dense(matrix, pivots, right):  # type: ignore
         right[k] = total * matrix[k, k]
 
 
-@kernel
-def _solve_by_gradients(active, right, count):  # type: ignore
+@summing_kernel
+def solve_by_gradients(active, right):  # type: ignore
     """Solve in place by biconjugate gradients; returns False if that takes as long as a factor."""
-    size, directions = active.sizes[0], active.directions
-    residual, shadow, along = directions[0][:size], directions[1][:size], directions[2][:size]
-    image, product, solution = directions[3][:size], directions[4][:size], directions[5][:size]
-    for k in range(size):
-        residual[k] = shadow[k] = right[k]
-        along[k] = image[k] = solution[k] = 0.0
-    square, angle, step, damping = _dot(residual, residual), 1.0, 1.0, 1.0
-    limit = 1e-7 * square
-    for _ in range(24):
-        if _dot(residual, residual) <= limit:
+    size, directions = len(right), active.directions
+    wide, matrix = _padded(size), _rows(active.single, size, size)
+    for k in range(wide):
+        directions[0, k] = directions[1, k] = right[k] if k < size else 0.0
+        for j in range(2, 6):
+            directions[j, k] = 0.0
+    residual, shadow, along = directions[0][:wide], directions[1][:wide], directions[2][:wide]
+    image, product, solution = directions[3][:wide], directions[4][:wide], directions[5][:wide]
+    one = np.float32(1.0)
+    angle, step, damping, square = one, one, one, _dot(residual, residual)
+    # the next Newton iteration takes up what remains
+    limit = np.float32(1e-7) * square
+    for _ in range(MAX_GRADIENT_STEPS):
+        if square <= limit:
             for k in range(size):
                 right[k] = solution[k]
             return True
@@ -489,34 +533,23 @@ def _solve_by_gradients(active, right, count):  # type: ignore
         factor = angle / last * step / damping
         for k in range(size):
             along[k] = residual[k] + factor * (along[k] - damping * image[k])
-        _apply_equations(active, along, image, count)
+        _multiply(matrix, along, image[:size])
         step = angle / _dot(shadow, image)
         for k in range(size):
             residual[k] -= step * image[k]
-        _apply_equations(active, residual, product, count)
-        square = _dot(product, product)
-        damping = _dot(product, residual) / square if square > 0.0 else 1.0
+        _multiply(matrix, residual, product[:size])
+        damping = _dot(product, residual) / _dot(product, product)
         for k in range(size):
             solution[k] += step * along[k] + damping * residual[k]
             residual[k] -= damping * product[k]
+        square = _dot(residual, residual)
     return False
-
-
-@kernel
-def _apply_equations(active, vector, image, count):  # type: ignore
-    """Multiply the equations by a vector, (1 - λ′ F) x."""
-    (places, values), moved = active.derivatives, active.gap
-    for k in range(active.sizes[0]):
-        image[k], moved[k] = vector[k], 0.0
-    add_gaps(active, vector, moved)
-    for entry in range(count):
-        image[places[entry, 0]] -= values[entry] * moved[places[entry, 1]]
 
 
 @summing_kernel
 def _dot(a, b):  # type: ignore
     """Return the inner product of two vectors."""
-    total = 0.0
+    total = a.dtype.type(0.0)
     for k in range(len(a)):
         total += a[k] * b[k]
     return total
