@@ -11,7 +11,7 @@ import pytest
 SCRIPTS = Path(__file__).parent / "benchmarks"
 
 # Scripts that still use names of an earlier layout.
-OUTDATED = {"drift_and_equality", "suite_of_records", "study_kills"}
+OUTDATED = {"suite_of_records", "study_kills"}
 
 NAMES = sorted(
     path.stem for path in SCRIPTS.glob("*.py") if "def main(arguments" in path.read_text("utf-8") and path.stem not in OUTDATED

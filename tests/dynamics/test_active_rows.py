@@ -15,10 +15,10 @@ solve_equations = from_python(active_rows.solve_equations)
 hold_reversed = from_python(newton.hold_reversed)
 
 FEW, MANY = MAX_DIRECT_ROWS // 2, 2 * MAX_DIRECT_ROWS
-"""Rows that are solved for by a factor, and by biconjugate gradients."""
+"""Rows that are solved for by a factor, and by minimal residuals."""
 
 RESIDUAL = 3e-4
-"""Residual of biconjugate gradients, relative to the first."""
+"""Of minimal residuals, relative to the first."""
 
 
 def compliance_of(full: np.ndarray) -> ActiveRows:

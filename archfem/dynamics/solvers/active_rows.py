@@ -9,11 +9,10 @@ gradient of an energy, and the problem is not symmetric. Iterations solve
 
     (1 - λ′ F) μ = λ(z̄ + F λ) - λ
 
-for the correction μ of λ, by a dense factor where the equations are few, else by stabilised
-biconjugate gradients (van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992) 631) to a coarse
-tolerance: the next iteration takes up what remains. Rows are active where joints open or slide, and
-where openings press on those. They are predicted before the step, and checked at the gaps that
-result.
+for the correction μ of λ, by a dense factor where the rows are few, else by generalised minimal
+residuals in single precision (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856): an
+iteration only leads to the next one. Rows are active where joints open or slide, and where openings
+press on those. They are predicted before the step, and checked at the gaps that result.
 
 F of the whole structure is too large for the cache of the processor. A problem copies the columns
 that it needs: those of rows with a force or a derivative, about half of its rows.
@@ -38,8 +37,8 @@ from archfem.dynamics.solvers.supernodal_lu import Indices
 # Equations up to which a problem is solved by its factor
 MAX_DIRECT_ROWS = 100
 
-# Steps of biconjugate gradients, of two products each, after which a factor takes no longer
-MAX_GRADIENT_STEPS = 24
+# Products with a matrix after which its factor takes no longer
+MAX_KRYLOV_VECTORS = 48
 
 # Entries of a row that are taken at once: each has room for a multiple of these
 ROW_PADDING = 16
@@ -75,7 +74,9 @@ class ActiveRows(NamedTuple):
     guess: Array  # of the gaps (q,)
     column: Array  # λ or a right side of the columns (q,)
     image: Array  # product with F (q,)
-    directions: Array  # of biconjugate gradients in single precision (6, q)
+    basis: Array  # Krylov vectors in single precision (d + 1, q)
+    triangle: Array  # of the least-squares problem in the basis (d, d)
+    rotations: Array  # that lead to it, and its right side (d + 1, 3)
     segments: Indices  # numbers of segments in the problem (s,)
     slips: Indices  # numbers of slip rows in the problem (p,)
     derivatives: tuple[Indices, Array]  # places of λ′, with its pair, and values (m, 3), (m,)
@@ -101,7 +102,9 @@ class ActiveRows(NamedTuple):
             np.empty(size**2),
             integers(),
             *np.zeros((10, room)),
-            np.zeros((6, room), np.float32),
+            np.zeros((MAX_KRYLOV_VECTORS + 1, room), np.float32),
+            np.empty((MAX_KRYLOV_VECTORS, MAX_KRYLOV_VECTORS)),
+            np.empty((MAX_KRYLOV_VECTORS + 1, 3)),
             np.empty(segments, np.int64),
             integers(),
             (np.zeros((pairs, 3), np.int64), np.zeros(pairs)),
@@ -250,22 +253,25 @@ def begin_problem(active, rows):  # type: ignore
 @kernel
 def add_columns(active, force, count):  # type: ignore
     """Add the columns of rows with λ, or with one of some derivatives."""
-    for k in range(active.sizes[0]):
+    (places, _), sizes, first = active.derivatives, active.sizes, active.sizes[1]
+    for k in range(sizes[0]):
         if force[k] != 0.0:
-            _add_column(active, k)
+            _list_column(active, k)
     for entry in range(count):
-        _add_column(active, active.derivatives[0][entry, 0])
+        _list_column(active, places[entry, 0])
+    if sizes[1] > first:
+        entries = _rows(active.entries, sizes[0], sizes[0])
+        for k in range(sizes[0]):  # F is symmetric: its rows are copied piece by piece
+            own, full = entries[k], active.full[active.numbers[k]]
+            for column in range(first, sizes[1]):
+                own[column] = full[active.numbers[active.row_of[column]]]
 
 
 @kernel
-def _add_column(active, row):  # type: ignore
+def _list_column(active, row):  # type: ignore
     """Make a row the next column, unless it is one."""
     if active.column_of[row] < 0:
-        column, full = active.sizes[1], active.full[active.numbers[row]]
-        active.column_of[row], active.row_of[column] = column, row
-        entries = _rows(active.entries, active.sizes[0], active.sizes[0])
-        for k in range(active.sizes[0]):
-            entries[k, column] = full[active.numbers[k]]
+        active.column_of[row], active.row_of[active.sizes[1]] = active.sizes[1], row
         active.sizes[1] += 1
 
 
@@ -455,7 +461,7 @@ def solve_equations(change, active, count):  # type: ignore
     for k in range(size):
         own[k] = change[active.row_of[k]]
     direct = size <= MAX_DIRECT_ROWS
-    if not (direct or solve_by_gradients(active, own[:size])):
+    if not (direct or minimise_residual(active, own[:size])):
         _factorise_equations(active, count)
         direct = True
     if direct:
@@ -510,46 +516,78 @@ def solve_dense(matrix, pivots, right):  # type: ignore
 
 
 @summing_kernel
-def solve_by_gradients(active, right):  # type: ignore
-    """Solve in place by biconjugate gradients; returns False if that takes as long as a factor."""
-    size, directions = len(right), active.directions
-    wide, matrix = _padded(size), _rows(active.single, size, size)
-    for k in range(wide):
-        directions[0, k] = directions[1, k] = right[k] if k < size else 0.0
-        for j in range(2, 6):
-            directions[j, k] = 0.0
-    residual, shadow, along = directions[0][:wide], directions[1][:wide], directions[2][:wide]
-    image, product, solution = directions[3][:wide], directions[4][:wide], directions[5][:wide]
-    one = np.float32(1.0)
-    angle, step, damping, square = one, one, one, _dot(residual, residual)
-    # the next Newton iteration takes up what remains
-    limit = np.float32(1e-7) * square
-    for _ in range(MAX_GRADIENT_STEPS):
-        if square <= limit:
-            for k in range(size):
-                right[k] = solution[k]
+def minimise_residual(active, right):  # type: ignore
+    """Solve in place by minimal residuals; returns False if that takes too many products."""
+    size, square_sum, basis = len(right), 0.0, active.basis
+    rotations, triangle, wide = active.rotations, active.triangle, _padded(size)
+    matrix = _rows(active.single, size, size)
+    for k in range(size):
+        square_sum += right[k] ** 2
+    rotations[0, 2] = first = np.sqrt(square_sum)
+    if first == 0.0:
+        return True
+    for k in range(size):
+        basis[0, k] = right[k] / first
+    for k in range(size, wide):
+        basis[0, k] = 0.0
+    for step in range(MAX_KRYLOV_VECTORS):
+        # Arnoldi: the next vector of the basis, orthogonal to all before
+        _multiply(matrix, basis[step][:wide], basis[step + 1][:size])
+        for k in range(size, wide):
+            basis[step + 1, k] = 0.0
+        norm = _orthogonalise(basis, step + 1, wide, triangle[step])
+        _rotate(triangle[step], step, norm, rotations)
+        # the next Newton iteration takes up what remains
+        if abs(rotations[step + 1, 2]) <= 3e-4 * first:
+            _combine(basis, step + 1, active, right)
             return True
-        last, angle = angle, _dot(shadow, residual)
-        factor = angle / last * step / damping
-        for k in range(size):
-            along[k] = residual[k] + factor * (along[k] - damping * image[k])
-        _multiply(matrix, along, image[:size])
-        step = angle / _dot(shadow, image)
-        for k in range(size):
-            residual[k] -= step * image[k]
-        _multiply(matrix, residual, product[:size])
-        damping = _dot(product, residual) / _dot(product, product)
-        for k in range(size):
-            solution[k] += step * along[k] + damping * residual[k]
-            residual[k] -= damping * product[k]
-        square = _dot(residual, residual)
     return False
 
 
 @summing_kernel
-def _dot(a, b):  # type: ignore
-    """Return the inner product of two vectors."""
-    total = a.dtype.type(0.0)
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
+def _orthogonalise(basis, number, size, shares):  # type: ignore
+    """Subtract from a vector its components along those before it, and scale it; its norm."""
+    own, square_sum, zero = basis[number], 0.0, np.float32(0.0)
+    for j in range(number):
+        other, share = basis[j], zero
+        for k in range(size):
+            share += other[k] * own[k]
+        shares[j] = share
+        for k in range(size):
+            own[k] -= share * other[k]
+    for k in range(size):
+        square_sum += own[k] * own[k]
+    norm = np.sqrt(square_sum)
+    inverse = np.float32(1.0 / norm if norm > 0.0 else 0.0)
+    for k in range(size):
+        own[k] *= inverse
+    return norm
+
+
+@kernel
+def _rotate(column, step, norm, rotations):  # type: ignore
+    """Bring a column of the Hessenberg matrix into a triangle by Givens rotations."""
+    for j in range(step):
+        above, cosine, sine = column[j], rotations[j, 0], rotations[j, 1]
+        column[j] = cosine * above + sine * column[j + 1]
+        column[j + 1] = cosine * column[j + 1] - sine * above
+    length = np.sqrt(column[step] ** 2 + norm**2)
+    cosine, sine = column[step] / length, norm / length
+    rotations[step, 0], rotations[step, 1], column[step] = cosine, sine, length
+    rotations[step + 1, 2] = -sine * rotations[step, 2]
+    rotations[step, 2] *= cosine
+
+
+@summing_kernel
+def _combine(basis, count, active, right):  # type: ignore
+    """Combine the vectors of the basis by back substitution in the triangle."""
+    triangle, rotations = active.triangle, active.rotations
+    for k in range(len(right)):
+        right[k] = 0.0
+    for step in range(count - 1, -1, -1):
+        rotations[step, 2] /= triangle[step, step]
+        for j in range(step):
+            rotations[j, 2] -= rotations[step, 2] * triangle[step, j]
+        own = basis[step]
+        for k in range(len(right)):
+            right[k] += rotations[step, 2] * own[k]

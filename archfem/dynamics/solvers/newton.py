@@ -7,7 +7,7 @@ it is sparse (`supernodal_lu`). Small displacements (`linear_step`) solve in eve
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
 the residual is the difference of λ(z) from the λ that w is in balance with. Large displacements
-solve for Δq, with f̄ the mean force of the joints over the step (`joints.moving`),
+solve for Δq, with f̄ the mean force of the joints over the step (`joints.large`),
 
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """
