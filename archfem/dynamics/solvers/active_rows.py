@@ -14,8 +14,11 @@ residuals in single precision (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1
 iteration only leads to the next one. Rows are active where joints open or slide, and where openings
 press on those. They are predicted before the step, and checked at the gaps that result.
 
-F of the whole structure is too large for the cache of the processor. A problem copies the columns
-that it needs: those of rows with a force or a derivative, about half of its rows.
+Rows whose λ is zero are there for their gaps alone, which press on joints that slide; they are as
+many as the others. A column is added once its λ is not zero, and stays to the end of the problem.
+Few rows and columns change from one problem to the next, and F of a whole structure is too large
+for the cache of the processor. So entries stay in place: the last row or column replaces one that
+is removed, and only new ones are copied. Without that, steps of a bridge take half as long again.
 """
 
 from typing import Any, NamedTuple
@@ -40,6 +43,9 @@ MAX_DIRECT_ROWS = 100
 # Products with a matrix after which its factor takes no longer
 MAX_KRYLOV_VECTORS = 48
 
+# Columns for which room is added at a time
+COLUMN_BLOCK = 64
+
 # Entries of a row that are taken at once: each has room for a multiple of these
 ROW_PADDING = 16
 
@@ -55,7 +61,7 @@ class ActiveRows(NamedTuple):
     filled: Any  # whether a row is filled in F (p,)
     near: Any  # whether a row is in the problem at hand (p,)
     marks: Any  # scratch, False between uses (p,)
-    sizes: Indices  # number of rows, of columns and of equations (3,)
+    sizes: Indices  # number of rows, of columns, room for columns, and number of equations (4,)
     numbers: Indices  # of the rows in the structure (p,)
     place: Indices  # place of each row of the structure among them, -1 for none (p,)
     row_of: Indices  # row of each column (p,)
@@ -95,7 +101,7 @@ class ActiveRows(NamedTuple):
         return cls(
             np.empty((size, size)),
             *(flags(), flags(), flags()),
-            np.zeros(3, np.int64),
+            np.array([0, 0, min(COLUMN_BLOCK, room), 0]),
             *(integers(), integers(-1), integers(), integers()),
             np.zeros(size * room),
             np.zeros(size * room, np.float32),
@@ -118,9 +124,9 @@ def _padded(count):  # type: ignore
 
 
 @view_kernel
-def _rows(entries, count, size):  # type: ignore
-    """Return some rows of a matrix, with the room of rows of a size."""
-    return entries[: count * _padded(size)].reshape((count, _padded(size)))
+def _rows(entries, count, wide):  # type: ignore
+    """Return some rows of a matrix in an array that may be larger (k, c)."""
+    return entries[: count * wide].reshape((count, wide))
 
 
 @summing_kernel
@@ -241,38 +247,122 @@ def _add_active(law, active, gap, near, everywhere):  # type: ignore
 
 
 @kernel
-def begin_problem(active, rows):  # type: ignore
-    """Begin a problem in some rows (k,), without columns."""
+def clear_problem(active):  # type: ignore
+    """Remove all rows, so that the order of later ones does not depend on earlier problems."""
     for k in range(active.sizes[0]):
         active.place[active.numbers[k]] = -1
-    active.sizes[0], active.sizes[1] = len(rows), 0
-    for k in range(len(rows)):
-        active.numbers[k], active.place[rows[k]], active.column_of[k] = rows[k], k, -1
+    active.sizes[0], active.sizes[1] = 0, 0
+
+
+@kernel
+def begin_problem(active, rows):  # type: ignore
+    """Begin a problem in some rows (k,), with the columns that are still there."""
+    marks, sizes, k = active.marks, active.sizes, 0
+    for row in rows:
+        marks[row] = True
+    while k < sizes[0]:
+        if marks[active.numbers[k]]:
+            k += 1
+        else:
+            _remove_row(active, k)
+    for row in rows:
+        marks[row] = False
+        if active.place[row] < 0:
+            _add_row(active, row)
+
+
+@kernel
+def _add_row(active, row):  # type: ignore
+    """Add a row of the structure."""
+    k, wide, full = active.sizes[0], active.sizes[2], active.full[row]
+    active.sizes[0] += 1
+    active.numbers[k], active.place[row], active.column_of[k] = row, k, -1
+    for j in range(active.sizes[1]):
+        active.entries[k * wide + j] = full[active.numbers[active.row_of[j]]]
+
+
+@kernel
+def _remove_row(active, k):  # type: ignore
+    """Remove a row; the last one takes its place."""
+    if active.column_of[k] >= 0:
+        _remove_column(active, active.column_of[k])
+    last, wide = active.sizes[0] - 1, active.sizes[2]
+    active.place[active.numbers[k]] = -1
+    if k < last:
+        for j in range(active.sizes[1]):
+            active.entries[k * wide + j] = active.entries[last * wide + j]
+        row, column = active.numbers[last], active.column_of[last]
+        active.numbers[k], active.place[row], active.column_of[k] = row, k, column
+        if column >= 0:
+            active.row_of[column] = k
+    active.sizes[0] = last
+
+
+@kernel
+def _remove_column(active, column):  # type: ignore
+    """Remove a column; the last one takes its place."""
+    last, entries, wide = active.sizes[1] - 1, active.entries, active.sizes[2]
+    active.column_of[active.row_of[column]] = -1
+    if column < last:
+        row = active.row_of[last]
+        active.row_of[column], active.column_of[row] = row, column
+        for k in range(active.sizes[0]):
+            entries[k * wide + column] = entries[k * wide + last]
+    active.sizes[1] = last
+
+
+@kernel
+def update_columns(active, before, force, count):  # type: ignore
+    """Remove columns without λ or derivative, and add those with one.
+
+    A column with λ in the last step stays: it often returns, and takes long to copy.
+    """
+    marks, column, (places, _) = active.marks, 0, active.derivatives
+    for entry in range(count):
+        marks[places[entry, 0]] = True
+    while column < active.sizes[1]:
+        row = active.row_of[column]
+        if force[row] == 0.0 and before[row] == 0.0 and not marks[row]:
+            _remove_column(active, column)
+        else:
+            column += 1
+    for entry in range(count):
+        marks[places[entry, 0]] = False
+    add_columns(active, force, count)
 
 
 @kernel
 def add_columns(active, force, count):  # type: ignore
     """Add the columns of rows with λ, or with one of some derivatives."""
-    (places, _), sizes, first = active.derivatives, active.sizes, active.sizes[1]
-    for k in range(sizes[0]):
+    for k in range(active.sizes[0]):
         if force[k] != 0.0:
-            _list_column(active, k)
+            _add_column(active, k)
     for entry in range(count):
-        _list_column(active, places[entry, 0])
-    if sizes[1] > first:
-        entries = _rows(active.entries, sizes[0], sizes[0])
-        for k in range(sizes[0]):  # F is symmetric: its rows are copied piece by piece
-            own, full = entries[k], active.full[active.numbers[k]]
-            for column in range(first, sizes[1]):
-                own[column] = full[active.numbers[active.row_of[column]]]
+        _add_column(active, active.derivatives[0][entry, 0])
 
 
 @kernel
-def _list_column(active, row):  # type: ignore
+def _add_column(active, row):  # type: ignore
     """Make a row the next column, unless it is one."""
     if active.column_of[row] < 0:
-        active.column_of[row], active.row_of[active.sizes[1]] = active.sizes[1], row
+        column, full = active.sizes[1], active.full[active.numbers[row]]
+        if column == active.sizes[2]:
+            _widen(active)
+        active.column_of[row], active.row_of[column] = column, row
         active.sizes[1] += 1
+        for k in range(active.sizes[0]):
+            active.entries[k * active.sizes[2] + column] = full[active.numbers[k]]
+
+
+@kernel
+def _widen(active):  # type: ignore
+    """Make room for more columns, from the last row on as rows move backwards."""
+    rows, columns, wide = active.sizes[0], active.sizes[1], active.sizes[2]
+    wider = min(wide + COLUMN_BLOCK, _padded(len(active.place)))
+    for k in range(rows - 1, 0, -1):
+        for j in range(columns - 1, -1, -1):
+            active.entries[k * wider + j] = active.entries[k * wide + j]
+    active.sizes[2] = wider
 
 
 @kernel
@@ -283,7 +373,7 @@ def add_gaps(active, force, gaps):  # type: ignore
         own[j] = force[active.row_of[j]]
     for j in range(count, _padded(count)):
         own[j] = 0.0
-    _multiply(_rows(active.entries, size, size), own[: _padded(count)], image[:size])
+    _multiply(_rows(active.entries, size, active.sizes[2]), own[: _padded(count)], image[:size])
     for k in range(size):
         gaps[k] += image[k]
 
@@ -346,7 +436,7 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
     force, released, change, gap = active.force, active.released, active.change, active.gap
     _evaluate(law, selection, released[:size])
     count = collect_derivatives(law, selection, active.derivatives)
-    add_columns(active, released, count)
+    update_columns(active, force, released, count)
     for k in range(size):
         force[k] = released[k]
         gap[k], change[k] = active.free[k] - law.guess[active.numbers[k]], 0.0
@@ -415,18 +505,18 @@ def _evaluate(law, selection, released):  # type: ignore
 @kernel
 def prepare_equations(active, count):  # type: ignore
     """Fill the equations 1 - λ′ F of the columns, and factorise them where they are few."""
-    active.sizes[2] = size = active.sizes[1]
+    active.sizes[3] = size = active.sizes[1]
     if size <= MAX_DIRECT_ROWS:
         _factorise_equations(active, count)
     else:
-        _fill_equations(active, count, _rows(active.single, size, size))
+        _fill_equations(active, count, _rows(active.single, size, _padded(size)))
 
 
 @kernel
 def _factorise_equations(active, count):  # type: ignore
     """Factorise 1 - λ′ F of the columns."""
-    size = active.sizes[2]
-    matrix = active.matrix[: size**2].reshape((size, size))
+    size = active.sizes[3]
+    matrix = _rows(active.matrix, size, size)
     _fill_equations(active, count, matrix)
     factorise_dense(matrix, active.pivots)
 
@@ -435,7 +525,7 @@ def _factorise_equations(active, count):  # type: ignore
 def _fill_equations(active, count, matrix):  # type: ignore
     """Fill 1 - λ′ F of the columns, by two derivatives at a time where these share a row."""
     (places, values), (size, wide), entry = active.derivatives, matrix.shape, 0
-    entries = _rows(active.entries, active.sizes[0], active.sizes[0])
+    entries = _rows(active.entries, active.sizes[0], active.sizes[2])
     for i in range(size):
         for k in range(wide):
             matrix[i, k] = 0.0
@@ -457,7 +547,7 @@ def _fill_equations(active, count, matrix):  # type: ignore
 @kernel
 def solve_equations(change, active, count):  # type: ignore
     """Solve (1 - λ′ F) μ = d in place; in rows without an equation μ is d."""
-    size, own = active.sizes[2], active.column
+    size, own = active.sizes[3], active.column
     for k in range(size):
         own[k] = change[active.row_of[k]]
     direct = size <= MAX_DIRECT_ROWS
@@ -465,7 +555,7 @@ def solve_equations(change, active, count):  # type: ignore
         _factorise_equations(active, count)
         direct = True
     if direct:
-        solve_dense(active.matrix[: size**2].reshape((size, size)), active.pivots, own)
+        solve_dense(_rows(active.matrix, size, size), active.pivots, own)
     for k in range(size):
         change[active.row_of[k]] = own[k]
 
@@ -520,7 +610,7 @@ def minimise_residual(active, right):  # type: ignore
     """Solve in place by minimal residuals; returns False if that takes too many products."""
     size, square_sum, basis = len(right), 0.0, active.basis
     rotations, triangle, wide = active.rotations, active.triangle, _padded(size)
-    matrix = _rows(active.single, size, size)
+    matrix = _rows(active.single, size, wide)
     for k in range(size):
         square_sum += right[k] ** 2
     rotations[0, 2] = first = np.sqrt(square_sum)

@@ -20,6 +20,7 @@ from archfem.dynamics.solvers.active_rows import (
     ActiveRows,
     begin_problem,
     check_active_rows,
+    clear_problem,
     predict_active_rows,
     solve_active_rows,
     subtract_released,
@@ -157,6 +158,11 @@ def _solve_in_rows(system, rows, first, tolerance):  # type: ignore
     for row in rows:
         if not system.active.filled[row]:
             _fill_compliance(system, row)
+    some = False
+    for force in work.force:
+        some = some or force != 0.0
+    if not some:  # so that histories do not depend on what was solved before
+        clear_problem(system.active)
     begin_problem(system.active, rows)
     # gaps of these rows if nothing were released
     if first:

@@ -1,4 +1,4 @@
-"""Which solver takes the steps of a run: a rule on displacements and on the width of a band."""
+"""Which solver takes the steps of a run: a rule on displacements, friction and band width."""
 
 import logging
 
@@ -17,8 +17,8 @@ SOLVERS: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": Co
 
 METHODS = ("auto", *SOLVERS, "snes")
 
-# Half-width of a band up to which "newton" is faster than "compliance" for small displacements
-MAX_NEWTON_HALF_WIDTH = 12
+# Half-width of a band up to which "newton" is faster than "compliance" where joints slide much
+MAX_NEWTON_HALF_WIDTH = 8
 
 logger = logging.getLogger("archfem")
 
@@ -51,9 +51,9 @@ def stepper_for(
 def select_solver(equation: Equation) -> StepSolver | None:
     """Return the solver of a run, or None where only SNES applies.
 
-    Newton's method on the whole structure takes large displacements, and small ones where the
-    tangent is a narrow band, as of a chain of rigid stones. Its time grows with the square of the
-    width; that of the compliance method with the number of open and sliding rows.
+    Newton's method on the whole structure takes large displacements, and small ones where joints
+    can slide and the tangent is a narrow band, as of a chain of rigid stones. Its time grows with
+    the square of the width; that of the compliance method with the number of open and sliding rows.
     """
     newton = NewtonSolver.of(equation)
     if newton is None:
@@ -62,4 +62,6 @@ def select_solver(equation: Equation) -> StepSolver | None:
             logger.info("joints dilate or resist tension: every step is solved by SNES")
         return None
     narrow = newton.half_width <= MAX_NEWTON_HALF_WIDTH
-    return newton if equation.model.large_displacements or narrow else ComplianceSolver.of(equation)
+    sliding_chain = narrow and equation.joints is not None and equation.joints.slides
+    large = equation.model.large_displacements
+    return newton if large or sliding_chain else ComplianceSolver.of(equation)
