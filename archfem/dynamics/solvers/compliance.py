@@ -117,15 +117,12 @@ def _solve_by_compliance(system):  # type: ignore
     predict_active_rows(law, active, work)
     tolerance, iterations = 1e-12 * largest_force(law, gap), 1
     # forward substitution of the right side serves all rounds
-    for k in range(len(half)):
-        half[k] = work.right_side[k]
+    _copy(work.right_side, half)
     solve_forward(system.factor, half)
-    for row in range(len(gap)):
-        work.gap_before[row] = gap[row]
+    _copy(gap, work.gap_before)
     for iteration in range(MAX_ITERATIONS):
         count = _list_marked(active.near, system.listed)
-        for k in range(len(vector)):
-            vector[k] = half[k]
+        _copy(half, vector)
         if count > 0:
             more = _solve_in_rows(system, system.listed[:count], iteration == 0, tolerance)
             if more < 0:
@@ -144,7 +141,7 @@ def _solve_by_compliance(system):  # type: ignore
         multiply(linear.gaps, vector, gap)
         for row in range(len(gap)):
             gap[row] += law.offset[row]
-            work.gap_end[row] = gap[row]
+        _copy(gap, work.gap_end)
         if check_active_rows(law, active, gap, active.near):
             return iterations
         iterations += 1
@@ -173,6 +170,13 @@ def _solve_in_rows(system, rows, first, tolerance):  # type: ignore
     else:
         subtract_released(system.active, work.force, start)
     return solve_active_rows(law, start, system.active, work.force, tolerance)
+
+
+@kernel
+def _copy(source, target):  # type: ignore
+    """Copy a vector."""
+    for k in range(len(source)):
+        target[k] = source[k]
 
 
 @kernel

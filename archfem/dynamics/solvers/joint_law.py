@@ -39,7 +39,7 @@ def _record_type(integers: str, floats: str) -> np.dtype[Any]:
 # across the joint (of a facet, that of the whole) [N/m], closed normal force per opening at the
 # near and at the far end [N/m], area (of a facet, that of the whole) [m²], μ [-], c [Pa], shear
 # stiffness [N/m], irreversible slip before the step [m], and distance from mid-depth [m].
-POINT = _record_type(
+POINT_RECORD = _record_type(
     "segment slip_row joint", "share stiffness near far area friction cohesion shear slip lever"
 )
 
@@ -47,15 +47,15 @@ POINT = _record_type(
 # derivatives of its released force by z at both ends of its segment [N/m], mean shear [N],
 # increment of irreversible slip [m], derivatives of the mean shear by its elastic change and by
 # Coulomb's limit [-], and energy dissipated by friction and damping along the joint [J].
-POINT_STATE = _record_type("", "normal area near far shear slip by_change by_limit lost")
+POINT_STATE_RECORD = _record_type("", "normal area near far shear slip by_change by_limit lost")
 
 # Points of a joint between which the opening is linear: first point, one after the last, and rows
 # of the openings at both ends.
-SEGMENT = _record_type("begin end near far", "")
+SEGMENT_RECORD = _record_type("begin end near far", "")
 
 # Released forces of a segment at both ends [N], and derivatives of the first by z there, of each
 # by z at the other end, and of the last by z there [N/m].
-SEGMENT_STATE = _record_type("", "near far first mixed last")
+SEGMENT_STATE_RECORD = _record_type("", "near far first mixed last")
 
 
 class GapRows(NamedTuple):
@@ -161,10 +161,10 @@ class JointLaw(NamedTuple):
     damping_lag: float  # lag of damping over the length of the step [-]
     openings: int  # number of rows that are openings
     stored: float  # energy of the undisplaced joints, as if closed and stuck [J]
-    points: Any  # records `POINT` (p,)
-    point_states: Any  # records `POINT_STATE` (p,)
-    segments: Any  # records `SEGMENT` (s,)
-    segment_states: Any  # records `SEGMENT_STATE` (s,)
+    points: Any  # records `POINT_RECORD` (p,)
+    point_states: Any  # records `POINT_STATE_RECORD` (p,)
+    segments: Any  # records `SEGMENT_RECORD` (s,)
+    segment_states: Any  # records `SEGMENT_STATE_RECORD` (s,)
     groups: Any  # of slip rows, begin of their points in `members` and of their pairs (2, g + 1)
     members: Any  # points sorted by their slip rows (p,)
     slips: Array  # released force of each slip row [N], and its derivative there [N/m] (g, 2)
@@ -188,7 +188,7 @@ def joint_law(
         stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
     count = len(points.offset)
     offset = np.zeros((2, count)) if joints.gap_offset is None else joints.gap_offset
-    segments = _records(SEGMENT, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far)
+    segments = _records(SEGMENT_RECORD, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far)
     law_points = _point_records(points, gaps, stiffness, facets)
     members = np.argsort(gaps.group, kind="stable")
     members = members[gaps.group[members] >= 0]
@@ -201,9 +201,9 @@ def joint_law(
         gaps.openings,
         0.5 * float(np.sum(offset * joints.closed_forces(offset))),
         law_points,
-        np.zeros(count, POINT_STATE),
+        np.zeros(count, POINT_STATE_RECORD),
         segments,
-        np.zeros(len(segments), SEGMENT_STATE),
+        np.zeros(len(segments), SEGMENT_STATE_RECORD),
         np.stack([first, pair]),
         members,
         np.zeros((len(gaps.sizes), 2)),
@@ -217,7 +217,7 @@ def joint_law(
 def _point_records(points: JointPoints, gaps: GapRows, stiffness: Array, facets: bool) -> Any:
     """Return the records of all joint points (p,)."""
     return _records(
-        POINT,
+        POINT_RECORD,
         gaps.segment,
         gaps.group,
         points.joint,

@@ -18,16 +18,10 @@ from scipy import sparse
 from scipy.linalg import solve_triangular
 from scipy.sparse.linalg import splu
 
-from archfem._numba import entry, summing_kernel, view_kernel
+from archfem._numba import entry, kernel, summing_kernel, view_kernel
 from archfem._typing import Array
 
 Indices = NDArray[np.int64]
-
-# Columns up to which a whole branch of the elimination tree becomes one group
-MAX_LEAF_COLUMNS = 16
-
-# Columns of a group at most
-MAX_GROUP_COLUMNS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +110,9 @@ def _groups(fill: list[Indices]) -> list[tuple[int, int]]:
             stored = width * height - width * (width - 1) // 2
             below = fill[before[1] - 1]
             follows = len(below) > 0 and start <= below[0] <= column
-            dense = width <= MAX_GROUP_COLUMNS and stored <= 64 + 1.15 * joined
-            if not (branch[column] <= MAX_LEAF_COLUMNS or (follows and dense)):
+            dense = width <= 64 and stored <= 64 + 1.15 * joined
+            # a whole branch of up to 16 columns becomes one group
+            if not (branch[column] <= 16 or (follows and dense)):
                 break
             start, own = before[0], joined
             groups.pop()
@@ -388,15 +383,22 @@ def solve_panels(panels, vector):  # type: ignore
             own[k] = value * row[k]
 
 
+@kernel
+def _is_zero(vector):  # type: ignore
+    """Return whether a vector has only zeros."""
+    zero = True
+    for value in vector:
+        zero = zero and value == 0.0
+    return zero
+
+
 @summing_kernel
 def solve_forward(factor, vector):  # type: ignore
     """Solve C x = b in place; groups with only zeros cost nothing."""
     for group in range(len(factor.parent)):
         start, width = factor.first[group], factor.first[group + 1] - factor.first[group]
-        own, zero = vector[start : start + width], True
-        for value in own:
-            zero = zero and value == 0.0
-        if zero:
+        own = vector[start : start + width]
+        if _is_zero(own):
             continue
         rows = factor.rows[factor.below[group] : factor.below[group + 1]]
         panel, size = factor.panels[factor.places[group] :], width + len(rows)
