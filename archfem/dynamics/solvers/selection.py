@@ -18,7 +18,7 @@ SOLVERS: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": Co
 METHODS = ("auto", *SOLVERS, "snes")
 
 # Half-width of a band up to which "newton" is faster than "compliance" where joints slide much
-MAX_NEWTON_HALF_WIDTH = 8
+MAX_NEWTON_HALF_WIDTH = 6
 
 logger = logging.getLogger("archfem")
 
