@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import kernel, summing_kernel, view_kernel
+from archfem._numba import inlined_kernel, kernel, summing_kernel, view_kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.joint_law import (
     collect_derivatives,
@@ -55,6 +55,7 @@ class ActiveRows(NamedTuple):
 
     Workspaces have room for all rows of the structure; pages that are never touched cost no memory.
     They are allocated once, as allocation in every iteration is slower than the arithmetic.
+    Functions that are called for each row are inlined, as it takes long to pass so many arrays.
     """
 
     full: Array  # F (p, p), symmetric, filled for rows that have been active
@@ -279,7 +280,7 @@ def begin_problem(active, rows):  # type: ignore
             _add_row(active, row)
 
 
-@kernel
+@inlined_kernel
 def _add_row(active, row):  # type: ignore
     """Add a row of the structure."""
     k, wide, full = active.sizes[0], active.sizes[2], active.full[row]
@@ -289,7 +290,7 @@ def _add_row(active, row):  # type: ignore
         active.entries[k * wide + j] = full[active.numbers[active.row_of[j]]]
 
 
-@kernel
+@inlined_kernel
 def _remove_row(active, k):  # type: ignore
     """Remove a row; the last one takes its place."""
     if active.column_of[k] >= 0:
@@ -306,7 +307,7 @@ def _remove_row(active, k):  # type: ignore
     active.sizes[0] = last
 
 
-@kernel
+@inlined_kernel
 def _remove_column(active, column):  # type: ignore
     """Remove a column; the last one takes its place."""
     last, entries, wide = active.sizes[1] - 1, active.entries, active.sizes[2]
@@ -349,7 +350,7 @@ def add_columns(active, force, count):  # type: ignore
         _add_column(active, active.derivatives[0][entry, 0])
 
 
-@kernel
+@inlined_kernel
 def _add_column(active, row):  # type: ignore
     """Make a row the next column, unless it is one."""
     if active.column_of[row] < 0:

@@ -417,7 +417,7 @@ def collect_derivatives(law, selection, entries):  # type: ignore
     return count
 
 
-@kernel
+@inlined_kernel
 def _slip_derivatives(law, place, row, entries, count):  # type: ignore
     """List the derivatives of a slip row by its slip and, as friction grows, by openings."""
     group, last, entered = row - law.openings, -1, -1
