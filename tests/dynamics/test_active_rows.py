@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from kernels import from_python
 
-from archfem.dynamics.solvers import active_rows, newton
-from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS, ActiveRows
+from archfem.dynamics.solvers import active_compliance, active_rows, newton
+from archfem.dynamics.solvers.active_compliance import ActiveRows
+from archfem.dynamics.solvers.active_rows import MAX_DIRECT_ROWS
 
-add_columns = from_python(active_rows.add_columns)
-add_gaps = from_python(active_rows.add_gaps)
-begin_problem = from_python(active_rows.begin_problem)
-update_columns = from_python(active_rows.update_columns)
+add_columns = from_python(active_compliance.add_columns)
+add_gaps = from_python(active_compliance.add_gaps)
+begin_problem = from_python(active_compliance.begin_problem)
+update_columns = from_python(active_compliance.update_columns)
 prepare_equations = from_python(active_rows.prepare_equations)
 solve_equations = from_python(active_rows.solve_equations)
 hold_reversed = from_python(newton.hold_reversed)

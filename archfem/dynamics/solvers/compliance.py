@@ -16,11 +16,9 @@ import numpy as np
 from numba.extending import overload
 
 from archfem._numba import KERNEL_OPTIONS, kernel
+from archfem.dynamics.solvers.active_compliance import ActiveRows, begin_problem, clear_problem
 from archfem.dynamics.solvers.active_rows import (
-    ActiveRows,
-    begin_problem,
     check_active_rows,
-    clear_problem,
     predict_active_rows,
     solve_active_rows,
     subtract_released,
