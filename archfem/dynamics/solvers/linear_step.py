@@ -137,7 +137,7 @@ def linear_workspace(linear: LinearSystem) -> LinearStepWorkspace:
     """Allocate the workspace of runs."""
     size, rows = len(linear.weight), len(linear.law.offset)
     ends, released = np.zeros((2, 3, 3, size)), np.zeros((2, linear.law.openings))
-    return LinearStepWorkspace(ends, *np.zeros((6, rows)), *np.zeros((3, size)), released)
+    return LinearStepWorkspace(ends, *np.zeros((6, rows)), *np.zeros((3, size)), released)  # type: ignore[call-arg]
 
 
 def solve_contact(system: Any) -> Any:

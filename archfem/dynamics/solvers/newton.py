@@ -200,7 +200,7 @@ class NewtonSolver:
         entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
         factored = np.zeros(len(pairs), np.int64), np.zeros(len(pairs)), np.full(1, -1)
         rows, contact = np.zeros((7, len(law.offset))), np.zeros((3, len(linear.weight)))
-        return SmallSystem(
+        return SmallSystem(  # type: ignore[call-arg]
             linear,
             linear_workspace(linear),
             tangent,
