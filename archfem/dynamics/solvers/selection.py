@@ -1,4 +1,4 @@
-"""Which solver takes the steps of a run: a rule on displacements and on the width of a band."""
+"""Which solver takes the steps of a run: "newton" for large displacements, else "compliance"."""
 
 import logging
 
@@ -16,9 +16,6 @@ from archfem.statics.newton import Newton
 SOLVERS: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": ComplianceSolver}
 
 METHODS = ("auto", *SOLVERS, "snes")
-
-# Half-width of a band up to which "newton" is faster than "compliance" for small displacements
-MAX_NEWTON_HALF_WIDTH = 12
 
 logger = logging.getLogger("archfem")
 
@@ -51,15 +48,13 @@ def stepper_for(
 def select_solver(equation: Equation) -> StepSolver | None:
     """Return the solver of a run, or None where only SNES applies.
 
-    Newton's method on the whole structure takes large displacements, and small ones where the
-    tangent is a narrow band, as of a chain of rigid stones. Its time grows with the square of the
-    width; that of the compliance method with the number of open and sliding rows.
+    For small displacements the compliance method was the faster one in 48 cases from a ring of 17
+    stones to a bridge with its fill.
     """
-    newton = NewtonSolver.of(equation)
-    if newton is None:
-        operator = equation.model.operator
-        if operator is not None and not operator.points.is_plain:
-            logger.info("joints dilate or resist tension: every step is solved by SNES")
-        return None
-    narrow = newton.half_width <= MAX_NEWTON_HALF_WIDTH
-    return newton if equation.model.large_displacements or narrow else ComplianceSolver.of(equation)
+    if equation.model.large_displacements:
+        return NewtonSolver.of(equation)
+    solver = ComplianceSolver.of(equation)
+    operator = equation.model.operator
+    if solver is None and operator is not None and not operator.points.is_plain:
+        logger.info("joints dilate or resist tension: every step is solved by SNES")
+    return solver
