@@ -333,7 +333,7 @@ class CollapseScale:
         return tuple((run.scale, run.fall) for run in self.searches[dt].runs)
 
     def verdict_range(self, structure: Structure, motion: Motion, **options: Any) -> VerdictRange:
-        """Run over the properties that nobody knows exactly, and over scales of the bracket.
+        """Run over uncertain properties, and over the scales of the bracket.
 
         Args:
             structure: structure that was shaken.

@@ -1,4 +1,4 @@
-"""Variations of a run: the same motion over properties that nobody knows exactly.
+"""Variations of a run: the same motion over uncertain properties of structure and model.
 
 Joint rule, stiffness, friction, damping, sign of the motion and time step are varied one at a time
 and all together, by a Latin hypercube. The result is the share of runs in which the structure
@@ -99,7 +99,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     seed: int = 0,
     workers: int = 1,
 ) -> VerdictRange:
-    """Run a motion with large displacements over the properties that nobody knows exactly.
+    """Run a motion with large displacements over its uncertain properties.
 
     The run as given comes first, then each property at each of its values alone, then a Latin
     hypercube over all (McKay, Beckman and Conover, 1979). By default these are varied:
@@ -161,7 +161,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over the properties that nobody knows exactly, with rigid blocks.
+    """Run a case over its uncertain properties, with rigid blocks.
 
     Args:
         case: case with one motion; its structure, motion, damping and time step are as given.
@@ -184,7 +184,7 @@ def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
 def verdict_range_of_bracket(
     bracket: CollapseScale, structure: Structure, motion: Motion, **options: Any
 ) -> VerdictRange:
-    """Run over the properties that nobody knows exactly, and over the scales of a bracket."""
+    """Run over its uncertain properties, and over the scales of a bracket."""
     if bracket.lower == 0.0:
         raise InvalidInput(
             "it fell at the smallest scale that was tried, so that no scale is known to stand: "

@@ -74,7 +74,7 @@ class ActiveRows(NamedTuple):
             return np.full(size, value, np.int64)
 
         room = size + -size % ROW_PADDING
-        return cls(
+        return cls(  # type: ignore[call-arg]  # lengths of unpacked arrays are unknown to it
             np.empty((size, size)),
             *(flags(), flags(), flags()),
             np.array([0, 0, min(COLUMN_BLOCK, room), 0]),
