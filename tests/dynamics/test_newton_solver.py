@@ -17,7 +17,7 @@ from archfem.dynamics.solvers.band_lu import (
 )
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
-from archfem.dynamics.solvers.selection import select_solver, stepper_for
+from archfem.dynamics.solvers.selection import MAX_NEWTON_HALF_WIDTH, select_solver, stepper_for
 
 DT = 0.005
 
@@ -59,13 +59,22 @@ def test_a_chain_of_rigid_stones_has_a_band_of_two_stones():
 
 
 @pytest.mark.parametrize(
-    ("fidelity", "method"),
-    [("rigid", "compliance"), ("full", "compliance"), ("monolithic", "snes")],
+    ("fidelity", "scheme", "damping", "method"),
+    [
+        ("rigid", af.dynamics.Conserving(), "closed", "newton"),
+        ("rigid", af.dynamics.Newmark(), "none", "newton"),
+        ("full", af.dynamics.Conserving(), "closed", "compliance"),
+        ("monolithic", af.dynamics.Conserving(), "closed", "snes"),
+    ],
 )
-def test_small_displacements_select_the_compliance(ring, fidelity, method):
+def test_the_width_of_the_band_selects(ring, fidelity, scheme, damping, method):
     model = af.build(glued(ring), fidelity=fidelity, cells=(4, 4))
-    equation = af.dynamics.Equation(model, MOTION, af.Rayleigh(0.05, (8.0, 16.0)))
+    rayleigh = af.Rayleigh(0.05, (8.0, 16.0), damping)
+    equation = af.dynamics.Equation(model, MOTION, rayleigh, scheme)
     assert stepper_for("auto", equation).name == method
+    if method != "snes":
+        narrow = NewtonSolver.of(equation).half_width <= MAX_NEWTON_HALF_WIDTH
+        assert narrow == (method == "newton")
 
 
 def test_large_displacements_select_it_whatever_the_width(ring):
