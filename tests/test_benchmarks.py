@@ -12,9 +12,7 @@ import pytest
 SCRIPTS = Path(__file__).parent / "benchmarks"
 
 NAMES = sorted(
-    path.stem
-    for path in SCRIPTS.glob("*.py")
-    if "def main(arguments" in path.read_text("utf-8")
+    path.stem for path in SCRIPTS.glob("*.py") if "def main(arguments" in path.read_text("utf-8")
 )
 """Scripts with a command line of their own."""
 
