@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import entry, inlined_kernel, kernel
+from archfem._numba import entry, inlined_kernel
 from archfem._typing import Array
 
 
