@@ -42,8 +42,8 @@ setup: .venv/ready  ## install what is needed (system packages, .venv)
 	$(PYTHON) -m archfem compile
 	@touch $@
 
-demo: .venv/ready  ## run the shipped ring on a synthetic earthquake: results in out/ring
-	$(PYTHON) -m archfem run meshes/ring.toml --out out/ring || test $$? = 3  # 3: in doubt, as said
+demo: .venv/ready  ## run the shipped ring on a strong earthquake: results in out/ring
+	$(PYTHON) -m archfem run meshes/ring.toml --out out/ring
 
 test: .venv/compiled  ## the default tests, on all cores
 	$(PYTHON) -m pytest $(SPREAD)

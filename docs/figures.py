@@ -1,4 +1,4 @@
-"""Draw the figures of the theory and of the tutorial: `python docs/figures.py`, about 15 s."""
+"""Draw the figures of the theory and of the tutorial: `python docs/figures.py`, about a minute."""
 
 from pathlib import Path
 
@@ -271,7 +271,7 @@ def tutorial() -> None:
     model = af.build(ring, fidelity="full", cells=(4, 4))
     dead = af.dead_load(model)
     motion = af.Motion.synthetic(duration=6.0, pga=6.0, seed=3)
-    run = af.time_history(model, motion, start=dead, damping=af.Rayleigh(0.05, (8.0, 16.0)))
+    run = af.time_history(model, motion, start=dead, damping=af.effective_damping(model, 0.05))
     limit = af.collapse_factor(ring, live=af.BodyForce(1.0, 0.0))
     drawn = {
         "tutorial_dead": af.view.draw_structure(ring, dead.joints),
@@ -283,7 +283,15 @@ def tutorial() -> None:
         figure.savefig(FOLDER / f"{name}.png", dpi=90)
 
 
+def verdict_range() -> None:
+    """Draw the range of a verdict, by the code of the page on verdicts."""
+    thin = af.circular_arch(radius=2.95, thickness=0.40, embrace=159.0, voussoirs=17)
+    motion = af.Motion.synthetic(duration=8.0, pga=4.5, seed=3)
+    found = af.verdict_range(thin, motion)
+    found.plot().savefig(FOLDER / "verdict_range.png", dpi=90)
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    for draw in (signs, law, section, rules, frame, ladder, states, programme, tutorial):
+    for draw in (signs, law, section, rules, frame, ladder, states, programme, tutorial, verdict_range):
         draw()

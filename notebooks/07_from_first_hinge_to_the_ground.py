@@ -172,20 +172,21 @@ pd.DataFrame({key: row(push) for key, push in (exact | stiff).items()}).T.round(
 # ## Under an earthquake
 #
 # A thinner ring, of 0.40 m, whose joints slide at 0.60, under a synthetic earthquake of 8 s, with a
-# PGA of 8 m/s² and then of 10. Over each step the work of the forces is the change of the energies,
-# to round-off (`Conserving`), so that nothing falls by an error of the scheme.
+# PGA of 4 m/s² and then of 5. Over each step the work of the forces is the change of the energies,
+# to round-off (`Conserving`), so that nothing falls by an error of the scheme. Damping follows the
+# stiffness of closed joints: a part proportional to mass would hold loose stones back.
 
 # %%
 thin = ring_on(af.masonry.STONE_TO_STONE, 0.40)
 model = af.build(thin, fidelity="rigid", displacements="large")
 dead = af.dead_load(model)
-motion = af.Motion.synthetic(duration=8.0, pga=10.0, seed=3)
-shake = {"start": dead, "damping": af.Rayleigh(0.05, (8.0, 16.0))}
+motion = af.Motion.synthetic(duration=8.0, pga=5.0, seed=3)
+shake = {"start": dead, "damping": af.effective_damping(model, 0.05)}
 runs = {
     scale: af.time_history(model, motion.scaled(scale), dt=0.005, **shake) for scale in (0.8, 1.0)
 }
 for scale, run in runs.items():
-    print(f"× {scale}: the ring {run.fall.text}")
+    print(f"× {scale}: {run.fall.text}")
 
 # %%
 figure = Figure(figsize=(6.4, 2.8), layout="constrained")
@@ -197,7 +198,7 @@ axes.legend(frameon=False, fontsize=8)
 figure
 
 # %% [markdown]
-# Both form mechanisms and close them again, the weaker even after a joint has rotated by 0.19 rad.
+# Both form mechanisms and close them again, the weaker even after a joint has rotated by 0.09 rad.
 # In the stronger the rotation continues. Once a joint has rotated by 0.3 rad its stones count as
 # loose, and another method takes over: rigid polygons that collide and slide, down to the ground.
 # `run.fall` describes the final state.

@@ -22,8 +22,8 @@ WORDS = "\n".join(PAGES.values())
 RUN = re.compile(r"```python\n(.*?)```(?:(?:(?!```).)*?```text\n(.*?)```)?", re.DOTALL)
 """A block of Python, and what it prints if the next block says so."""
 
-SLOW = ("docs/tutorial.md", "docs/index.md")
-"""What these run, the README's own lines do as well."""
+SLOW = ("docs/tutorial.md", "docs/index.md", "docs/howto/verdict.md")
+"""What these run, the README's own lines or other tests do as well."""
 
 
 def run_blocks(page, capsys):

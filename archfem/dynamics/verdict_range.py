@@ -61,7 +61,8 @@ class VerdictRange(ResultDisplay):
     @property
     def properties(self) -> tuple[str, ...]:
         """Names of the varied properties."""
-        return tuple(str(name) for name in self.dataset.attrs["properties"])
+        # files store a list of one name as the name
+        return tuple(str(name) for name in np.atleast_1d(self.dataset.attrs["properties"]))
 
     def importance(self) -> dict[str, float]:
         """Return the share of the variance of the damage that each property explains [-].

@@ -74,4 +74,5 @@ def _compile_large_displacements(max_half_width: int) -> None:
     stepper = Stepper(equation, NewtonSolver(equation, max_half_width))
     run = time_history(model, _SHORT_MOTION, dt=_SHORT_MOTION.dt, method=stepper)
     end = last_state(run)
+    model.observer().joint_ends(end.q)  # pose of a face, as films need it
     simulate_fall(model, end, end, _SHORT_MOTION)

@@ -140,7 +140,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     base = RunSettings(structure, motion, damping, dt, fidelity)
     dead_load(model)  # a structure that does not stand is refused before any run
     changes = [*_single_changes(ranges, damping), *_sample_changes(ranges, samples, seed)]
-    points = [(k, Variation(base, tuple(each.items()))) for k, each in enumerate(changes)]
+    points = [(k, Variation(base, _resolve_labels(ranges, each))) for k, each in enumerate(changes)]
     evaluator = Evaluator(evaluate_variation)
     rows: dict[int, dict[str, Any]] = {}
     evaluated = (
@@ -251,6 +251,16 @@ def _sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[
         }
         for row in sampler.random(samples)
     ]
+
+
+def _resolve_labels(
+    ranges: Mapping[str, Any], changes: Mapping[str, Any]
+) -> tuple[tuple[str, Any], ...]:
+    """Return the changes with structures and motions in place of their labels."""
+    return tuple(
+        (name, ranges[name][value] if isinstance(ranges[name], Mapping) else value)
+        for name, value in changes.items()
+    )
 
 
 def _value_at(values: Any, share: float) -> Any:

@@ -36,7 +36,7 @@ from archfem.studies.process_pool import Row
 from archfem.studies.result_store import load_table_libraries
 
 MESHES = Path(__file__).parents[2] / "meshes"
-RING, BRIDGE = MESHES / "ring.toml", MESHES / "prusias_sensitivity.toml"
+RING, BRIDGE = MESHES / "ring_paper.toml", MESHES / "prusias_sensitivity.toml"
 
 CASES = 25
 """Of the bridge's sensitivity study."""

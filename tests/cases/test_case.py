@@ -9,7 +9,7 @@ import pytest
 import archfem as af
 from archfem.cases.case import BUILD_KEYWORDS, MODEL_KEYS
 
-RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
 
 GLUED = "contacts.stone to stone.friction=none"
@@ -53,8 +53,8 @@ def test_changes_from_the_command_line():
         ("analysis.dt='5 s'", "analysis.dt = 5 s is not between"),
         ("output.free_body='vousoir 3'", "no block 'vousoir 3': .*'voussoir 3'"),
         ("model.cells=4", r"model.cells = 4 is not a list"),
-        ("model.cells=[0, 4]", "ring.toml: cells through = 0 is not a whole number"),
-        ("model.tolerance=2", "ring.toml: tolerance 2 on .e. is not between 0 and 1"),
+        ("model.cells=[0, 4]", "ring_paper.toml: cells through = 0 is not a whole number"),
+        ("model.tolerance=2", "ring_paper.toml: tolerance 2 on .e. is not between 0 and 1"),
         ("model.fidelity=modal", "fidelity 'modal' is not known: use one of"),
         ("analysis.damping={ratio=0.05}", "give a ratio and a frequency"),
         ("analysis.scheme=euler", "use 'conserving', 'newmark', or 'hht'"),
@@ -89,7 +89,7 @@ def test_refusals_name_the_key(change, says):
 def test_schemes_that_follow_no_sliding_are_refused_where_joints_slide(scheme):
     """Before the dead load, and in the words of the file; joints that never slide may have any."""
     change = f"analysis.scheme={scheme}"
-    says = f"ring.toml: analysis.scheme = '{scheme}': .* follows no sliding.* friction = \"none\""
+    says = f"toml: analysis.scheme = '{scheme}': .* follows no sliding.* friction = \"none\""
     with pytest.raises(af.InvalidInput, match=says):
         af.Case.read(RING, [change])
     scheme = af.Case.read(RING, [change, GLUED]).scheme
@@ -123,7 +123,7 @@ def test_joints_of_a_case_slide_by_friction_and_cohesion():
 
 
 def test_geometry_errors_name_the_file():
-    with pytest.raises(af.InvalidStructure, match=r"ring.toml: thickness 9 m"):
+    with pytest.raises(af.InvalidStructure, match=r"ring_paper.toml: thickness 9 m"):
         af.Case.read(RING, ["structure.thickness=9"])
 
 

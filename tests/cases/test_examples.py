@@ -8,11 +8,15 @@ from archfem.cases.examples import copy_example, list_example_titles, list_examp
 
 def test_each_has_a_title():
     titles = list_example_titles()
-    assert titles.keys() == list_examples().keys() >= {"ring", "ring_falls", "prusias", "survey"}
+    assert (
+        titles.keys()
+        == list_examples().keys()
+        >= {"ring", "ring_falls", "ring_paper", "prusias", "survey"}
+    )
     assert all(titles.values())
 
 
-@pytest.mark.parametrize("name", ["ring", "ring_falls", "survey", "prusias_restored"])
+@pytest.mark.parametrize("name", ["ring", "ring_falls", "ring_paper", "survey", "prusias_restored"])
 def test_a_case_that_is_printed_can_be_run_from_anywhere(name, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(read_example(name)[0], encoding="utf-8")

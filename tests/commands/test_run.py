@@ -10,7 +10,7 @@ import pytest
 import archfem as af
 from archfem.commands.run import print_results
 
-RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
 
 def test_run_command(tmp_path, capsys):
@@ -53,10 +53,11 @@ def test_a_rest_without_modes_is_shaken_all_the_same(tmp_path, undrawn, monkeypa
 def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     """Four joints reach |e| = 0.38 at once, and never 0.46."""
     changes = ["model.fidelity=rigid", "motion.end=4", "analysis.stop_at_mechanism=true"]
-    changes += ["output.animation=false"]
+    changes += ["motion.scale=0.8", "output.animation=false"]
+    changes += ["analysis.damping={ratio=0.05, frequency=8.0}"]
     given = [part for change in changes for part in ("--set", change)]
     assert af.commands.main(["run", str(RING), "--out", str(tmp_path / "usual"), *given]) == 0
-    assert "any joints at once, one part at once" not in capsys.readouterr().out.splitlines()[0]
+    assert "no mechanism; no doubts" in capsys.readouterr().out
     loose = ["--set", "criteria.hinge=0.38"]
     assert (
         af.commands.main(["run", str(RING), "--out", str(tmp_path / "loose"), *given, *loose]) == 0
@@ -65,10 +66,7 @@ def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     assert run.criteria == af.Criteria(hinge=0.38)
     assert run.ending is af.dynamics.Ending.EVENT
     assert run.mechanism.time == run.time[-1]
-    assert (
-        f"Demirel and Aldemir: local mechanism of arch at {run.mechanism.time:.3f}"
-        in capsys.readouterr().out
-    )
+    assert f"local mechanism of arch at {run.mechanism.time:.3f}" in capsys.readouterr().out
     assert af.Case.read(tmp_path / "loose" / "case.toml").criteria == run.criteria
     assert af.Case.read(RING).criteria == af.Criteria()
 
@@ -101,9 +99,12 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
         "joints.png",
     }
     table = (out / "suite.txt").read_text()
-    # 1 m/s² by R = 2
-    assert re.search(r"^first .* 0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE)
-    assert re.search(r"^second +no mechanism +none .* none +reached 1\.00 s$", table, re.MULTILINE)
+    assert re.search(
+        r"^first +no mechanism +none +0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE
+    )  # 1 m/s² by R = 2
+    assert re.search(
+        r"^second +no mechanism +none .*( +none){2} +-( +none){3} +reached 1\.00 s$", table, re.M
+    )
     assert "finished before" not in capsys.readouterr().out
 
     before = (out / "second" / "history.nc").stat().st_mtime_ns
@@ -118,7 +119,7 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
     assert run(small, "suite.scale=2") == 0
     assert "finished before" not in capsys.readouterr().out
     table = (out / "suite.txt").read_text()
-    assert re.search(r"^first .* 1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
+    assert re.search(r"^first +no mechanism +none +1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
 
 
 def told(small, shake):

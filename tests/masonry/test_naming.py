@@ -7,7 +7,7 @@ import pytest
 import archfem as af
 from archfem.masonry.structure import find_number, join_joint_names, join_names
 
-RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
+RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
 
 

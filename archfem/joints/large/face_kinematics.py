@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import inlined_kernel, kernel
+from archfem._numba import entry, inlined_kernel
 from archfem._typing import Array
 
 
@@ -221,7 +221,8 @@ def _frameless_pose(sides, joint, side, q):  # type: ignore
     return fixed[joint, side, 0] + dx, fixed[joint, side, 1] + dy, fixed[joint, side, 2] + turn
 
 
-@kernel
+# compiled for Python too: films place faces by it
+@entry
 def face_pose(sides, joint, side, q):  # type: ignore
     """Return the pose of a face [m, m, rad]."""
     if not sides.has_frame[joint, side]:

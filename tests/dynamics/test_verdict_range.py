@@ -1,0 +1,153 @@
+"""Statistics of a range of verdicts against closed forms and made-up runs."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import beta, rankdata
+
+import archfem as af
+from archfem.dynamics.verdict_range import VerdictRange
+
+
+def made_up(falls, sampled=None, error=None, residual=None, **columns):
+    """Runs that fall or stand, with the properties of the columns."""
+    falls = np.asarray(falls)
+    count = len(falls)
+    data = {name: ("run", np.asarray(values)) for name, values in columns.items()}
+    data["outcome"] = "run", np.where(falls, "fallen", "stands")
+    residual = np.zeros(count) if residual is None else residual
+    data["displacement"] = data["residual"] = "run", np.asarray(residual, float)
+    data["time"] = "run", np.where(falls, 1.0, np.nan)
+    data["error"] = "run", np.array([""] * count if error is None else error)
+    data["sampled"] = "run", np.ones(count, bool) if sampled is None else np.asarray(sampled)
+    attrs = {"properties": list(columns), "k_n": 2e9, "k_s": 1e9}
+    return VerdictRange(xr.Dataset(data, attrs=attrs))
+
+
+@pytest.mark.parametrize(("falls", "count"), [(0, 26), (3, 26), (26, 26), (1, 2)])
+@pytest.mark.parametrize("confidence", [0.5, 0.95])
+def test_the_interval_is_that_of_clopper_and_pearson(falls, count, confidence):
+    found = made_up(np.arange(count) < falls, k_n=np.linspace(0.5, 2.0, count))
+    assert found.share == falls / count
+    tail = 0.5 * (1.0 - confidence)
+    low = beta.ppf(tail, falls, count - falls + 1) if falls else 0.0
+    high = beta.ppf(1.0 - tail, falls + 1, count - falls) if falls < count else 1.0
+    assert found.interval(confidence) == pytest.approx((low, high), abs=1e-9)
+
+
+def test_runs_beside_the_sample_count_for_the_sentence_alone():
+    found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
+    assert found.share == 0.5
+    assert found.sentence.startswith("falls in 2 of 4: ")
+    assert "; of those sampled 50% fall (1% to 99%)" in found.sentence
+
+
+def test_a_run_without_an_answer_neither_stands_nor_falls():
+    names = ["x", "x", "y", "y", "y"]
+    found = made_up(
+        [True, False, False, True, False],
+        error=["", "", "", "", "did not converge"],
+        sign=names,
+    )
+    assert found.answered.tolist() == [True] * 4 + [False]
+    assert found.share == 0.5
+    assert found.sentence.startswith("falls in 2 of 4")
+    assert found.sentence.endswith("; 1 have no answer")
+    without = made_up([True, False, False, True], sign=names[:4])
+    assert found.interval() == without.interval()
+    assert found.importance() == without.importance()
+    assert found.table() == without.table()
+
+
+def test_importance_is_the_correlation_ratio_of_ranks():
+    """By its definition, for a label and for numbers in thirds."""
+    rng = np.random.default_rng(0)
+    residual, number = rng.random(30), rng.permutation(30) / 30.0
+    label = np.where(rng.random(30) < 0.4, "a", "b")
+    found = made_up(np.zeros(30, bool), residual=residual, sign=label, scale=number)
+    ranks = rankdata(residual)
+    thirds = [np.sort(number)[10 * k : 10 * k + 10] for k in range(3)]
+    groups = {
+        "sign": [ranks[label == each] for each in "ab"],
+        "scale": [ranks[np.isin(number, each)] for each in thirds],
+    }
+    expected = {
+        name: sum(len(each) * (each.mean() - ranks.mean()) ** 2 for each in members)
+        / np.sum((ranks - ranks.mean()) ** 2)
+        for name, members in groups.items()
+    }
+    assert found.importance() == pytest.approx(expected)
+    assert list(found.importance()) == sorted(expected, key=lambda name: -expected[name])
+
+
+def test_what_alone_decides_explains_most_and_a_constant_nothing():
+    label = np.array(["a", "b"] * 10)
+    found = made_up(label == "a", sign=label, dt=["as given"] * 20, scale=np.arange(20.0))
+    assert found.importance()["sign"] == pytest.approx(1.0)
+    assert found.importance()["dt"] == 0.0
+    # distances to the ground say nothing about fallen structures
+    far = made_up(label == "a", residual=np.where(label == "a", range(20), 0.0), sign=label)
+    assert far.importance()["sign"] == pytest.approx(1.0)
+    same = made_up(np.ones(4, bool), sign=list("aabb"))
+    assert same.importance() == {"sign": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("columns", "falls", "where"),
+    [
+        (
+            {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
+            [True, True, False, False],
+            "all with k_n below 2.3 GPa/m, where 2 of 2 fall",
+        ),
+        (
+            {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},
+            [False, False, True, True],
+            "all with friction above that given +0.025, where 2 of 2 fall",
+        ),
+        (
+            {"damping_ratio": np.array([0.5, 1.0, 1.5, 2.0])},
+            [True, False, False, False],
+            "all with damping ratio below × 0.75, where 1 of 1 fall",
+        ),
+        (
+            {"joint_rule": ["exact", "rigid", "rigid", "exact"], "dt": list("hhgh")},
+            [False, True, False, False],
+            "all with joint rule 'rigid' and dt 'h', where 1 of 1 fall",
+        ),
+    ],
+)
+def test_the_sentence_names_what_separates_falls(columns, falls, where):
+    assert made_up(falls, **columns).sentence.split(": ")[1].split(";")[0] == where
+
+
+def test_without_a_difference_no_condition_is_named():
+    for falls, first in ((False, "falls in 0 of 3; "), (True, "falls in 3 of 3; ")):
+        assert made_up([falls] * 3, sign=list("aba")).sentence.startswith(first)
+
+
+def test_the_table_counts_falls_by_value():
+    found = made_up([True, False, True, True], sign=list("aabb"), k_n=[0.5, 0.5, 2.0, 2.0])
+    (_, *rows) = found.table().splitlines()
+    assert {row.split("%")[1].strip() for row in rows} == {
+        "a: 1 of 2, b: 2 of 2",
+        "0.5: 1 of 2, 2: 2 of 2",
+    }
+    assert str(found) == f"{found.sentence}\n{found.table()}"
+    assert found.sentence in repr(found)
+
+
+def test_a_saved_range_is_read_again(tmp_path):
+    found = made_up([True, False], error=["", "no answer"], sign=list("ab"))
+    again = VerdictRange.read(found.save(tmp_path / "folder" / "range.nc"))
+    assert again.dataset.equals(found.dataset)
+    assert (again.sentence, again.properties) == (found.sentence, ("sign",))
+    with pytest.raises(af.InvalidInput):
+        VerdictRange.read(tmp_path / "nothing.nc")
+
+
+def test_each_property_has_a_panel():
+    found = made_up([True, False, False], sign=list("aab"), k_n=[0.5, 1.0, 2.0])
+    figure = found.plot()
+    assert len([axes for axes in figure.axes if axes.get_visible()]) == 2
+    assert figure.get_suptitle() == found.sentence

@@ -1,0 +1,306 @@
+"""Runs over properties that nobody knows exactly: what is varied, and what each run gets."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pages import read_page
+
+import archfem as af
+from archfem.dynamics.fall import CollapseState
+from archfem.studies import variations
+from archfem.studies.variations import (
+    DEFAULT_RANGES,
+    RunSettings,
+    Variation,
+    evaluate_variation,
+    verdict_range_of_case,
+)
+
+HELD = {name: values[0] for name, values in DEFAULT_RANGES.items()} | {
+    **{"k_n": 1.0, "k_s": 1.0, "friction": 0.0, "damping_ratio": 1.0},
+}
+"""Values that hold all properties as given."""
+
+
+@pytest.fixture(scope="module")
+def column():
+    return af.column(breadth=0.4, heights=[0.8, 0.8], width=1.0)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return af.Motion.synthetic(duration=1.0, pga=4.0, seed=1)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """What runs would get; they are not computed."""
+    calls = []
+
+    def state(*given):
+        calls.append(given)
+        return CollapseState("stands", None, (), 0.02, 0.01, True)
+
+    monkeypatch.setattr(variations, "_run_elastic_joints", state)
+    monkeypatch.setattr(variations, "_run_rigid_blocks", state)
+    return calls
+
+
+def evaluate(column, motion, damping=None, **changes):
+    base = RunSettings(column, motion, damping, 0.005, "rigid")
+    return evaluate_variation(Variation(base, tuple(changes.items())))
+
+
+def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
+    found = evaluate(column, motion)
+    (same, moved, dt, *_) = calls.pop()
+    assert found == {
+        "outcome": "stands",
+        "displacement": 0.02,
+        "residual": 0.01,
+        "time": pytest.approx(np.nan, nan_ok=True),
+    }
+    assert (same, dt) == (column, 0.005)
+    assert np.array_equal(moved.horizontal, motion.horizontal)
+    evaluate(column, motion, k_n=2.0, k_s=0.5, friction=-0.1, scale=3.0, sign="reversed", dt="half")
+    (changed, moved, dt, *_) = calls.pop()
+    for new, old in zip(changed.joints, column.joints, strict=True):
+        assert new.contact == replace(
+            old.contact,
+            normal_stiffness=2.0 * old.contact.normal_stiffness,
+            shear_stiffness=0.5 * old.contact.shear_stiffness,
+            friction=old.contact.coefficient - 0.1,
+        )
+    assert moved.horizontal == pytest.approx(-3.0 * motion.horizontal)
+    assert dt == 0.0025
+    evaluate(column, motion, friction=-5.0)
+    assert calls.pop()[0].joints[0].contact.coefficient == 0.05
+
+
+def test_joint_rules_select_the_method(column, motion, monkeypatch):
+    built, rigid = [], []
+    build, run = variations.build, variations._run_rigid_blocks
+
+    def note(structure, **given):
+        built.append(given)
+        return build(structure, **given)
+
+    monkeypatch.setattr(variations, "build", note)
+    monkeypatch.setattr(
+        variations, "_run_rigid_blocks", lambda *given: rigid.append(given) or run(*given)
+    )
+    exact = evaluate(column, motion)
+    springs = evaluate(column, motion, joint_rule="three points")
+    plain = {"fidelity": "rigid", "displacements": "large"}
+    assert built == [plain, plain | {"quadrature": "trapezoidal", "points": 3}]
+    assert not rigid
+    blocks = evaluate(column, motion, joint_rule="rigid")
+    assert len(rigid) == 1
+    assert len(built) == 2
+    assert len({each["displacement"] for each in (exact, springs, blocks)}) == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "expected"),
+    [
+        (af.StiffnessDamping(0.05, 8.0), "stiffness", af.StiffnessDamping(0.1, 8.0)),
+        (af.StiffnessDamping(0.05, 8.0), "mass and stiffness", af.Rayleigh(0.1, (8.0, 16.0))),
+        (af.Rayleigh(0.05, (6.0, 9.0)), "stiffness", af.StiffnessDamping(0.1, 6.0)),
+        (af.Rayleigh(0.05, (6.0, 9.0)), "mass and stiffness", af.Rayleigh(0.1, (6.0, 9.0))),
+    ],
+)
+def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kind, expected):
+    used = []
+    history = variations.time_history
+    monkeypatch.setattr(
+        variations,
+        "time_history",
+        lambda *words, damping, **rest: (
+            used.append(damping) or history(*words, damping=damping, **rest)
+        ),
+    )
+    evaluate(column, motion, given, damping_kind=kind, damping_ratio=2.0)
+    assert used == [expected]
+    evaluate(column, motion, given)  # as given
+    assert used[1] == given
+
+
+def test_by_default_damping_is_that_of_effective_modes(column):
+    model = af.build(column, fidelity="rigid", displacements="large")
+    for kind, name in (("stiffness", "stiffness"), ("mass and stiffness", "rayleigh")):
+        expected = af.effective_damping(model, 0.025, kind=name)
+        assert variations._vary_damping(model, None, kind, 0.5) == expected
+
+
+def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, calls):
+    found = af.verdict_range(column, motion, samples=3)
+    rows = found.dataset.isel(run=np.flatnonzero(~found.dataset["sampled"].values))
+    assert found.properties == tuple(DEFAULT_RANGES)
+    neutral = {**variations.NEUTRAL, "damping_kind": "stiffness"}
+    changed = [
+        {
+            name: rows[name].values[k]
+            for name in DEFAULT_RANGES
+            if rows[name].values[k] != neutral[name]
+        }
+        for k in range(rows.sizes["run"])
+    ]
+    alone = [{name: value} for name, values in DEFAULT_RANGES.items() for value in values]
+    assert changed == [{}, *(each for each in alone if not each.items() <= neutral.items())]
+    assert found.dataset["sampled"].values[-3:].all()
+    assert found.dataset.sizes["run"] == len(changed) + 3 == len(calls)
+    contact = column.joints[0].contact
+    assert found.dataset.attrs["k_n"] == pytest.approx(contact.normal_stiffness)
+
+
+def test_the_sample_is_a_latin_hypercube(column, motion, calls):
+    """Each of as many equal parts of a range as there are samples has one sample."""
+    found = af.verdict_range(column, motion, samples=12, seed=3, vary={"scale": (0.5, 0.9)})
+    rows = found.dataset.isel(run=slice(-12, None))
+    log = np.log(rows["k_n"].values * 3.0) / np.log(9.0)  # evenly in logarithm
+    even = (rows["scale"].values - 0.5) / 0.4
+    shift = (rows["friction"].values + 0.1) / 0.2
+    for share in (log, even, shift):
+        assert sorted(np.floor(12.0 * share)) == list(range(12))
+    for name in ("joint_rule", "sign"):
+        _, counts = np.unique(rows[name].values, return_counts=True)
+        assert set(counts) == {12 // len(DEFAULT_RANGES[name])}
+    again = af.verdict_range(column, motion, samples=12, seed=3, vary={"scale": (0.5, 0.9)})
+    assert again.dataset.identical(found.dataset)
+
+
+def test_a_property_that_is_held_does_not_vary(column, motion, calls):
+    found = af.verdict_range(
+        column, motion, samples=2, vary=HELD | {"sign": ("as given", "reversed")}
+    )
+    assert found.dataset["sign"].values[:2].tolist() == ["as given", "reversed"]
+    assert found.dataset.sizes["run"] == 4
+    for name in set(DEFAULT_RANGES) - {"sign"}:
+        assert set(found.dataset[name].values) == {HELD[name]}
+
+
+def test_other_structures_and_motions_are_varied_by_label(column, motion, calls):
+    thin = af.column(breadth=0.3, heights=[0.8, 0.8], width=1.0)
+    other = motion.scaled(0.5)
+    vary = HELD | {"survey": {"thin": thin}, "record": {"weaker": other}}
+    found = af.verdict_range(column, motion, samples=1, vary=vary)
+    assert found.dataset["survey"].values.tolist() == ["as given", "thin", "as given", "thin"]
+    depths = [call[0].joints[0].depth for call in calls]
+    assert depths == pytest.approx([0.4, 0.3, 0.4, 0.3])
+    assert [np.array_equal(call[1].horizontal, other.horizontal) for call in calls] == [
+        *(False, False, True, True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("vary", "says"),
+    [
+        ({"frction": (0.1, 0.2)}, "'frction' cannot be varied: name one of"),
+        ({"joint_rule": ("exact", "five")}, "give some of"),
+        ({"sign": ()}, "give some of"),
+        ({"k_n": ()}, "give the ends of a range above 0"),
+        ({"k_n": (-1.0, 2.0)}, "give the ends of a range above 0"),
+        ({"scale": "strong"}, "scale"),
+        ({"survey": {"thin": 3}}, "give labels with structures or with motions"),
+    ],
+)
+def test_unknown_names_and_values_are_refused(column, motion, calls, vary, says):
+    with pytest.raises(af.InvalidInput, match=says):
+        af.verdict_range(column, motion, vary=vary)
+    assert not calls
+
+
+def test_other_arguments_are_refused(column, motion):
+    for given in ((1, motion), (column, 2)):
+        with pytest.raises(af.InvalidInput):
+            af.verdict_range(*given)
+    with pytest.raises(af.InvalidInput, match="samples = 0"):
+        af.verdict_range(column, motion, samples=0)
+    with pytest.raises(af.DidNotConverge):
+        af.verdict_range(
+            af.circular_arch(radius=2.95, thickness=0.15, embrace=159.0, voussoirs=7), motion
+        )
+
+
+SMALL = {name: HELD[name] for name in ("k_s", "friction", "damping_ratio", "damping_kind", "dt")}
+
+
+def test_two_workers_give_the_same_bits_as_one(column, motion):
+    alone, shared = (
+        af.verdict_range(column, motion, samples=2, vary=SMALL, workers=workers)
+        for workers in (1, 2)
+    )
+    assert shared.dataset.identical(alone.dataset)
+    assert alone.answered.all()
+
+
+def test_a_run_without_an_equilibrium_has_no_answer(column, motion):
+    """Blocks that slide off each other under their own weight."""
+    sloped = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5)
+    vary = HELD | {"friction": (-0.55, 0.0)}
+    found = af.verdict_range(sloped, motion.scaled(0.1), samples=1, seed=0, vary=vary)
+    slippery = found.dataset["friction"].values < -0.5
+    assert "own weight" in found.dataset["error"].values[slippery][0]
+    assert found.dataset["outcome"].values[slippery][0] == "unknown"
+    assert not found.answered[slippery].any()
+    assert "have no answer" in found.sentence
+
+
+CASE = """
+title = "A column"
+[structure]
+shape = "column"
+breadth = "0.4 m"
+heights = ["0.8 m", "0.8 m"]
+[model]
+fidelity = "rigid"
+displacements = "large"
+[analysis]
+dt = "4 ms"
+damping = { ratio = 0.03, modes = "effective" }
+[motion]
+synthetic = { seed = 1, duration = 1.0, pga = 4.0 }
+[output]
+animation = false
+"""
+
+
+def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
+    path = tmp_path / "column.toml"
+    path.write_text(CASE)
+    case = af.Case.read(path)
+    verdict_range_of_case(case, samples=1)
+    (_, motion, dt, base, _) = calls[0]
+    model = af.build(case.structure, fidelity="rigid")
+    assert base.damping == af.effective_damping(model, 0.03)
+    assert dt == 0.004
+    assert np.array_equal(motion.horizontal, case.ground_motion().horizontal)
+
+
+def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn, calls):
+    path, out = tmp_path / "column.toml", tmp_path / "out"
+    path.write_text(CASE)
+    assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
+    said = capsys.readouterr().out
+    names = {"verdict_range.nc", "verdict_range.txt", "verdict_range.png"}
+    assert names == {each.name for each in out.iterdir()}
+    found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
+    assert str(found) in said
+    assert (out / "verdict_range.txt").read_text().strip() == str(found)
+
+
+def test_a_report_shows_the_range(tmp_path, calls):
+    path, out = tmp_path / "column.toml", tmp_path / "out"
+    path.write_text(CASE)
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
+    words = " ".join(read_page(report(out)).words)
+    assert "Not among the results: the range of the verdict" in words
+    assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
+    words = " ".join(read_page(report(out)).words)
+    assert af.dynamics.VerdictRange.read(out / "verdict_range.nc").sentence in words
+    assert "Residual displacement over each property; falls are above the line." in words
+
+
+def report(folder):
+    return af.cases.open_results(folder).report().read_text(encoding="utf-8")
