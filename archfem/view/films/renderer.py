@@ -195,7 +195,9 @@ class FrameLayout:
 
     def _draw_surroundings(self, setup: Setup, run: History | None, below: float) -> None:
         """Draw title, colour bar and legend, above a height [inch] that the strip takes."""
-        name = run.dataset.attrs["title"] if run else setup.model.structure.name
+        name = setup.model.structure.name
+        if run is not None:
+            name = f"{run.dataset.attrs['title']}: {run.verdict.outcome}"
         top = 1.0 - 0.5 * self.header / self._inches[1]
         self._write(0.02, top, name[:1].upper() + name[1:], fontsize=13.0, ha="left")
         self._state_text = self._write(0.985, top, "", fontsize=13.0, animated=True)
