@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, ClassVar
@@ -26,7 +27,8 @@ from archfem.dynamics.model_selection import DampingChoice, select_model
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, StiffnessDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import Record, time_history
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
+from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
 from archfem.models.builder import build
 from archfem.models.model import Doubt, Model
@@ -381,10 +383,54 @@ def _run_motion(
     except DidNotConverge as error:
         history, failure = partial_history(error), error
     seconds = perf_counter() - start
-    history = history.with_doubts((*at_rest.doubts, *history.doubts))
+    doubts = (*at_rest.doubts, *history.doubts, *doubt_fidelity(at_rest, motion, history))
+    history = history.with_doubts(doubts)
     if path is not None:
         history.save(path)
     return Run(case, motion, history, path, seconds=seconds, error=failure)
+
+
+def doubt_fidelity(
+    at_rest: DeadLoadResult,
+    motion: Motion,
+    history: History,
+    duration: float = 0.5,
+    tolerance: float = 0.03,
+) -> list[Doubt]:
+    """Return a doubt where the next finer fidelity disagrees in |e| at the start of a run.
+
+    A fidelity that was selected by its predicted error is not compared.
+
+    Args:
+        at_rest: dead load of the case.
+        motion: ground motion.
+        history: history of the run.
+        duration: duration of the comparison from the start of the motion [s].
+        tolerance: admissible difference of the largest |e| of any joint [-].
+    """
+    case, fidelity = at_rest.case, at_rest.dead.model.fidelity
+    finer = {"rigid": "faces", "faces": "condensed", "condensed": "full"}.get(fidelity)
+    if finer is None or at_rest.dead.model.prediction is not None or find_spec("dolfinx") is None:
+        return []
+    tables = {**case.settings, "model": {**case.settings.get("model", {}), "fidelity": finer}}
+    start = motion.cut(0.0, min(duration, motion.duration))
+    try:
+        other = Case.of(tables, case.folder)
+        run = run_time_history(other, start, dead_load_of_case(other), at_rest.damping[0])
+    except ArchfemError:  # the finer fidelity may not exist for this case: no comparison
+        return []
+    sizes = []
+    for each in (history, run):
+        joints = assessed_joints(each.joints).sel(time=slice(None, start.duration))
+        sizes.append(abs(joints["eccentricity"]).max("time").values)
+    worst = float(np.nanmax(np.abs(sizes[0] - sizes[1]), initial=0.0))
+    if worst <= tolerance:
+        return []
+    cause = (
+        f"within the first {start.duration:g} s fidelity '{fidelity}' differs from '{finer}' by "
+        f"{worst:.2g} in the largest |e| of a joint"
+    )
+    return [Doubt(cause, f"take fidelity '{finer}', or 'auto', which predicts its error")]
 
 
 def load_finished_run(path: Path, case: Case, motion: Motion) -> History | None:

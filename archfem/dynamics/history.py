@@ -241,6 +241,9 @@ class History(ResultDisplay):
             residual=float(attrs.get("residual", np.nan)),
             mechanisms=mechanisms,
             fall=self.fall,
+            incomplete=""
+            if finished or self.ending.is_complete
+            else self.outcome.partition(":")[0],
             remarks=tuple(remarks),
         )
 

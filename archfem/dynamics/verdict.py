@@ -98,6 +98,7 @@ class Verdict:
             applies, and by the criterion of Demirel and Aldemir; "verified" only where the
             structure is known.
         fall: state of collapse with large displacements, or None.
+        incomplete: how the run was broken off, such as "failed at 1.2 s"; "" otherwise.
         remarks: further sentences on the run: ending, places of the largest values, mechanisms too
             short to count.
     """
@@ -108,6 +109,7 @@ class Verdict:
     residual: float
     mechanisms: Mapping[str, DetectedMechanism | None]
     fall: CollapseState | None = None
+    incomplete: str = ""
     remarks: tuple[str, ...] = ()
 
     @property
@@ -115,7 +117,8 @@ class Verdict:
         """Outcome and number of doubts, in one line."""
         count = len(self.doubts)
         doubt = f"{count} doubt{'s' if count > 1 else ''}" if count else "no doubts"
-        return f"{self._outcome_text}; {doubt}"
+        broken_off = f", but the run {self.incomplete}" if self.incomplete else ""
+        return f"{self._outcome_text}{broken_off}; {doubt}"
 
     @property
     def _outcome_text(self) -> str:

@@ -140,3 +140,27 @@ def test_warnings_name_case_and_motion(caplog):
         "study, pair 3: energy drifts by 3 %",
         "on its own, 100% as it is",
     ]
+
+
+def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
+    """Stones hardly stiffer than their joints: rigid ones err from the dead load on."""
+    ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}
+    ring |= {"voussoirs": 7, "material": "stone"}
+    motion = {"synthetic": {"duration": 1.0, "pga": 0.5, "seed": 1}}
+
+    def doubts(young):
+        case = af.Case.of(
+            {
+                "structure": ring,
+                "materials": {"stone": {"young": young}},
+                "model": {"fidelity": "rigid"},
+                "motion": motion,
+                "analysis": {"dt": 0.005},
+            }
+        )
+        *_, run = af.cases.run_case(case)
+        return [doubt for doubt in run.history.doubts if "differs from 'faces'" in doubt.cause]
+
+    assert not doubts("10 GPa")
+    (doubt,) = doubts("0.5 GPa")
+    assert "take fidelity 'faces', or 'auto'" in doubt.remedy

@@ -123,6 +123,25 @@ def test_the_total_time_with_enough_failures_is_stated(run):
     assert f"{words}{5 * max(lengths):.3g} ms at the longest" in str(run.verdict)
 
 
+def test_a_run_that_was_broken_off_says_so_first(model, motion):
+    """After a failed step the state of collapse is unknown; what was found until then remains."""
+
+    class Failing(af.dynamics.Stepper):
+        def batches(self, start, dt, end):
+            for number, batch in enumerate(super().batches(start, dt, end)):
+                if number == 1:
+                    raise af.DidNotConverge("no equilibrium")
+                yield batch
+
+    equation = af.dynamics.Equation(model, motion, af.StiffnessDamping(0.05, 8.0))
+    failing = Failing(equation, exact=af.dynamics.SnesSolver(equation))
+    with pytest.raises(af.DidNotConverge) as caught:
+        af.time_history(model, motion, dt=0.005, method=failing)
+    run = caught.value.history
+    assert run.verdict.incomplete == f"failed at {run.time[-1]:.4g} s"
+    assert run.verdict.headline.startswith(f"no mechanism, but the run {run.verdict.incomplete}; ")
+
+
 def test_a_calm_run_says_so(model, motion):
     damping = af.Rayleigh(0.05, (8.0, 16.0))
     calm = af.time_history(model, motion.scaled(0.1), dt=0.005, damping=damping).verdict
