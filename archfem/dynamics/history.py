@@ -234,6 +234,7 @@ class History(ResultDisplay):
         remarks += brief_mechanism_remarks(joints, self.structure, mechanisms)
         if mechanisms["any joints at once"] is not None:
             remarks.append(total_duration_remark(joints))
+        broken_off = not (finished or self.ending.is_complete)
         return Verdict(
             outcome=outcome,
             doubts=self.doubts,
@@ -241,9 +242,7 @@ class History(ResultDisplay):
             residual=float(attrs.get("residual", np.nan)),
             mechanisms=mechanisms,
             fall=self.fall,
-            incomplete=""
-            if finished or self.ending.is_complete
-            else self.outcome.partition(":")[0],
+            incomplete=self.outcome.partition(":")[0] if broken_off else "",
             remarks=tuple(remarks),
         )
 
