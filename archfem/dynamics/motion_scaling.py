@@ -70,15 +70,25 @@ class ScaledRun:
         """Whether blocks of the structure have fallen."""
         return self.fall is not None and self.fall.kind in FALLEN_STATES
 
-    def fails(self, definition: str) -> bool:
-        """Return whether the limit state was met, or a step had no equilibrium."""
+    def has_answer(self, definition: str) -> bool:
+        """Return whether the run decides on a limit state.
+
+        Without a state of collapse it does not decide on a fall. A step of small displacements
+        without equilibrium counts as a mechanism.
+        """
         if definition == COLLAPSE_DEFINITION:
-            return self.has_fallen or self.has_failed
+            return self.fall is not None and not self.is_interrupted
+        return self.fails(definition) or not self.is_interrupted
+
+    def fails(self, definition: str) -> bool:
+        """Return whether the limit state was met."""
+        if definition == COLLAPSE_DEFINITION:
+            return self.has_fallen
         return self.mechanisms[definition] is not None or self.has_failed
 
     def survives(self, definition: str) -> bool:
         """Return whether the whole motion passed without the limit state."""
-        return not self.fails(definition) and not self.is_interrupted
+        return self.has_answer(definition) and not self.fails(definition)
 
 
 @dataclass(frozen=True)
@@ -92,6 +102,7 @@ class Bracket:
     upper: float  # smallest failing scale [-]; infinite for none
     run: ScaledRun | None  # that at `upper`, or None
     above: tuple[float, ...]  # surviving scales beyond `upper`
+    unanswered: tuple[float, ...] = ()  # scales of runs that do not decide on it
 
     @property
     def ratio(self) -> float:
@@ -124,6 +135,7 @@ class MechanismScales:
             upper,
             failing[0] if failing else None,
             tuple(scale for scale in surviving if scale > upper),
+            tuple(run.scale for run in self.runs if not run.has_answer(definition)),
         )
 
     def table(self) -> str:
@@ -278,15 +290,21 @@ def _next_scale(
     wide = [bracket for bracket in brackets if 1.0 + precision < bracket.ratio < inf]
     if not wide:
         return None
-    widest = max(wide, key=lambda bracket: bracket.ratio)
-    return sqrt(widest.lower * widest.upper)
+    for bracket in sorted(wide, key=lambda bracket: -bracket.ratio):
+        # a scale without an answer divides no bracket: its neighbours are tried instead
+        for share in (1.0 / 2.0, 1.0 / 3.0, 2.0 / 3.0):
+            scale = bracket.lower * bracket.ratio**share
+            if all(abs(scale / other - 1.0) > 1e-6 for other in bracket.unanswered):
+                return float(scale)
+    return None
 
 
 @dataclass(frozen=True)
 class CollapseScale:
     """Scales between which a structure falls, by several time steps.
 
-    A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". The response
+    A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
+    broken off counts neither as a fall nor as standing, and no bracket rests on it. The response
     need not be monotonic: it may survive a motion stronger than one that brought it down.
 
     Attributes:
@@ -320,6 +338,11 @@ class CollapseScale:
     def above(self) -> tuple[float, ...]:
         """Scales at which it stood although it fell at a smaller one [-]."""
         return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).above}))
+
+    @property
+    def unanswered(self) -> tuple[float, ...]:
+        """Scales of runs that were broken off before a state of collapse was known [-]."""
+        return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).unanswered}))
 
     def falls(self, dt: float) -> tuple[tuple[float, CollapseState | None], ...]:
         """Return the scale and the state of collapse of each run by one time step.
@@ -357,7 +380,7 @@ class CollapseScale:
             [
                 f"{1e3 * dt:g} ms",
                 f"{scale:.3g}",
-                fall.kind if fall else "-",
+                fall.kind if fall else "no answer",
                 f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
                 f"{fall.residual:.3g} m" if fall else "-",
             ]

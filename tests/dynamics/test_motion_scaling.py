@@ -241,6 +241,28 @@ def test_collapse_is_between_what_stands_and_what_falls_by_every_step():
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
 
 
+def test_no_bracket_rests_on_a_run_without_an_answer():
+    """Stands up to 1.2, falls from 1.9 on, and is broken off between 1.35 and 1.5."""
+
+    def shaken(scale):
+        if 1.35 < scale < 1.5:
+            return ScaledRun(scale, {}, Ending.PARTED, "blocks came loose")
+        kind = "fallen" if scale > 1.9 else "stands"
+        state = af.dynamics.CollapseState(kind, None, (), 0.1, 0.1, True)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", state)
+
+    found = search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 4.0))
+    bracket = found[COLLAPSE_DEFINITION]
+    assert bracket.lower < 1.9 < bracket.upper <= 1.05 * ROUND_OFF * bracket.lower
+    assert bracket.unanswered == (pytest.approx(np.sqrt(2.0)),)
+    scales = CollapseScale({0.005: found})
+    assert scales.unanswered == bracket.unanswered
+    assert "no answer" in scales.table()
+    (run,) = [run for run in found.runs if run.fall is None]
+    assert not run.survives(COLLAPSE_DEFINITION)
+    assert not run.fails(COLLAPSE_DEFINITION)
+
+
 @pytest.mark.parametrize(
     ("between", "limits"),
     [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],
