@@ -55,7 +55,7 @@ motions = {
 alone = af.Case.of({**case.settings, "motion": motions["motion 1"]})
 run = af.cases.run_time_history(alone, alone.ground_motion(), af.cases.dead_load_of_case(alone))
 found = af.studies.of_history(run)
-f"|e| up to {found['eccentricity']:.3f}; four joints failed at {found['any four joints']:.2f} s"
+f"|e| up to {found['eccentricity']:.3f}; four joints failed at {found['any joints at once']:.2f} s"
 
 # %% [markdown]
 # ## The equation

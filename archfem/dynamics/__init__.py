@@ -12,11 +12,12 @@
     motion_scaling    scale of a motion at first mechanism or collapse
     recorder          recording of a run
     rigid_body        free rigid blocks with impacts and friction
-    verdict           outcome, doubts, displacements and mechanisms of a run
     schemes           time integration schemes, Rayleigh and stiffness damping
     solvers           solvers of a time step: newton, compliance, snes
     state             State, Step, Batch
     time_history      time_history, Record, last_state
+    verdict           outcome, doubts, displacements and mechanisms of a run
+    verdict_range     range of a verdict, and the properties that decide it
     warm_up           compilation of all kernels ahead of time
 
 Imports `motion`, `statics` and the rooms before them. Start reading at `time_history`.

@@ -1,4 +1,4 @@
-"""Range of a verdict: runs over properties that nobody knows exactly, and which of them decide."""
+"""Range of a verdict: runs over uncertain properties, and which of them decide."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

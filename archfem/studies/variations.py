@@ -1,4 +1,4 @@
-"""Variations of a run: the same motion over properties that nobody knows exactly.
+"""Variations of a run: the same motion over uncertain properties.
 
 Joint rule, stiffness, friction, damping, sign of the motion and time step are varied one at a time
 and all together, by a Latin hypercube. The result is the share of runs in which the structure
@@ -97,7 +97,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     seed: int = 0,
     workers: int = 1,
 ) -> VerdictRange:
-    """Run a motion with large displacements over the properties that nobody knows exactly.
+    """Run a motion with large displacements over uncertain properties.
 
     The run as given comes first, then each property at each of its values alone, then a Latin
     hypercube over all (McKay, Beckman and Conover, 1979). By default these are varied:
@@ -159,7 +159,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over the properties that nobody knows exactly, with rigid blocks.
+    """Run a case over uncertain properties, with rigid blocks.
 
     Args:
         case: case with one motion; its structure, motion, damping and time step are as given.
