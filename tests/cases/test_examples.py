@@ -52,6 +52,7 @@ def test_the_shipped_ring_stands_without_doubt_and_slides():
 
 def test_the_ring_of_the_paper_has_its_geometry_and_rayleigh_damping():
     case = af.Case.read(list_examples()["ring_paper"])
-    assert case.structure == af.Case.read(list_examples()["ring"]).structure
+    ring = af.Case.read(list_examples()["ring"]).structure
+    assert (case.structure.blocks, case.structure.joints) == (ring.blocks, ring.joints)
     assert case.damping == af.Rayleigh(0.05, (8.0, 16.0))
     assert (case.model["fidelity"], case.discretisation.displacements) == ("full", "small")
