@@ -11,13 +11,8 @@ import pytest
 
 SCRIPTS = Path(__file__).parent / "benchmarks"
 
-# Scripts that still use names of an earlier layout.
-OUTDATED = {"drift_and_equality"}
-
 NAMES = sorted(
-    path.stem
-    for path in SCRIPTS.glob("*.py")
-    if "def main(arguments" in path.read_text("utf-8") and path.stem not in OUTDATED
+    path.stem for path in SCRIPTS.glob("*.py") if "def main(arguments" in path.read_text("utf-8")
 )
 """Scripts with a command line of their own."""
 

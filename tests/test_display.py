@@ -26,10 +26,11 @@ def things():
         af.collapse_factor(stones, live=af.BodyForce(1.0)),
         af.modes(model, 2),
         motion,
+        af.verdict_range(stones, motion, samples=2, vary={"joint_rule": "exact"}),
     ]
 
 
-def test_there_are_seven_kinds(things):
+def test_there_are_eight_kinds(things):
     assert {type(each) for each in things} == set(ResultDisplay.__subclasses__())
 
 

@@ -1,6 +1,7 @@
 """Results as text: sentences, and tables which the command line prints and the report shows."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -112,6 +113,17 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
     ]
     rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])
     return ResultTable([*RUN_COLUMNS, *definitions, "end"], rows)
+
+
+def describe_verdicts(runs: Iterable[History]) -> str:
+    """Describe the verdict of a run, or how many of several runs have each outcome, in one line."""
+    verdicts = [run.verdict for run in runs]
+    if len(verdicts) == 1:
+        return verdicts[0].headline
+    outcomes = Counter(verdict.outcome for verdict in verdicts)
+    text = ", ".join(f"{outcome} in {count}" for outcome, count in outcomes.items())
+    doubtful = sum(bool(verdict.doubts) for verdict in verdicts)
+    return f"{text} of {len(verdicts)} runs; doubts in {doubtful or 'none'}"
 
 
 def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:

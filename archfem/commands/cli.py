@@ -145,7 +145,7 @@ def _add_case_commands(commands: Any) -> None:
     modes = add("modes", "frequencies, masses and shapes of vibrations about dead load")
     modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
     add("mesh", "write the mesh of a case as a gmsh file", "FILE.msh")
-    verdict = add("verdict", "does it fall, over uncertain properties?", None)
+    verdict = add("verdict", "does it fall, whatever its uncertain properties are?", None)
     verdict.add_argument("--out", metavar="DIR", help="folder for table and picture (none)")
     verdict.add_argument("--workers", type=int, default=1, help="processes for the runs (1)")
     verdict.add_argument("--samples", type=int, default=26, help="runs of the sample (26)")

@@ -1,8 +1,10 @@
 """Commands on cases: run, check, modes, mesh, accuracy and report; motion and compile."""
 
 import argparse
+import io
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import redirect_stdout
 from pathlib import Path
 
 from archfem._files import create_result_folder
@@ -12,6 +14,7 @@ from archfem.cases.result_text import (
     describe_collapse,
     describe_dead_load,
     describe_run,
+    describe_verdicts,
     tabulate_matches,
     tabulate_motions,
     tabulate_runs,
@@ -32,13 +35,20 @@ def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     (folder / "case.toml").write_text(case.text(), encoding="utf-8")
-    print(case.title)
     if options.workers > 1 and case.suite is not None:
         from archfem.studies.comparison_run import run_pairs
 
         # Workers save the histories, which `run_case` reuses below.
         run_pairs(case, folder, workers=options.workers)
-    return EXIT_DOUBTFUL if print_results(case, run_case(case, folder), folder) else 0
+    headline, output = "", io.StringIO()
+    try:
+        # All else is printed after the verdict, which is known last.
+        with redirect_stdout(output):
+            headline, doubtful = print_results(case, run_case(case, folder), folder)
+    finally:
+        print(f"{case.title}: {headline}" if headline else case.title)
+        print(output.getvalue(), end="")
+    return EXIT_DOUBTFUL if doubtful else 0
 
 
 def check(options: argparse.Namespace) -> int:
@@ -157,8 +167,8 @@ def compile_steps(options: argparse.Namespace) -> None:
         print(f"{seconds:5.0f} s: {kind}", flush=True)
 
 
-def print_results(case: Case, results: Iterable[Result], folder: Path) -> bool:
-    """Print results as they are computed, write their files, and return whether any is in doubt."""
+def print_results(case: Case, results: Iterable[Result], folder: Path) -> tuple[str, bool]:
+    """Print results, write their files, and return the verdict and whether any is in doubt."""
     from archfem.cases.result_folder import write_dead_load, write_limit, write_suite
 
     # `run_case` yields limit analysis, dead load, suite and runs in this order.
@@ -179,11 +189,13 @@ def print_results(case: Case, results: Iterable[Result], folder: Path) -> bool:
             print_motions(suite)
             print_written(write_suite(suite, case.target, folder))
         else:
+            print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
             _print_run(result, at_rest)
             runs[result.motion.name] = result.history
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
-    return bool(at_rest.doubts) or any(run.doubts for run in runs.values())
+    verdict = describe_verdicts(runs.values()) if runs else ""
+    return verdict, bool(at_rest.doubts) or any(run.doubts for run in runs.values())
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:

@@ -17,7 +17,7 @@
     state             State, Step, Batch
     time_history      time_history, Record, last_state
     verdict           outcome, doubts, displacements and mechanisms of a run
-    verdict_range     range of a verdict, and the properties that decide it
+    verdict_range     verdicts over uncertain properties
     warm_up           compilation of all kernels ahead of time
 
 Imports `motion`, `statics` and the rooms before them. Start reading at `time_history`.

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
@@ -28,9 +29,11 @@ from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
+from archfem.masonry.structure import Structure
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
@@ -328,6 +331,25 @@ class CollapseScale:
             Pairs in order of the scales; the state is None where the run was broken off.
         """
         return tuple((run.scale, run.fall) for run in self.searches[dt].runs)
+
+    def verdict_range(self, structure: Structure, motion: Motion, **options: Any) -> VerdictRange:
+        """Run over uncertain properties, and over the scales of the bracket.
+
+        Args:
+            structure: structure that was shaken.
+            motion: unscaled motion.
+            options: as for `archfem.verdict_range`; `vary` may override the range of "scale",
+                which is from `lower` to `upper`, or to twice `lower` where it never fell.
+
+        Returns:
+            All runs; those of single changes are at the lower scale.
+
+        Raises:
+            InvalidInput: it fell at the smallest scale that was tried; or as `verdict_range`.
+        """
+        name = "CollapseScale.verdict_range"
+        result: VerdictRange = call_late_bound(name, self, structure, motion, **options)
+        return result
 
     def table(self) -> str:
         """Return a line per run: step, scale, state of collapse, time and residual displacement."""

@@ -1,4 +1,4 @@
-"""Range of a verdict: runs over uncertain properties, and which of them decide."""
+"""Range of a verdict over uncertain properties: share of falls, and the decisive properties."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,6 +1,5 @@
 """Ground motions: records, synthetic motions, spectra, spectral matching and suites.
 
-    averages            ground motion averaged over time steps
     design_spectra      design spectra of codes
     intensity_measures  PGA, Arias, CAV, duration
     matching            spectral matching by wavelets

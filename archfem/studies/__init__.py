@@ -14,7 +14,7 @@
     process_pool     workers on this machine
     result_store     rows on disk, progress, dataset
     study            Study
-    variations       verdict_range: a run over uncertain properties
+    variations       verdict_range: runs over uncertain properties
 
 Imports all rooms before it. Start reading at `study`.
 """

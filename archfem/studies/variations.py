@@ -1,4 +1,4 @@
-"""Variations of a run: the same motion over uncertain properties.
+"""Variations of a run: the same motion over uncertain properties of structure and model.
 
 Joint rule, stiffness, friction, damping, sign of the motion and time step are varied one at a time
 and all together, by a Latin hypercube. The result is the share of runs in which the structure
@@ -7,6 +7,7 @@ falls, and the properties that decide it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from archfem.cases.run import expected_damping
 from archfem.dynamics.damping import effective_damping
 from archfem.dynamics.fall import CollapseState, classify_collapse
 from archfem.dynamics.model_selection import build
+from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
 from archfem.dynamics.schemes import Rayleigh, StiffnessDamping, Viscous
@@ -97,7 +99,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     seed: int = 0,
     workers: int = 1,
 ) -> VerdictRange:
-    """Run a motion with large displacements over uncertain properties.
+    """Run a motion with large displacements over its uncertain properties.
 
     The run as given comes first, then each property at each of its values alone, then a Latin
     hypercube over all (McKay, Beckman and Conover, 1979). By default these are varied:
@@ -159,7 +161,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
-    """Run a case over uncertain properties, with rigid blocks.
+    """Run a case over its uncertain properties, with rigid blocks.
 
     Args:
         case: case with one motion; its structure, motion, damping and time step are as given.
@@ -177,6 +179,20 @@ def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
         damping = damping(build(case.structure, fidelity="rigid"))
     options = {"damping": damping, "dt": case.analysis["dt"] or 0.005, **options}
     return verdict_range(case.structure, motion, **options)
+
+
+def verdict_range_of_bracket(
+    bracket: CollapseScale, structure: Structure, motion: Motion, **options: Any
+) -> VerdictRange:
+    """Run over its uncertain properties, and over the scales of a bracket."""
+    if bracket.lower == 0.0:
+        raise InvalidInput(
+            "it fell at the smallest scale that was tried, so that no scale is known to stand: "
+            "search from a smaller one, between=(…, …)"
+        )
+    ratio = bracket.upper / bracket.lower if bracket.upper < inf else 2.0
+    vary = {"scale": (1.0, ratio), **options.pop("vary", {})}
+    return verdict_range(structure, motion.scaled(bracket.lower), vary=vary, **options)
 
 
 def _check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,6 @@
     structure    structures, joint names, loads, displaced shapes
     studies      studies, IDA, fragility, sensitivity, convergence, accuracy
     style        common style of all figures
-    triangles    triangulation of cells
 
 Imports all rooms before it. Start reading at `structure`, then at `style`.
 """

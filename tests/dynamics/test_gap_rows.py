@@ -2,16 +2,19 @@
 
 import numpy as np
 import pytest
+from kernels import from_python
 
 import archfem as af
+from archfem.dynamics.solvers import joint_law as law_kernels
 from archfem.dynamics.solvers.joint_law import (
-    collect_released,
-    evaluate_openings,
     gap_rows,
     joint_law,
-    open_forces,
 )
 from archfem.dynamics.solvers.newmark import step_numbers
+
+collect_released = from_python(law_kernels.collect_released)
+evaluate_openings = from_python(law_kernels.evaluate_openings)
+open_forces = from_python(law_kernels.open_forces)
 
 CELLS = 4
 

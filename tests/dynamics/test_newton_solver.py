@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from glued import glued
+from kernels import from_python
 from scipy import sparse
 
 import archfem as af
+from archfem.dynamics.solvers import band_lu
 from archfem.dynamics.solvers.band_lu import (
     band_of,
-    factorise_band,
     half_width,
     narrow_order,
-    solve_band,
 )
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
@@ -90,6 +90,10 @@ def test_supports_that_have_moved_are_refused_by_schemes_at_an_instant(ring):
         with pytest.raises(af.InvalidInput, match="supports have not moved"):
             stepper_for(method, equation)
         assert stepper_for(method, af.dynamics.Equation(moved, MOTION)).name == method
+
+
+factorise_band = from_python(band_lu.factorise_band)
+solve_band = from_python(band_lu.solve_band)
 
 
 def banded(rng, size, half):

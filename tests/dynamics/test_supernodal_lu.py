@@ -4,10 +4,12 @@ import logging
 
 import numpy as np
 import pytest
+from kernels import from_python
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import archfem as af
+from archfem.dynamics.solvers import supernodal_lu
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.solvers.supernodal_lu import (
@@ -15,7 +17,6 @@ from archfem.dynamics.solvers.supernodal_lu import (
     eliminate,
     panel_places,
     panels_of,
-    solve_panels,
 )
 
 SIDE = 9
@@ -38,6 +39,9 @@ def grid():
     entries = matrix.tocoo()
     own = touched[entries.row] & touched[entries.col]
     return matrix, elimination, np.stack([entries.row[own], entries.col[own]]).astype(np.int64)
+
+
+solve_panels = from_python(supernodal_lu.solve_panels)
 
 
 def factorise(panels, places, added):

@@ -2,14 +2,10 @@
 
 import numpy as np
 import pytest
+from kernels import from_python
 
 from archfem.joints.large import face_kinematics
-from archfem.joints.large.face_kinematics import (
-    FaceKinematics,
-    face_pose,
-    gather_face_forces,
-    step_poses,
-)
+from archfem.joints.large.face_kinematics import FaceKinematics
 from archfem.joints.large.forces import (
     LargeDisplacementJoints,
     allocate_step_forces,
@@ -18,6 +14,15 @@ from archfem.joints.large.forces import (
 )
 from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
+
+joint_measures = from_python(face_kinematics.joint_measures)
+step_measures = from_python(face_kinematics.step_measures)
+face_forces = from_python(face_kinematics.face_forces)
+rotation_series = from_python(face_kinematics.rotation_series)
+cosine_sine = from_python(face_kinematics.cosine_sine)
+face_pose = from_python(face_kinematics.face_pose)
+gather_face_forces = from_python(face_kinematics.gather_face_forces)
+step_poses = from_python(face_kinematics.step_poses)
 
 SEEDS = range(12)
 
@@ -32,7 +37,7 @@ def random_poses(seed):
 
 
 def measured(poses, angle):
-    return np.array(face_kinematics.joint_measures(tuple(poses[0]), tuple(poses[1]), angle))
+    return np.array(joint_measures(tuple(poses[0]), tuple(poses[1]), angle))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -40,24 +45,22 @@ def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
     before, after, angle = random_poses(seed)
     lower, higher = (tuple(map(tuple, each)) for each in np.stack([before, after], axis=1))
-    start, end, rates, *_ = face_kinematics.step_measures(lower, higher, angle)
+    start, end, rates, *_ = step_measures(lower, higher, angle)
     for found, poses in ((start, before), (end, after)):
         assert found == pytest.approx(measured(poses, angle), abs=2e-15)
     low, high = after - before
     moved = np.array([*(high - low)[:2], low[2], high[2]])
     for row, change in zip(np.eye(3), np.subtract(end, start), strict=True):
-        assert abs(face_kinematics.face_forces(rates, tuple(row)) @ moved - change) < 4e-15
+        assert abs(face_forces(rates, tuple(row)) @ moved - change) < 4e-15
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
 def test_small_turns(x):
     """Against NumPy, and the derivative of sin x / x against differences of it."""
-    assert face_kinematics.rotation_series(x)[:2] == pytest.approx(
-        (np.cos(x), np.sinc(x / np.pi)), abs=2e-16
-    )
-    assert face_kinematics.cosine_sine(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
-    there, back = (face_kinematics.rotation_series(x + d)[1] for d in (1e-4, -1e-4))
-    assert face_kinematics.rotation_series(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
+    assert rotation_series(x)[:2] == pytest.approx((np.cos(x), np.sinc(x / np.pi)), abs=2e-16)
+    assert cosine_sine(x) == pytest.approx((np.cos(x), np.sin(x)), abs=2e-16)
+    there, back = (rotation_series(x + d)[1] for d in (1e-4, -1e-4))
+    assert rotation_series(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
 
 
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():

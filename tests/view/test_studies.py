@@ -45,5 +45,5 @@ def test_definitions_by_which_nothing_fails_have_no_sign():
     }
     page = draw_study(many, title="a $ study")
     told = [text.get_text() for text in page.legends[0].get_texts()]
-    assert told == ["any four joints fail", "median, and range of the pairs"]
+    assert told == ["enough joints fail at once", "median, and range of the pairs"]
     assert "first mechanism" in page.legends[0].get_title().get_text()

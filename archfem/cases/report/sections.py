@@ -12,6 +12,7 @@ from archfem.cases.report.report_data import ReportData, build_player, missing_n
 from archfem.cases.result_text import (
     RUN_COLUMNS,
     ResultTable,
+    describe_verdicts,
     format_ratio,
     tabulate_joints,
     tabulate_motions,
@@ -433,13 +434,9 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 def _verdict_facts(runs: Sequence[History]) -> list[tuple[str, str]]:
     """Return outcome and doubts of a run, or how many of several runs have each."""
     verdicts = [run.verdict for run in runs]
+    facts = [("verdict", describe_verdicts(runs))]
     if len(verdicts) == 1:
-        (verdict,) = verdicts
-        doubts = [("in doubt", str(doubt)) for doubt in verdict.doubts]
-        return [("verdict", verdict.headline), *doubts]
-    outcomes = Counter(verdict.outcome for verdict in verdicts)
-    counts = ", ".join(f"{word} in {count}" for word, count in outcomes.items())
-    facts = [("verdict", f"{counts} of {len(verdicts)} runs")]
+        return [*facts, *(("in doubt", str(doubt)) for doubt in verdicts[0].doubts)]
     reasons = Counter(str(doubt) for verdict in verdicts for doubt in verdict.doubts)
     facts += [
         ("in doubt", f"{count} of {len(verdicts)} runs: {text}") for text, count in reasons.items()

@@ -17,7 +17,7 @@ and SNES takes the steps at which they fail.
     band_lu            its factor where the tangent is a narrow band
     compliance         solver "compliance": one sparse factor, and unknowns in active joint rows
     active_rows        their dense problem
-    active_compliance  its matrix and workspace
+    active_compliance  its compliance and workspace
     supernodal_lu      sparse factors in dense panels
     sparse_products    products of sparse matrices
 """

@@ -19,37 +19,15 @@ import numpy as np
 
 from archfem._numba import kernel, summing_kernel
 from archfem.dynamics.solvers.active_compliance import (
-    BEFORE,
-    CHANGE,
-    COLUMN,
-    COLUMN_ROW,
-    FORCE,
-    FREE,
-    GUESS,
-    MARK,
     MAX_KRYLOV_VECTORS,
-    NEAR,
-    NUMBER,
-    PIVOT,
-    PLACE,
-    RELEASED,
-    RESIDUAL,
-    ROW_COLUMN,
-    TRIAL,
     add_columns,
     add_gaps,
-    begin_problem,
-    clear_problem,
-    line,
-    padded,
-    padded_square,
-    products,
-    square,
+    multiply_rows,
+    row_room,
+    rows_of,
     update_columns,
 )
-from archfem.dynamics.solvers.joint_law import GUESS as Z_GUESS
 from archfem.dynamics.solvers.joint_law import (
-    START,
     collect_derivatives,
     collect_released,
     evaluate_openings,
@@ -57,17 +35,16 @@ from archfem.dynamics.solvers.joint_law import (
     largest_force,
     predict_gaps,
 )
-from archfem.dynamics.solvers.linear_step import LAMBDA, SPARE, Z_BEFORE, Z
 
-# Rows up to which a problem is solved by its factor
+# Equations up to which a problem is solved by its factor
 MAX_DIRECT_ROWS = 100
 
 
 @kernel
-def predict_active_rows(law, compliance, values):  # type: ignore
+def predict_active_rows(law, active, work):  # type: ignore
     """Mark in `near` the rows that are active, or soon will be at the rates of the gaps."""
-    near, marks, openings = compliance.flags[NEAR], compliance.flags[MARK], law.openings
-    gap, before, force, ahead = values[Z], values[Z_BEFORE], values[LAMBDA], values[SPARE]
+    near, marks, openings = active.near, active.marks, law.openings
+    gap, before, force, ahead = work.gap, work.gap_before, work.force, work.spare
     predict_gaps(law, gap, before)
     for row in range(len(gap)):
         near[row] = force[row] != 0.0
@@ -75,14 +52,14 @@ def predict_active_rows(law, compliance, values):  # type: ignore
         opens = row < openings and gap[row] + 2.0 * (gap[row] - before[row]) > 0.0
         marks[row] = near[row] or opens
         # the end of the path on which the law sees the gaps
-        base = law.rows[START, row] if law.gain > 0.0 else gap[row]
-        ahead[row] = base + 2.0 * (law.rows[Z_GUESS, row] - base)
+        base = law.start[row] if law.gain > 0.0 else gap[row]
+        ahead[row] = base + 2.0 * (law.guess[row] - base)
     for segment in law.segments:
         if marks[segment.near] or marks[segment.far]:
             near[segment.near] = near[segment.far] = True
     for row in range(len(gap)):
         marks[row] = False
-    _add_active(law, compliance, ahead, near, True)
+    _add_active(law, active, ahead, near, True)
     _add_slips_near_limit(law, near)
     _add_pressing(law, near)
 
@@ -111,29 +88,29 @@ def _add_pressing(law, near):  # type: ignore
 
 
 @kernel
-def check_active_rows(law, compliance, gap, near):  # type: ignore
+def check_active_rows(law, active, gap, near):  # type: ignore
     """Return whether λ fits the gaps of the whole structure; adds rows that are active, too.
 
     λ of the rows fits the guess of their gaps: so these need only be equal, to ten times the
     tolerance of the iterations, as rounding of the whole structure adds to theirs.
     """
-    guess, error = law.rows[Z_GUESS], 0.0
+    guess, error = law.guess, 0.0
     for row in range(len(gap)):
         if near[row]:
             error = max(error, law.stiffness[row] * abs(gap[row] - guess[row]))
         guess[row] = gap[row]
     everywhere = error > 1e-11 * largest_force(law, gap)
-    return _add_active(law, compliance, gap, near, everywhere) and not everywhere
+    return _add_active(law, active, gap, near, everywhere) and not everywhere
 
 
 @kernel
-def _add_active(law, compliance, gap, near, everywhere):  # type: ignore
+def _add_active(law, active, gap, near, everywhere):  # type: ignore
     """Add rows that are active at some gaps; returns whether there are none.
 
     Evaluates all rows, or only those that are not near.
     """
     openings, more, count, slip_count = law.openings, False, 0, 0
-    segments, slips = compliance.segments, compliance.slips
+    segments, slips = active.segments, active.slips
     for number in range(len(law.segments)):
         segment = law.segments[number]
         if everywhere or not (near[segment.near] and near[segment.far]):
@@ -159,135 +136,107 @@ def _add_active(law, compliance, gap, near, everywhere):  # type: ignore
 
 
 @kernel
-def subtract_released(compliance, rows, force, gap):  # type: ignore
-    """Subtract from gaps of some rows what released forces contribute, z̄ = z - F λ."""
-    begin_problem(compliance, rows)
-    own, released, moved = (
-        compliance.indices[NUMBER],
-        compliance.vectors[FORCE],
-        compliance.vectors[FREE],
-    )
-    for k in range(len(rows)):
-        released[k], moved[k] = force[own[k]], 0.0
-    add_columns(compliance, released[: len(rows)], compliance.derivatives[0], 0)
-    add_gaps(compliance, released, moved[: len(rows)])
-    for k in range(len(rows)):
-        gap[own[k]] -= moved[k]
+def subtract_released(active, force, gap):  # type: ignore
+    """Subtract from gaps of the rows what released forces contribute, z̄ = z - F λ."""
+    for k in range(active.sizes[0]):
+        active.force[k], active.gap[k] = force[active.numbers[k]], 0.0
+    add_columns(active, active.force, 0)
+    add_gaps(active, active.force, active.gap)
+    for k in range(active.sizes[0]):
+        gap[active.numbers[k]] -= active.gap[k]
 
 
 @kernel
-def solve_active_rows(law, start, rows, compliance, force, tolerance):  # type: ignore
-    """Solve for λ of some rows from the guess of their gaps."""
-    some = False
-    for row in range(len(force)):
-        some = some or force[row] != 0.0
-    if not some:  # so that histories do not depend on what was solved before
-        clear_problem(compliance)
-    begin_problem(compliance, rows)
-    count, vectors, own, iterations = len(rows), compliance.vectors, compliance.indices[NUMBER], -1
-    inside, slip_count = _select_joints(law, compliance, count)
-    selection = (
-        compliance.indices[PLACE],
-        compliance.segments[:inside],
-        compliance.slips[:slip_count],
-    )
+def solve_active_rows(law, start, active, force, tolerance):  # type: ignore
+    """Solve for λ of the rows from the guess of their gaps; returns iterations, or -1."""
+    count, own, iterations = active.sizes[0], active.numbers, -1
+    inside, slip_count = _select_joints(law, active)
+    selection = active.place, active.segments[:inside], active.slips[:slip_count]
     for full_steps in (4, 1):
         for k in range(count):
             # a second try restarts from the guess, with a line search from its begin
             if full_steps > 1:
-                vectors[GUESS][k] = law.rows[Z_GUESS, own[k]]
-            law.rows[Z_GUESS, own[k]] = vectors[GUESS][k]
-            vectors[FORCE][k], vectors[FREE][k] = force[own[k]], start[own[k]]
-        iterations = _iterate(law, compliance, selection, tolerance, full_steps)
+                active.guess[k] = law.guess[own[k]]
+            law.guess[own[k]] = active.guess[k]
+            active.force[k], active.free[k] = force[own[k]], start[own[k]]
+        iterations = _iterate(law, active, selection, tolerance, full_steps)
         if iterations > 0:
             break
     for k in range(count):
-        force[own[k]] = vectors[FORCE][k]
+        force[own[k]] = active.force[k]
     return iterations
 
 
 @kernel
-def _select_joints(law, compliance, count):  # type: ignore
+def _select_joints(law, active):  # type: ignore
     """List the segments and the slip rows of a problem; returns how many there are of each."""
-    place, segments, slips = compliance.indices[PLACE], compliance.segments, compliance.slips
-    inside, slip_count = 0, 0
+    place, inside, slip_count = active.place, 0, 0
     for number in range(len(law.segments)):
         if place[law.segments[number].near] >= 0 and place[law.segments[number].far] >= 0:
-            segments[inside] = number
+            active.segments[inside] = number
             inside += 1
-    for k in range(count):
-        if compliance.indices[NUMBER, k] >= law.openings:
-            slips[slip_count] = compliance.indices[NUMBER, k]
+    for k in range(active.sizes[0]):
+        if active.numbers[k] >= law.openings:
+            active.slips[slip_count] = active.numbers[k]
             slip_count += 1
     return inside, slip_count
 
 
 @kernel
-def _iterate(law, compliance, selection, tolerance, full_steps):  # type: ignore
+def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
     """Take Newton iterations from the guess; returns how many, or -1.
 
     The first residual is that of the gaps, later ones are those of λ. The equations serve again
-    where the last iteration promises that they suffice for the next, and no row was added.
+    where the last iteration promises that they suffice for the next.
     """
-    size, error, vectors, rows = (
-        compliance.sizes[0],
-        np.inf,
-        compliance.vectors,
-        compliance.indices[NUMBER],
-    )
-    force, released = vectors[FORCE][:size], vectors[RELEASED][:size]
-    residual, change = vectors[RESIDUAL][:size], vectors[CHANGE][:size]
-    places, values = compliance.derivatives
-    _evaluate(law, selection, released)
-    count = collect_derivatives(law, selection, compliance.derivatives)
-    update_columns(compliance, force, released, places, count)
+    size, error, (places, values) = active.sizes[0], np.inf, active.derivatives
+    force, released, change, gap = active.force, active.released, active.change, active.gap
+    _evaluate(law, selection, released[:size])
+    count = collect_derivatives(law, selection, active.derivatives)
+    update_columns(active, force, released, count)
     for k in range(size):
         force[k] = released[k]
-        residual[k], change[k] = vectors[FREE][k] - law.rows[Z_GUESS, rows[k]], 0.0
-    prepare_equations(compliance, count)
+        gap[k], change[k] = active.free[k] - law.guess[active.numbers[k]], 0.0
+    prepare_equations(active, count)
     # right side λ′ (z̄ + F λ - z) of the first iteration
-    add_gaps(compliance, released, residual)
+    add_gaps(active, released, gap)
     for k in range(count):
-        change[places[k, 0]] += values[k] * residual[places[k, 1]]
+        change[places[k, 0]] += values[k] * gap[places[k, 1]]
     for iteration in range(1, 17):
-        solve_equations(change, compliance, count)
-        last, error = error, _go(law, compliance, selection, iteration >= full_steps)
+        solve_equations(change, active, count)
+        last, error = error, _go(law, active, selection, iteration >= full_steps)
         if error <= tolerance or last <= error <= 10.0 * tolerance:
             return iteration
         if not error < np.inf:
             return -1
-        add_columns(compliance, released, places, 0)
-        added = compliance.sizes[1] > compliance.sizes[3]
-        if iteration == 1 or added or error**2 > last * tolerance:
-            count = collect_derivatives(law, selection, compliance.derivatives)
-            add_columns(compliance, released, places, count)
-            prepare_equations(compliance, count)
+        add_columns(active, released, 0)
+        if iteration == 1 or error**2 > last * tolerance:
+            count = collect_derivatives(law, selection, active.derivatives)
+            add_columns(active, released, count)
+            prepare_equations(active, count)
         for k in range(size):
             change[k] = released[k] - force[k]
     return -1
 
 
 @kernel
-def _go(law, compliance, selection, search):  # type: ignore
+def _go(law, active, selection, search):  # type: ignore
     """Change λ by its correction, or with a line search by a share; returns its residual [N]."""
-    size, vectors, share = compliance.sizes[0], compliance.vectors, 1.0
-    force, released = vectors[FORCE][:size], vectors[RELEASED][:size]
-    change = vectors[CHANGE][:size]
-    before, trial, z = vectors[BEFORE][:size], vectors[TRIAL][:size], vectors[RESIDUAL][:size]
-    square = 0.0
+    size, share, square, change = active.sizes[0], 1.0, 0.0, active.change
+    force, released, before, trial = active.force, active.released, active.before, active.trial
     for k in range(size):
         before[k] = released[k]
         square += (released[k] - force[k]) ** 2
     while True:
         for k in range(size):
-            trial[k], z[k] = force[k] + share * change[k], vectors[FREE][k]
+            trial[k], active.gap[k] = force[k] + share * change[k], active.free[k]
             # points that would reverse their slip are held: no derivative sees where they stick
             if before[k] * trial[k] < 0.0:
                 trial[k] = 0.0
-        add_gaps(compliance, trial, z)
+        add_gaps(active, trial, active.gap)
         for k in range(size):
-            law.rows[Z_GUESS, compliance.indices[NUMBER, k]] = z[k]
-        _evaluate(law, selection, released)
+            law.guess[active.numbers[k]] = active.gap[k]
+        _evaluate(law, selection, released[:size])
         error, now = 0.0, 0.0
         for k in range(size):
             off = abs(released[k] - trial[k])
@@ -305,43 +254,45 @@ def _go(law, compliance, selection, search):  # type: ignore
 @kernel
 def _evaluate(law, selection, released):  # type: ignore
     """Evaluate λ of the rows at the guess of their gaps."""
-    evaluate_openings(law, law.rows[Z_GUESS], selection[1])
-    evaluate_slips(law, law.rows[Z_GUESS], selection[2])
+    evaluate_openings(law, law.guess, selection[1])
+    evaluate_slips(law, law.guess, selection[2])
     collect_released(law, selection, released)
 
 
 @kernel
-def prepare_equations(compliance, count):  # type: ignore
+def prepare_equations(active, count):  # type: ignore
     """Fill the equations 1 - λ′ F of the columns, and factorise them where they are few."""
-    compliance.sizes[3] = size = compliance.sizes[1]
+    active.sizes[3] = size = active.sizes[1]
     if size <= MAX_DIRECT_ROWS:
-        _factorise_equations(compliance, count)
+        _factorise_equations(active, count)
     else:
-        _fill_equations(compliance, count, padded_square(compliance.single, size))
+        _fill_equations(active, count, rows_of(active.single, size, row_room(size)))
 
 
 @kernel
-def _factorise_equations(compliance, count):  # type: ignore
+def _factorise_equations(active, count):  # type: ignore
     """Factorise 1 - λ′ F of the columns."""
-    matrix = square(compliance.matrix, compliance.sizes[3])
-    _fill_equations(compliance, count, matrix)
-    factorise_dense(matrix, compliance.indices[PIVOT])
+    size = active.sizes[3]
+    matrix = rows_of(active.matrix, size, size)
+    _fill_equations(active, count, matrix)
+    factorise_dense(matrix, active.pivots)
 
 
 @summing_kernel
-def _fill_equations(compliance, count, matrix):  # type: ignore
+def _fill_equations(active, count, matrix):  # type: ignore
     """Fill 1 - λ′ F of the columns, by two derivatives at a time where these share a row."""
-    (places, values), (size, wide), entry = compliance.derivatives, matrix.shape, 0
+    (places, values), (size, wide), entry = active.derivatives, matrix.shape, 0
+    entries = rows_of(active.entries, active.sizes[0], active.sizes[2])
     for i in range(size):
         for k in range(wide):
             matrix[i, k] = 0.0
         matrix[i, i] = 1.0
     while entry < count:
         row, value = places[entry, 0], values[entry]
-        own, other = matrix[compliance.indices[ROW_COLUMN, row]], line(compliance, places[entry, 1])
+        own, other = matrix[active.column_of[row]], entries[places[entry, 1]]
         entry += 1
         if entry < count and places[entry, 0] == row:
-            second, further = values[entry], line(compliance, places[entry, 1])
+            second, further = values[entry], entries[places[entry, 1]]
             for k in range(wide):
                 own[k] -= value * other[k] + second * further[k]
             entry += 1
@@ -351,19 +302,19 @@ def _fill_equations(compliance, count, matrix):  # type: ignore
 
 
 @kernel
-def solve_equations(change, compliance, count):  # type: ignore
-    """Solve (1 - λ′ F) μ = d in place; in rows without a column μ is d."""
-    size = compliance.sizes[3]
-    own = compliance.vectors[COLUMN][:size]
+def solve_equations(change, active, count):  # type: ignore
+    """Solve (1 - λ′ F) μ = d in place; in rows without an equation μ is d."""
+    size, own = active.sizes[3], active.column
     for k in range(size):
-        own[k] = change[compliance.indices[COLUMN_ROW, k]]
-    if size > MAX_DIRECT_ROWS and not minimise_residual(compliance, own):
-        _factorise_equations(compliance, count)
-        solve_dense(square(compliance.matrix, size), compliance.indices[PIVOT], own)
-    elif size <= MAX_DIRECT_ROWS:
-        solve_dense(square(compliance.matrix, size), compliance.indices[PIVOT], own)
+        own[k] = change[active.row_of[k]]
+    direct = size <= MAX_DIRECT_ROWS
+    if not (direct or minimise_residual(active, own[:size])):
+        _factorise_equations(active, count)
+        direct = True
+    if direct:
+        solve_dense(rows_of(active.matrix, size, size), active.pivots, own)
     for k in range(size):
-        change[compliance.indices[COLUMN_ROW, k]] = own[k]
+        change[active.row_of[k]] = own[k]
 
 
 @kernel
@@ -395,7 +346,7 @@ def factorise_dense(matrix, pivots):  # type: ignore
 @summing_kernel
 def solve_dense(matrix, pivots, right):  # type: ignore
     """Solve in place by the factor of `factorise_dense`."""
-    size = len(right)
+    size = len(matrix)
     for k in range(size):
         best = pivots[k]
         right[k], right[best] = right[best], right[k]
@@ -412,10 +363,11 @@ def solve_dense(matrix, pivots, right):  # type: ignore
 
 
 @summing_kernel
-def minimise_residual(compliance, right):  # type: ignore
+def minimise_residual(active, right):  # type: ignore
     """Solve in place by minimal residuals; returns False if that takes too many products."""
-    size, square_sum, basis = len(right), 0.0, compliance.basis
-    rotations, triangle, wide = compliance.rotations, compliance.triangle, padded(size)
+    size, square_sum, basis = len(right), 0.0, active.basis
+    rotations, triangle, wide = active.rotations, active.triangle, row_room(size)
+    matrix = rows_of(active.single, size, wide)
     for k in range(size):
         square_sum += right[k] ** 2
     rotations[0, 2] = first = np.sqrt(square_sum)
@@ -427,14 +379,14 @@ def minimise_residual(compliance, right):  # type: ignore
         basis[0, k] = 0.0
     for step in range(MAX_KRYLOV_VECTORS):
         # Arnoldi: the next vector of the basis, orthogonal to all before
-        products(compliance.single, wide, basis[step][:wide], basis[step + 1][:size])
+        multiply_rows(matrix, basis[step][:wide], basis[step + 1][:size])
         for k in range(size, wide):
             basis[step + 1, k] = 0.0
         norm = _orthogonalise(basis, step + 1, wide, triangle[step])
         _rotate(triangle[step], step, norm, rotations)
         # the next Newton iteration takes up what remains
         if abs(rotations[step + 1, 2]) <= 3e-4 * first:
-            _combine(basis, step + 1, compliance, right)
+            _combine(basis, step + 1, active, right)
             return True
     return False
 
@@ -474,9 +426,9 @@ def _rotate(column, step, norm, rotations):  # type: ignore
 
 
 @summing_kernel
-def _combine(basis, count, compliance, right):  # type: ignore
+def _combine(basis, count, active, right):  # type: ignore
     """Combine the vectors of the basis by back substitution in the triangle."""
-    triangle, rotations = compliance.triangle, compliance.rotations
+    triangle, rotations = active.triangle, active.rotations
     for k in range(len(right)):
         right[k] = 0.0
     for step in range(count - 1, -1, -1):

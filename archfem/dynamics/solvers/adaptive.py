@@ -20,9 +20,6 @@ from archfem.dynamics.state import Batch, State
 # Lengths that are not halved, and not doubled, any more [s]
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 2e-2
 
-# Steps between two checks of the error
-STEPS_PER_CHECK = 32
-
 # Least compression of joints in the error, relative to dead load [-]
 MIN_COMPRESSION = 0.5
 
@@ -61,9 +58,10 @@ class AdaptiveStepper:
         while done < total:
             while level > 0 and (done % 2**level or done + 2**level > total):
                 level -= 1
-            count = min(STEPS_PER_CHECK, (total - done) // 2**level)
+            # 32 steps between two checks of the error
+            count = min(32, (total - done) // 2**level)
             ends = start.time + tick * (done + 2**level * np.arange(1, count + 1))
-            batch, worst = self._tried(state, tick * 2**level, ends, level == 0)
+            batch, worst = self._try_steps(state, tick * 2**level, ends, level == 0)
             if batch is None:
                 level -= 1
                 continue
@@ -75,14 +73,14 @@ class AdaptiveStepper:
             elif worst < 0.1 * self.tolerance and level < coarsest - finest:
                 level += 1
 
-    def _tried(
+    def _try_steps(
         self, state: State, dt: float, ends: Array, last: bool
     ) -> tuple[Batch | None, float]:
         """Return the steps before the first with too large an error, and their largest error.
 
         All are returned if they are the `last`, which cannot be shorter; None without any.
         """
-        batch = self._taken(state, dt, ends, last)
+        batch = self._take_steps(state, dt, ends, last)
         if batch is None:
             return None, np.inf
         errors = self._errors(batch)
@@ -92,12 +90,12 @@ class AdaptiveStepper:
         self.taken += good
         self.unmet += int(np.sum(errors[:good] > self.tolerance))
         middles = batch.times - 0.5 * dt
-        scaled = self._scaled(batch.resultants[max(good - 2, 0) : good])
+        scaled = self._scale_moments(batch.resultants[max(good - 2, 0) : good])
         self._last += list(zip(middles[max(good - 2, 0) : good], scaled, strict=True))
         self._last = self._last[-2:]
         return batch.cut(good), float(errors[:good].max())
 
-    def _taken(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
+    def _take_steps(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
         """Return steps by the solver, or a fall-back step; None where shorter ones may converge."""
         stepper = self.stepper
         if stepper.solver is not None:
@@ -110,7 +108,7 @@ class AdaptiveStepper:
         (batch,) = stepper.exact.batches(state, dt, state.time + dt)
         return replace(batch, times=ends[:1])
 
-    def _scaled(self, resultants: Array) -> Array:
+    def _scale_moments(self, resultants: Array) -> Array:
         """Return M / (N h) of the joints of rings and piers (steps, joints)."""
         normal, moment = resultants[:, self._judged, 0], resultants[:, self._judged, 2]
         e: Array = moment / (np.maximum(normal, self._least) * self._depths)
@@ -120,7 +118,7 @@ class AdaptiveStepper:
         """Return the error of each step in |e| of the worst joint (steps,)."""
         dt = batch.smallest_step[0]
         middles = batch.times - 0.5 * dt
-        before, values = self._last, self._scaled(batch.resultants)
+        before, values = self._last, self._scale_moments(batch.resultants)
         times = np.append([time for time, _ in before], middles)
         values = np.concatenate([*(value[None] for _, value in before), values])
         errors = np.zeros(len(times))

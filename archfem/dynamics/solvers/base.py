@@ -57,7 +57,7 @@ def evaluate_step(
     raise NotImplementedError
 
 
-delete_stale_cache(Path(__file__).parent, Path(__file__).parents[2] / "joints" / "moving")
+delete_stale_cache(Path(__file__).parent, Path(__file__).parents[2] / "joints" / "large")
 
 
 @entry

@@ -16,7 +16,7 @@ import numpy as np
 from numba.extending import overload
 
 from archfem._numba import KERNEL_OPTIONS, kernel
-from archfem.dynamics.solvers.active_compliance import FILLED, NEAR, ActiveCompliance
+from archfem.dynamics.solvers.active_compliance import ActiveRows, begin_problem, clear_problem
 from archfem.dynamics.solvers.active_rows import (
     check_active_rows,
     predict_active_rows,
@@ -25,17 +25,10 @@ from archfem.dynamics.solvers.active_rows import (
 )
 from archfem.dynamics.solvers.base import MAX_ITERATIONS, is_system
 from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.joint_law import OFFSET, largest_force
+from archfem.dynamics.solvers.joint_law import largest_force
 from archfem.dynamics.solvers.linear_step import (
-    LAMBDA,
-    PRODUCT,
-    RIGHT_SIDE,
-    Z_BEFORE,
-    Z_END,
     LinearStepWorkspace,
     LinearSystem,
-    W,
-    Z,
     effective_matrix,
     joint_rows,
     linear_system,
@@ -50,10 +43,10 @@ from archfem.dynamics.solvers.sparse_products import (
 )
 from archfem.dynamics.solvers.supernodal_lu import (
     Elimination,
-    Panels,
-    definite_factor,
-    solve_lower,
-    solve_upper,
+    SymmetricFactor,
+    solve_backward,
+    solve_forward,
+    symmetric_factor,
 )
 
 
@@ -62,12 +55,12 @@ class ComplianceSystem(NamedTuple):
 
     linear: LinearSystem  # its matrices by rows
     work: LinearStepWorkspace
-    factor: Panels  # of K + μ M + ν R
+    factor: SymmetricFactor  # of K + μ M + ν R
     group: Any  # of the factor to which each coordinate belongs (n,)
     marked: Any  # groups of the factor in which a solve is wanted (groups,)
-    active: Any  # numbers of active rows (r,)
+    listed: Any  # numbers of the rows of a problem (r,)
     unit: Any  # displacements by forces of one at a row of gaps (n,)
-    compliance: ActiveCompliance  # F, filled for rows that have been active
+    active: ActiveRows  # F, filled for rows that have been active
 
 
 class ComplianceSolver:
@@ -90,21 +83,24 @@ class ComplianceSolver:
         """Return the data of steps of one length [s]."""
         linear = linear_system(self._equation, self.order, dt)
         matrix = effective_matrix(self._equation, self.order, dt)
-        factor = definite_factor(matrix, self._elimination)
-        pairs = len(joint_rows(self._equation, dt).pairs)
-        rows, group = linear.law.rows.shape[1], self._elimination.group_of
-        marked, active = np.zeros(len(factor.parent), bool), np.zeros(rows, np.int64)
-        unit = np.zeros(len(linear.weight))
-        compliance = ActiveCompliance.of(rows, len(linear.law.segments), pairs)
+        factor = symmetric_factor(matrix, self._elimination)
+        pairs, rows = len(joint_rows(self._equation, dt).pairs), len(linear.law.offset)
         return ComplianceSystem(
-            linear, linear_workspace(linear), factor, group, marked, active, unit, compliance
+            linear,
+            linear_workspace(linear),
+            factor,
+            self._elimination.group_of,
+            np.zeros(len(factor.parent), bool),
+            np.zeros(rows, np.int64),
+            np.zeros(len(linear.weight)),
+            ActiveRows.of(rows, len(linear.law.segments), pairs),
         )
 
     def copy_system(self, system: ComplianceSystem) -> ComplianceSystem:
-        """Return a copy for another run, with an empty compliance: untouched pages cost nothing."""
-        old, segments = system.compliance, len(system.linear.law.segments)
-        empty = ActiveCompliance.of(len(old.full), segments, len(old.derivatives[1]))
-        return deepcopy(system, {id(system.compliance): empty})
+        """Return a copy for another run, with an empty F: untouched pages cost nothing."""
+        old, segments = system.active, len(system.linear.law.segments)
+        empty = ActiveRows.of(len(old.full), segments, len(old.derivatives[1]))
+        return deepcopy(system, {id(system.active): empty})
 
 
 @overload(solve_contact, jit_options=KERNEL_OPTIONS)
@@ -114,43 +110,37 @@ def _solve_contact(system):  # type: ignore
 
 def _solve_by_compliance(system):  # type: ignore
     """Solve a step, adding rows that turn out to be active; returns iterations, or -1."""
-    linear, law, compliance, work = system.linear, system.linear.law, system.compliance, system.work
-    right = work.vectors[RIGHT_SIDE]
-    vector, half = work.vectors[W], work.vectors[PRODUCT]
-    gap, start = work.rows[Z], work.rows[Z_END]
-    predict_active_rows(law, compliance, work.rows)
+    linear, law, active, work = system.linear, system.linear.law, system.active, system.work
+    vector, half, gap = work.contact, work.product, work.gap
+    predict_active_rows(law, active, work)
     tolerance, iterations = 1e-12 * largest_force(law, gap), 1
     # forward substitution of the right side serves all rounds
-    for k in range(len(right)):
-        half[k] = right[k]
-    solve_lower(system.factor, half)
-    for k in range(len(right)):
-        vector[k] = half[k]
-    for row in range(len(gap)):
-        work.rows[Z_BEFORE, row] = gap[row]
+    _copy(work.right_side, half)
+    solve_forward(system.factor, half)
+    _copy(gap, work.gap_before)
     for iteration in range(MAX_ITERATIONS):
-        count = _list_marked(compliance.flags[NEAR], system.active)
-        rows = system.active[:count]
+        count = _list_marked(active.near, system.listed)
+        _copy(half, vector)
         if count > 0:
-            more = _solve_in_rows(system, rows, iteration == 0, tolerance)
+            more = _solve_in_rows(system, system.listed[:count], iteration == 0, tolerance)
             if more < 0:
                 return -1
             iterations += more - 1
             # right side with the released forces, whose forward substitution is added
             for k in range(len(vector)):
                 vector[k] = 0.0
-            add_rows(linear.gaps, work.rows[LAMBDA], vector)
-            solve_lower(system.factor, vector)
-            for k in range(len(half)):
+            add_rows(linear.gaps, work.force, vector)
+            solve_forward(system.factor, vector)
+            for k in range(len(vector)):
                 vector[k] += half[k]
         for group in range(len(system.marked)):
             system.marked[group] = True
-        _solve_branches(system, vector)
+        solve_backward(system.factor, vector, system.marked)
         multiply(linear.gaps, vector, gap)
         for row in range(len(gap)):
-            gap[row] += law.rows[OFFSET, row]
-            start[row] = gap[row]
-        if check_active_rows(law, compliance, gap, compliance.flags[NEAR]):
+            gap[row] += law.offset[row]
+        _copy(gap, work.gap_end)
+        if check_active_rows(law, active, gap, active.near):
             return iterations
         iterations += 1
     return -1
@@ -159,19 +149,32 @@ def _solve_by_compliance(system):  # type: ignore
 @kernel
 def _solve_in_rows(system, rows, first, tolerance):  # type: ignore
     """Solve for λ in some rows; returns iterations, or -1."""
-    law, work, start = system.linear.law, system.work, system.work.rows[Z_END]
+    law, work, start, gaps = system.linear.law, system.work, system.work.gap_end, system.linear.gaps
     for row in rows:
-        if not system.compliance.flags[FILLED, row]:
+        if not system.active.filled[row]:
             _fill_compliance(system, row)
+    some = False
+    for force in work.force:
+        some = some or force != 0.0
+    if not some:  # so that histories do not depend on what was solved before
+        clear_problem(system.active)
+    begin_problem(system.active, rows)
     # gaps of these rows if nothing were released
     if first:
         _mark_branches(system, rows)
-        _solve_branches(system, work.vectors[W])
+        solve_backward(system.factor, work.contact, system.marked)
         for row in rows:
-            start[row] = row_times(system.linear.gaps, row, work.vectors[W]) + law.rows[OFFSET, row]
+            start[row] = row_times(gaps, row, work.contact) + law.offset[row]
     else:
-        subtract_released(system.compliance, rows, work.rows[LAMBDA], start)
-    return solve_active_rows(law, start, rows, system.compliance, work.rows[LAMBDA], tolerance)
+        subtract_released(system.active, work.force, start)
+    return solve_active_rows(law, start, system.active, work.force, tolerance)
+
+
+@kernel
+def _copy(source, target):  # type: ignore
+    """Copy a vector."""
+    for k in range(len(source)):
+        target[k] = source[k]
 
 
 @kernel
@@ -188,20 +191,20 @@ def _list_marked(marks, numbers):  # type: ignore
 @kernel
 def _fill_compliance(system, row):  # type: ignore
     """Compute a row of F, as far as it meets rows computed before."""
-    (indptr, indices, data), compliance = system.linear.gaps, system.compliance
-    compliance.flags[FILLED, row] = True
+    (indptr, indices, data), active = system.linear.gaps, system.active
+    active.filled[row] = True
     vector = system.unit
     for k in range(len(vector)):
         vector[k] = 0.0
     for entry in range(indptr[row], indptr[row + 1]):
         vector[indices[entry]] += data[entry]
-    solve_lower(system.factor, vector)
-    count = _list_marked(compliance.flags[FILLED], compliance.slips)
-    _mark_branches(system, compliance.slips[:count])
-    _solve_branches(system, vector)
-    for other in compliance.slips[:count]:
+    solve_forward(system.factor, vector)
+    count = _list_marked(active.filled, active.slips)
+    _mark_branches(system, active.slips[:count])
+    solve_backward(system.factor, vector, system.marked)
+    for other in active.slips[:count]:
         value = row_times(system.linear.gaps, other, vector)
-        compliance.full[row, other] = compliance.full[other, row] = value
+        active.full[row, other] = active.full[other, row] = value
 
 
 @kernel
@@ -216,11 +219,3 @@ def _mark_branches(system, rows):  # type: ignore
             while group >= 0 and not marked[group]:
                 marked[group] = True
                 group = parent[group]
-
-
-@kernel
-def _solve_branches(system, vector):  # type: ignore
-    """Solve with the upper triangle in the groups that are marked."""
-    for group in range(len(system.marked) - 1, -1, -1):
-        if system.marked[group]:
-            solve_upper(system.factor, vector, group)

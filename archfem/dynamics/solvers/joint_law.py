@@ -39,7 +39,7 @@ def _record_type(integers: str, floats: str) -> np.dtype[Any]:
 # across the joint (of a facet, that of the whole) [N/m], closed normal force per opening at the
 # near and at the far end [N/m], area (of a facet, that of the whole) [m²], μ [-], c [Pa], shear
 # stiffness [N/m], irreversible slip before the step [m], and distance from mid-depth [m].
-POINT = _record_type(
+POINT_RECORD = _record_type(
     "segment slip_row joint", "share stiffness near far area friction cohesion shear slip lever"
 )
 
@@ -47,15 +47,15 @@ POINT = _record_type(
 # derivatives of its released force by z at both ends of its segment [N/m], mean shear [N],
 # increment of irreversible slip [m], derivatives of the mean shear by its elastic change and by
 # Coulomb's limit [-], and energy dissipated by friction and damping along the joint [J].
-POINT_STATE = _record_type("", "normal area near far shear slip by_change by_limit lost")
+POINT_STATE_RECORD = _record_type("", "normal area near far shear slip by_change by_limit lost")
 
 # Points of a joint between which the opening is linear: first point, one after the last, and rows
 # of the openings at both ends.
-SEGMENT = _record_type("begin end near far", "")
+SEGMENT_RECORD = _record_type("begin end near far", "")
 
 # Released forces of a segment at both ends [N], and derivatives of the first by z there, of each
 # by z at the other end, and of the last by z there [N/m].
-SEGMENT_STATE = _record_type("", "near far first mixed last")
+SEGMENT_STATE_RECORD = _record_type("", "near far first mixed last")
 
 
 class GapRows(NamedTuple):
@@ -153,12 +153,6 @@ def _distinct_rows(rows: Array) -> tuple[Any, Any]:
     return np.array(distinct), number
 
 
-# Rows of `JointLaw.rows`: gaps of the undisplaced structure, gaps at the start of the step, their
-# change per step at the rates there, and z at which forces were evaluated last. The law has few
-# arrays, as each takes time to pass to a compiled function, and to compile.
-OFFSET, START, SPEED, GUESS = range(4)
-
-
 class JointLaw(NamedTuple):
     """The joint law for one length of step, with the joints' state at the start of the step."""
 
@@ -167,15 +161,18 @@ class JointLaw(NamedTuple):
     damping_lag: float  # lag of damping over the length of the step [-]
     openings: int  # number of rows that are openings
     stored: float  # energy of the undisplaced joints, as if closed and stuck [J]
-    points: Any  # records `POINT` (p,)
-    point_states: Any  # records `POINT_STATE` (p,)
-    segments: Any  # records `SEGMENT` (s,)
-    segment_states: Any  # records `SEGMENT_STATE` (s,)
+    points: Any  # records `POINT_RECORD` (p,)
+    point_states: Any  # records `POINT_STATE_RECORD` (p,)
+    segments: Any  # records `SEGMENT_RECORD` (s,)
+    segment_states: Any  # records `SEGMENT_STATE_RECORD` (s,)
     groups: Any  # of slip rows, begin of their points in `members` and of their pairs (2, g + 1)
     members: Any  # points sorted by their slip rows (p,)
     slips: Array  # released force of each slip row [N], and its derivative there [N/m] (g, 2)
     stiffness: Array  # of openings the largest, of slips the sum of their points (r,) [N/m]
-    rows: Array  # values of all rows of gaps, as named below (4, r) [m]
+    offset: Array  # gaps of the undisplaced structure (r,) [m]
+    start: Array  # gaps at the start of the step (r,) [m]
+    speed: Array  # their change per step at the rates there (r,) [m]
+    guess: Array  # z at which forces were evaluated last (r,) [m]
 
 
 def joint_law(
@@ -191,14 +188,12 @@ def joint_law(
         stiffness = np.repeat(stiffness[0::2] + stiffness[1::2], 2)
     count = len(points.offset)
     offset = np.zeros((2, count)) if joints.gap_offset is None else joints.gap_offset
-    segments = _records(SEGMENT, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far)
+    segments = _records(SEGMENT_RECORD, gaps.begin[:-1], gaps.begin[1:], gaps.near, gaps.far)
     law_points = _point_records(points, gaps, stiffness, facets)
     members = np.argsort(gaps.group, kind="stable")
     members = members[gaps.group[members] >= 0]
     first = np.append(0, np.cumsum(gaps.sizes))
     pairs, pair = _derivative_pairs(segments, law_points["segment"], members, first, gaps.openings)
-    rows = np.zeros((4, len(gaps.offset)))
-    rows[OFFSET] = gaps.offset
     law = JointLaw(
         facets,
         numbers.gain if conserving else 0.0,
@@ -206,14 +201,15 @@ def joint_law(
         gaps.openings,
         0.5 * float(np.sum(offset * joints.elastic_forces(offset))),
         law_points,
-        np.zeros(count, POINT_STATE),
+        np.zeros(count, POINT_STATE_RECORD),
         segments,
-        np.zeros(len(segments), SEGMENT_STATE),
+        np.zeros(len(segments), SEGMENT_STATE_RECORD),
         np.stack([first, pair]),
         members,
         np.zeros((len(gaps.sizes), 2)),
         _row_stiffness(gaps, stiffness, points.shear_spring),
-        rows,
+        gaps.offset,
+        *np.zeros((3, len(gaps.offset))),
     )
     return law, gaps.rows, pairs
 
@@ -221,7 +217,7 @@ def joint_law(
 def _point_records(points: JointPoints, gaps: GapRows, stiffness: Array, facets: bool) -> Any:
     """Return the records of all joint points (p,)."""
     return _records(
-        POINT,
+        POINT_RECORD,
         gaps.segment,
         gaps.group,
         points.joint,
@@ -288,15 +284,15 @@ def predict_gaps(law, gap, before):  # type: ignore
     """Predict z from its rate, or at an instant from its change in the step before."""
     for row in range(len(gap)):
         if law.gain > 0.0:
-            law.rows[GUESS, row] = law.rows[START, row] + law.rows[SPEED, row] / law.gain
+            law.guess[row] = law.start[row] + law.speed[row] / law.gain
         else:
-            law.rows[GUESS, row] = 2.0 * gap[row] - before[row]
+            law.guess[row] = 2.0 * gap[row] - before[row]
 
 
 @kernel
 def evaluate_openings(law, gap, segments):  # type: ignore
     """Evaluate normal and released forces of some segments at z, into their states."""
-    half, facets, start, points = 0.5 * law.gain, law.facets, law.rows[START], law.points
+    half, facets, start, points = 0.5 * law.gain, law.facets, law.start, law.points
     step, area = (2, 0.5) if facets else (1, 1.0)
     for number in segments:
         segment, state = law.segments[number], law.segment_states[number]
@@ -359,7 +355,7 @@ def between(ends, share):  # type: ignore
 @kernel
 def evaluate_slips(law, gap, rows):  # type: ignore
     """Evaluate shear and released forces of some slip rows at z, after `evaluate_openings`."""
-    first, start, gain, late = law.groups[0], law.rows[START], law.gain, law.damping_lag
+    first, start, gain, late = law.groups[0], law.start, law.gain, law.damping_lag
     for row in rows:
         slip, released, rate = gain * (gap[row] - start[row]), 0.0, 0.0
         group = row - law.openings
@@ -421,7 +417,7 @@ def collect_derivatives(law, selection, entries):  # type: ignore
     return count
 
 
-@kernel
+@inlined_kernel
 def _slip_derivatives(law, place, row, entries, count):  # type: ignore
     """List the derivatives of a slip row by its slip and, as friction grows, by openings."""
     group, last, entered = row - law.openings, -1, -1

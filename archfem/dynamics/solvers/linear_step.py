@@ -21,10 +21,6 @@ from archfem._typing import Array
 from archfem.dynamics.solvers.base import evaluate_step, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
-    GUESS,
-    OFFSET,
-    SPEED,
-    START,
     JointLaw,
     between,
     collect_released,
@@ -59,20 +55,19 @@ class LinearSystem(NamedTuple):
     places: Any  # numbers of all rows, whose begin are those of all segments, too (r,)
 
 
-# Rows of the workspace: z, z of the step before, λ, gaps at the end of a step and where the law of
-# an instant sees them there, and scratch.
-Z, Z_BEFORE, LAMBDA, Z_END, Z_SEEN, SPARE = range(6)
-
-# Vectors of the workspace: w, the right side of a step, and the product of a matrix and w.
-W, RIGHT_SIDE, PRODUCT = range(3)
-
-
 class LinearStepWorkspace(NamedTuple):
     """Arrays that persist from step to step; the ends of a step alternate in `images`."""
 
     images: Array  # of u, v and a under M, K and R (2, 3, 3, n)
-    rows: Array  # of gaps, as named above (6, r)
-    vectors: Array  # of coordinates, as named above (3, n)
+    gap: Array  # z (r,)
+    gap_before: Array  # z of the step before (r,)
+    force: Array  # λ (r,)
+    gap_end: Array  # gaps at the end of a step (r,)
+    gap_seen: Array  # gaps that the law of an instant sees there (r,)
+    spare: Array  # scratch (r,)
+    contact: Array  # w (n,)
+    right_side: Array  # of the equation of the step (n,)
+    product: Array  # of a matrix and w (n,)
     released: Array  # by openings at an instant, and how much more with the lag (2, o)
 
 
@@ -140,11 +135,9 @@ def effective_matrix(equation: Equation, order: NDArray[Any], dt: float) -> spar
 
 def linear_workspace(linear: LinearSystem) -> LinearStepWorkspace:
     """Allocate the workspace of runs."""
-    size, rows = len(linear.weight), linear.law.rows.shape[1]
-    released = np.zeros((2, linear.law.openings))
-    return LinearStepWorkspace(
-        np.zeros((2, 3, 3, size)), np.zeros((6, rows)), np.zeros((3, size)), released
-    )
+    size, rows = len(linear.weight), len(linear.law.offset)
+    ends, released = np.zeros((2, 3, 3, size)), np.zeros((2, linear.law.openings))
+    return LinearStepWorkspace(ends, *np.zeros((6, rows)), *np.zeros((3, size)), released)  # type: ignore[call-arg]
 
 
 def solve_contact(system: Any) -> Any:
@@ -174,18 +167,8 @@ def _evaluate_step(system, step, states, ground, results, memory):  # type: igno
 
 def _start_linear_run(system, state, memory):  # type: ignore
     """Fill the workspace with images and gaps of a state, and the memory of the joints."""
-    linear, law, images, values = (
-        system.linear,
-        system.linear.law,
-        system.work.images,
-        system.work.rows,
-    )
-    lag, released, start, speed = (
-        linear.numbers.lag,
-        system.work.released,
-        law.rows[START],
-        law.rows[SPEED],
-    )
+    linear, law, work, images = system.linear, system.linear.law, system.work, system.work.images
+    lag, released, start, speed = linear.numbers.lag, work.released, law.start, law.speed
     for k in range(3):
         multiply(linear.mass, state[k], images[0, 0, k])
         multiply(linear.closed, state[k], images[0, 1, k])
@@ -196,15 +179,15 @@ def _start_linear_run(system, state, memory):  # type: ignore
     for point in range(len(memory)):
         law.points[point].slip = memory[point]
     for row in range(len(start)):
-        start[row] += law.rows[OFFSET, row]
+        start[row] += law.offset[row]
         # at an instant the law sees gaps ahead by the lag of damping
-        values[Z, row] = start[row] + (lag * speed[row] if law.gain == 0.0 else 0.0)
+        work.gap[row] = start[row] + (lag * speed[row] if law.gain == 0.0 else 0.0)
         speed[row] *= 2.0 / linear.numbers.velocity[1]
-        values[Z_BEFORE, row] = values[Z, row] - (speed[row] if law.gain > 0.0 else 0.0)
-        values[LAMBDA, row] = 0.0
+        work.gap_before[row] = work.gap[row] - (speed[row] if law.gain > 0.0 else 0.0)
+        work.force[row] = 0.0
     if law.gain == 0.0:
-        force = values[LAMBDA][: law.openings]
-        open_forces(law, values[Z], force)
+        force = work.force[: law.openings]
+        open_forces(law, work.gap, force)
         open_forces(law, start, released[0])
         for row in range(law.openings):
             released[1, row] = force[row] - released[0, row]
@@ -213,7 +196,7 @@ def _start_linear_run(system, state, memory):  # type: ignore
 def _solve_linear_step(system, step, states, ground):  # type: ignore
     """Solve a step and update state and images."""
     linear, work, numbers = system.linear, system.work, system.linear.numbers
-    old, new, right = work.images[step % 2], work.images[(step + 1) % 2], work.vectors[RIGHT_SIDE]
+    old, new, right = work.images[step % 2], work.images[(step + 1) % 2], work.right_side
     # right side: gravity and ground, inertia, damping, and joints that slid before the step
     for k in range(len(right)):
         ground_force = ground[0] * linear.body[0, k] + ground[1] * linear.body[1, k]
@@ -225,7 +208,7 @@ def _solve_linear_step(system, step, states, ground):  # type: ignore
     iterations = solve_contact(system)
     if iterations > 0:
         _update_images(linear, work, (old, new))
-        update_images(work.vectors[W], states[0], states[1], numbers)
+        update_images(work.contact, states[0], states[1], numbers)
     return iterations
 
 
@@ -244,14 +227,14 @@ def _add_irreversible_slips(law, gaps, right):  # type: ignore
 def _update_images(linear, work, ends):  # type: ignore
     """Update the images of the state after a step; K w follows from the balance of the step."""
     (old, new), numbers = ends, linear.numbers
-    right, image = work.vectors[RIGHT_SIDE], work.vectors[PRODUCT]
-    add_rows(linear.gaps, work.rows[LAMBDA], right)
-    multiply(linear.mass, work.vectors[W], image)
+    right, image = work.right_side, work.product
+    add_rows(linear.gaps, work.force, right)
+    multiply(linear.mass, work.contact, image)
     update_images(image, old[0], new[0], numbers)
     for k in range(len(right)):
         right[k] -= numbers.inertia * image[k]
     if len(linear.rest[2]) > 0:
-        multiply(linear.rest, work.vectors[W], image)
+        multiply(linear.rest, work.contact, image)
         update_images(image, old[2], new[2], numbers)
         for k in range(len(right)):
             right[k] -= numbers.rate * image[k]
@@ -264,34 +247,34 @@ def _evaluate_linear_step(system, step, states, ground, results, memory):  # typ
     images = work.images[step % 2], work.images[(step + 1) % 2]
     if law.gain == 0.0:
         _gaps_at_end(linear, work, states[1])
-    _sum_resultants(law, linear.shear, work.vectors[W], resultants)
+    _sum_resultants(law, linear.shear, work.contact, resultants)
     loads = linear.weight, linear.body[0], linear.body[1]
     damping = linear.numbers.drag, linear.numbers.lag
     _closed_energies(states, images, loads, damping, ground, energy)
     if law.gain == 0.0:
-        _instant_energies(law, linear.numbers.lag, work.rows, work.released, energy)
+        _instant_energies(law, linear.numbers.lag, work, energy)
     else:
-        _path_energies(law, work.rows[Z], energy, memory)
-        open_forces(law, law.rows[START], work.released[0])
+        _path_energies(law, work.gap, energy, memory)
+        open_forces(law, law.start, work.released[0])
     # elastic energy that open joints do not store
     for row in range(work.released.shape[1]):
-        energy[1] -= 0.5 * law.rows[START, row] * work.released[0, row]
+        energy[1] -= 0.5 * law.start[row] * work.released[0, row]
 
 
 @kernel
 def _gaps_at_end(linear, work, state):  # type: ignore
     """Find the gaps at the end of a step, and forces where the law of an instant sees them."""
-    law, numbers, now, seen = linear.law, linear.numbers, work.rows[Z_END], work.rows[Z_SEEN]
+    law, numbers, now, seen = linear.law, linear.numbers, work.gap_end, work.gap_seen
     multiply(linear.gaps, state[0], now)
     if numbers.share == 1.0:
         for row in range(len(seen)):
-            seen[row] = work.rows[Z, row]
+            seen[row] = work.gap[row]
     else:  # HHT writes the equation before the end: evaluate the joints there
         multiply(linear.gaps, state[1], seen)
         for row in range(len(seen)):
             seen[row] = now[row] + numbers.lag * seen[row]
-        for k in range(len(work.vectors[W])):
-            work.vectors[W, k] = state[0, k] + numbers.lag * state[1, k]
+        for k in range(len(work.contact)):
+            work.contact[k] = state[0, k] + numbers.lag * state[1, k]
         evaluate_openings(law, seen, linear.places[: len(law.segments)])
 
 
@@ -330,19 +313,20 @@ def _closed_energies(states, images, loads, damping, ground, energy):  # type: i
 
 
 @kernel
-def _instant_energies(law, lag, rows, released, energy):  # type: ignore
+def _instant_energies(law, lag, work, energy):  # type: ignore
     """Subtract damping that open joints do not provide, by the trapezoidal rule."""
-    now, force, late = rows[Z_END], rows[SPARE][: law.openings], released[1]
+    now, force, released = work.gap_end, work.spare[: law.openings], work.released
+    late = released[1]
     open_forces(law, now, released[0])
     if lag > 0.0:
         # how much more is released where the law sees the joints than at the gaps themselves
-        open_forces(law, rows[Z_SEEN], force)
+        open_forces(law, work.gap_seen, force)
         for row in range(len(late)):
             more = force[row] - released[0, row]
-            energy[3] -= 0.5 * (now[row] - law.rows[START, row]) * (late[row] + more)
+            energy[3] -= 0.5 * (now[row] - law.start[row]) * (late[row] + more)
             late[row] = more
     for row in range(len(now)):
-        law.rows[START, row] = now[row]
+        law.start[row] = now[row]
 
 
 @kernel
@@ -352,7 +336,7 @@ def _path_energies(law, gap, energy, memory):  # type: ignore
     Energies are as if joints held tension and were stuck: what open ones do not damp is subtracted,
     and what friction dissipates is added.
     """
-    start, speed, gain = law.rows[START], law.rows[SPEED], law.gain
+    start, speed, gain = law.start, law.speed, law.gain
     if law.damping_lag > 0.0:
         energy[3] += _open_damping(law, gap)
         for point in law.points:
@@ -379,7 +363,7 @@ def _path_energies(law, gap, energy, memory):  # type: ignore
 @kernel
 def _open_damping(law, gap):  # type: ignore
     """Return the energy dissipated by the lag on openings, less that of closed joints [J]."""
-    start, points, lost = law.rows[START], law.points, 0.0
+    start, points, lost = law.start, law.points, 0.0
     for number in range(len(law.segments)):
         part, state = law.segments[number], law.segment_states[number]
         first = start[part.near], start[part.far]
@@ -407,6 +391,6 @@ def _open_damping(law, gap):  # type: ignore
 def evaluate_released(law, places, released):  # type: ignore
     """Evaluate the released forces of all rows at the guess of z."""
     segments, slips = places[: len(law.segments)], places[law.openings :]
-    evaluate_openings(law, law.rows[GUESS], segments)
-    evaluate_slips(law, law.rows[GUESS], slips)
+    evaluate_openings(law, law.guess, segments)
+    evaluate_slips(law, law.guess, slips)
     collect_released(law, (places, segments, slips), released)

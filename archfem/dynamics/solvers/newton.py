@@ -7,7 +7,7 @@ it is sparse (`supernodal_lu`). Small displacements (`linear_step`) solve in eve
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
 the residual is the difference of λ(z) from the λ that w is in balance with. Large displacements
-solve for Δq, with f̄ the mean force of the joints over the step (`joints.moving`),
+solve for Δq, with f̄ the mean force of the joints over the step (`joints.large`),
 
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """
@@ -33,20 +33,13 @@ from archfem.dynamics.solvers.band_lu import (
 from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
-    GUESS,
-    OFFSET,
     collect_derivatives,
     largest_force,
     predict_gaps,
 )
 from archfem.dynamics.solvers.linear_step import (
-    LAMBDA,
-    RIGHT_SIDE,
-    Z_BEFORE,
     LinearStepWorkspace,
     LinearSystem,
-    W,
-    Z,
     effective_matrix,
     evaluate_released,
     joint_rows,
@@ -206,8 +199,8 @@ class NewtonSolver:
         blocks = np.zeros(widest), np.zeros(widest**2)
         entries = np.zeros((len(pairs), 3), np.int64), np.zeros(len(pairs))
         factored = np.zeros(len(pairs), np.int64), np.zeros(len(pairs)), np.full(1, -1)
-        rows, contact = np.zeros((7, law.rows.shape[1])), np.zeros((3, len(linear.weight)))
-        return SmallSystem(
+        rows, contact = np.zeros((7, len(law.offset))), np.zeros((3, len(linear.weight)))
+        return SmallSystem(  # type: ignore[call-arg]
             linear,
             linear_workspace(linear),
             tangent,
@@ -216,7 +209,7 @@ class NewtonSolver:
             blocks,
             entries,
             factored,
-            rows,
+            *rows,
             contact,
             self._reduction,
         )
@@ -284,12 +277,6 @@ def _pair_blocks(gaps: SparseRows, pairs: Indices) -> tuple[Indices, Any, Any]:
 # ---- small displacements
 
 
-# Rows of iterations with small displacements: λ(z), the same of the evaluation before, λ that w is
-# in balance with, its change by the correction, the change of the gaps, and gaps and balanced λ
-# before the correction.
-RELEASED, LAST, BALANCED, MOVE, ALONG, GAP_ORIGIN, BALANCED_ORIGIN = range(7)
-
-
 class SmallSystem(NamedTuple):
     """A structure of small displacements."""
 
@@ -301,7 +288,13 @@ class SmallSystem(NamedTuple):
     blocks: tuple[Array, Array]  # workspace for a row of a block, and for a block
     entries: tuple[Any, Array]  # derivatives: row, column and pair (m, 3), and values (m,)
     factored: tuple[Any, Array, Any]  # pairs and values in the factor, and their number (1,)
-    rows: Array  # of iterations, as named above (7, r)
+    released: Array  # λ(z) (r,)
+    last: Array  # the same of the evaluation before (r,)
+    balanced: Array  # λ that w is in balance with (r,)
+    move: Array  # its change by the correction (r,)
+    along: Array  # change of the gaps (r,)
+    gap_origin: Array  # gaps before the correction (r,)
+    balanced_origin: Array  # balanced λ before the correction (r,)
     contact: Array  # w, w before the correction, and the correction (3, n)
     reduction: float  # as of `Tolerances`
 
@@ -309,7 +302,7 @@ class SmallSystem(NamedTuple):
 @kernel
 def _small_residual(system, work, iteration):  # type: ignore
     """Evaluate λ(z) at the trial gaps, and its difference from the λ in balance."""
-    released, last, force = system.rows[RELEASED], system.rows[LAST], system.rows[BALANCED]
+    released, last, force = system.released, system.last, system.balanced
     largest, square, reverses = 0.0, 0.0, False
     for row in range(len(released)):
         last[row] = released[row]
@@ -328,18 +321,23 @@ def _small_residual(system, work, iteration):  # type: ignore
 @kernel
 def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
     """Find the corrections of w, and of z and λ as the derivatives predict them."""
-    gaps, rows, law, begin = system.linear.gaps, system.rows, system.linear.law, iteration == 0
-    released, along, move, origin = rows[RELEASED], rows[ALONG], rows[MOVE], rows[BALANCED_ORIGIN]
-    contact, change, right = system.contact, system.contact[2], work.vectors[RIGHT_SIDE]
+    gaps, law, begin = system.linear.gaps, system.linear.law, iteration == 0
+    released, along, move, origin = (
+        system.released,
+        system.along,
+        system.move,
+        system.balanced_origin,
+    )
+    contact, change, right = system.contact, system.contact[2], work.right_side
     if not (reuse or _renew_factor(system, hold)):
         return False
     # right side: at the guess all of it, r + Gᵀ (λ - λ′ (z - z₀)); later, as w is in balance with a
     # λ, only the residual of that, which rounds less
     for row in range(len(move)):
-        rows[GAP_ORIGIN, row] = law.rows[GUESS, row]
-        origin[row] = 0.0 if begin else rows[BALANCED, row]
+        system.gap_origin[row] = law.guess[row]
+        origin[row] = 0.0 if begin else system.balanced[row]
         move[row] = released[row] - origin[row]
-        along[row] = law.rows[OFFSET, row] - law.rows[GUESS, row]
+        along[row] = law.offset[row] - law.guess[row]
     if begin:
         _add_derivatives(system.entries, system.factored[2][0], along, move)
     for k in range(len(change)):
@@ -365,7 +363,7 @@ def _renew_factor(system, hold):  # type: ignore
     selection = numbers, numbers[: len(law.segments)], numbers[law.openings :]
     count = collect_derivatives(law, selection, system.entries)
     if hold:
-        hold_reversed(system.rows[LAST], system.rows[RELEASED], system.entries, count)
+        hold_reversed(system.last, system.released, system.entries, count)
     same = number[0] == count
     for k in range(count):
         same = same and pairs[k] == rows[k, 2] and factored[k] == values[k]
@@ -434,10 +432,10 @@ def _add_derivatives(entries, count, along, result):  # type: ignore
 @kernel
 def _small_move(system, work, share):  # type: ignore
     """Go a share of the correction from where it begins."""
-    law, rows, contact = system.linear.law, system.rows, system.contact
-    for row in range(rows.shape[1]):
-        law.rows[GUESS, row] = rows[GAP_ORIGIN, row] + share * rows[ALONG, row]
-        rows[BALANCED, row] = rows[BALANCED_ORIGIN, row] + share * rows[MOVE, row]
+    law, contact = system.linear.law, system.contact
+    for row in range(len(law.guess)):
+        law.guess[row] = system.gap_origin[row] + share * system.along[row]
+        system.balanced[row] = system.balanced_origin[row] + share * system.move[row]
     for k in range(contact.shape[1]):
         contact[0, k] = contact[1, k] + share * contact[2, k]
     return 1.0
@@ -455,21 +453,21 @@ def _solve_small_step(system):  # type: ignore
     """Solve a step; a second try restarts from the guess, with a line search from its begin."""
     law, work, total = system.linear.law, system.work, 0
     # relative to the largest force; ten times as much where rounding does not let it fall
-    error = 1e-12 * largest_force(law, work.rows[Z])
+    error = 1e-12 * largest_force(law, work.gap)
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
     for full_steps in (4, 1):
-        predict_gaps(law, work.rows[Z], work.rows[Z_BEFORE])
+        predict_gaps(law, work.gap, work.gap_before)
         iterations = _solve_small(system, work, tolerances, full_steps)
         total += abs(iterations)
         if iterations > 0:
-            for row in range(law.rows.shape[1]):
-                work.rows[Z_BEFORE, row], work.rows[Z, row] = (
-                    work.rows[Z, row],
-                    law.rows[GUESS, row],
+            for row in range(len(law.guess)):
+                work.gap_before[row], work.gap[row] = (
+                    work.gap[row],
+                    law.guess[row],
                 )
-                work.rows[LAMBDA, row] = system.rows[BALANCED, row]
+                work.force[row] = system.balanced[row]
             for k in range(len(system.linear.weight)):
-                work.vectors[W, k] = system.contact[0, k]
+                work.contact[k] = system.contact[0, k]
             return total
     return -1
 

@@ -25,9 +25,6 @@ from archfem.statics.newton import (
     load_magnitude,
 )
 
-# Times that a step may be halved before the run fails
-MAX_HALVINGS = 8
-
 # Function that solves a step from a state and a time step
 Attempt = Callable[[State, float], Step]
 
@@ -110,7 +107,7 @@ class SnesSolver:
         Raises:
             DidNotConverge: SNES finds no equilibrium.
         """
-        equation, (numbers, linear) = self.equation, self._prepared(dt)
+        equation, (numbers, linear) = self.equation, self._step_matrix(dt)
         load = equation.load(state.time + numbers.share * dt)
         before = np.stack([state.q, state.velocity, state.acceleration])
         unmoved = numbers.velocity[0] @ before, numbers.acceleration[0] @ before
@@ -120,17 +117,17 @@ class SnesSolver:
             velocity = numbers.velocity[1] * moved + unmoved[0]
             return State(state.time + dt, q, velocity, numbers.acceleration[1] * moved + unmoved[1])
 
-        def unbalanced(q: Array) -> Array:
-            now = _written(state, end(q), numbers.share)
+        def residual(q: Array) -> Array:
+            now = _interpolate_states(state, end(q), numbers.share)
             moving = equation.model.mass @ now.acceleration + equation.viscous @ now.velocity
             return np.asarray(moving + equation.model.force(equation.contact(now)) - load)
 
         def tangent(q: Array) -> sparse.csr_matrix:
-            contact = equation.contact(_written(state, end(q), numbers.share))
+            contact = equation.contact(_interpolate_states(state, end(q), numbers.share))
             return self._tangent(contact, linear, numbers.gain)
 
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
-        solved = self._solver.solve(unbalanced, tangent, guess, self._scale)
+        solved = self._solver.solve(residual, tangent, guess, self._scale)
         new = end(solved.q)
         ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
         ends = (state.q, state.velocity), (new.q, new.velocity)
@@ -151,7 +148,7 @@ class SnesSolver:
         Raises:
             DidNotConverge: SNES finds no equilibrium.
         """
-        equation, (numbers, linear) = self.equation, self._prepared(dt)
+        equation, (numbers, linear) = self.equation, self._step_matrix(dt)
         model = equation.with_memory(state)
         ground = equation.ground(np.array([state.time + dt]), dt)[0, 0]
         load = equation.weight - model.mass_influence @ ground
@@ -160,8 +157,8 @@ class SnesSolver:
         def speed(q: Array) -> Array:
             return np.asarray(gain * (q - state.q) - state.velocity)
 
-        def solved(passage: ModelStep, guess: Array) -> Solution:
-            def unbalanced(q: Array) -> Array:
+        def solve_passage(passage: ModelStep, guess: Array) -> Solution:
+            def residual(q: Array) -> Array:
                 change, drag = (speed(q) - state.velocity) / dt, 0.5 * (speed(q) + state.velocity)
                 moving = model.mass @ change + equation.viscous @ drag
                 return np.asarray(moving + passage.force(q) - load)
@@ -172,10 +169,10 @@ class SnesSolver:
                 return matrix
 
             searches = SLIDING_SEARCHES if equation.remembers else CONVEX_SEARCHES
-            return self._solver.solve(unbalanced, tangent, guess, self._scale, searches)
+            return self._solver.solve(residual, tangent, guess, self._scale, searches)
 
         passage = model.begin_step(state.q, equation.lag / dt)
-        passage, solution = _solve_with_teeth(passage, solved, state.q + dt * state.velocity)
+        passage, solution = _solve_with_teeth(passage, solve_passage, state.q + dt * state.velocity)
         q, moved = solution.q, solution.q - state.q
         memory, velocity = passage.updated_memory(q), speed(q)
         new = State(state.time + dt, q, velocity, (velocity - state.velocity) / dt, memory)
@@ -184,7 +181,7 @@ class SnesSolver:
         energy = equation.energy(new) + np.array([0.0, 0.0, work, lost])
         return Step(new, passage.resultants(q), solution.iterations, dt, energy)
 
-    def _prepared(self, dt: float) -> tuple[StepNumbers, sparse.csr_matrix]:
+    def _step_matrix(self, dt: float) -> tuple[StepNumbers, sparse.csr_matrix]:
         """StepNumbers of a step, and μ M + ν R; the same objects as before while the step stays."""
         if self._step is None or abs(self._step[0] - dt) > 1e-9 * dt:
             numbers, matrix = self.equation.numbers(dt), self.equation.rest.copy()
@@ -208,7 +205,7 @@ class SnesSolver:
         try:
             step = self._attempts(state, dt)
         except DidNotConverge as error:
-            if halvings == MAX_HALVINGS:
+            if halvings == 8:  # 1/256 of the step
                 raise DidNotConverge(
                     f"the step from t = {state.time:.6g} s failed, down to {dt:.3g} s ({error}): "
                     "the structure may have fallen apart; try a smaller dt or HHT",
@@ -235,7 +232,7 @@ def _solve_with_teeth(
     raise DidNotConverge(f"saw teeth of joints that slide do not converge in {alternations} turns")
 
 
-def _written(start: State, end: State, share: float) -> State:
+def _interpolate_states(start: State, end: State, share: float) -> State:
     """Return the state where HHT writes the equation, with the acceleration at the end."""
     between = start.velocity + share * (end.velocity - start.velocity)
     return replace(end, q=start.q + share * (end.q - start.q), velocity=between)

@@ -15,18 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import solve_triangular
 from scipy.sparse.linalg import splu
 
 from archfem._numba import entry, kernel, summing_kernel, view_kernel
 from archfem._typing import Array
 
 Indices = NDArray[np.int64]
-
-# Columns up to which a whole branch of the elimination tree becomes one group
-MAX_LEAF_COLUMNS = 16
-
-# Columns of a group at most
-MAX_GROUP_COLUMNS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +110,9 @@ def _groups(fill: list[Indices]) -> list[tuple[int, int]]:
             stored = width * height - width * (width - 1) // 2
             below = fill[before[1] - 1]
             follows = len(below) > 0 and start <= below[0] <= column
-            dense = width <= MAX_GROUP_COLUMNS and stored <= 64 + 1.15 * joined
-            if not (branch[column] <= MAX_LEAF_COLUMNS or (follows and dense)):
+            dense = width <= 64 and stored <= 64 + 1.15 * joined
+            # a whole branch of up to 16 columns becomes one group
+            if not (branch[column] <= 16 or (follows and dense)):
                 break
             start, own = before[0], joined
             groups.pop()
@@ -160,18 +156,44 @@ def panels_of(
     return panels._replace(changing=np.flatnonzero(changes), base=panels.entries.copy())
 
 
-def definite_factor(matrix: sparse.csr_matrix, elimination: Elimination) -> Panels:
-    """Return the factor of a symmetric positive definite matrix, which never changes.
+class SymmetricFactor(NamedTuple):
+    """The factor C Cᵀ of a symmetric positive definite matrix.
+
+    The panel of a group holds the inverse of its triangle, and below it the rows further down times
+    that inverse. So both substitutions are products with it, in which loops are long.
+    """
+
+    first: Indices  # first column of each group, and the number of columns (groups + 1,)
+    below: Indices  # begin of its rows in `rows` (groups + 1,)
+    rows: Indices  # rows below the columns of each group
+    parent: Indices  # group of the first row below, -1 where there is none (groups,)
+    places: Indices  # begin of its panel (groups + 1,)
+    panels: Array  # column by column
+    image: Array  # intermediate results (n,)
+
+
+def symmetric_factor(matrix: sparse.csr_matrix, elimination: Elimination) -> SymmetricFactor:
+    """Return the factor of a symmetric positive definite matrix.
 
     Raises LinAlgError where it is not definite, and ValueError where the pattern lacks entries.
     """
-    panels = _layout(matrix, elimination, 0.0)  # no exchanges, however small a pivot is
-    regular = eliminate(panels)
-    diagonal = np.arange(matrix.shape[0])
-    if not (regular and np.all(panels.entries[panel_places(panels, diagonal, diagonal)] > 0.0)):
-        raise np.linalg.LinAlgError("the matrix is not positive definite")
-    none = np.zeros(0, np.int64)
-    return panels._replace(targets=none, base=np.zeros(0))
+    lu, parts = _layout(matrix, elimination, 0.0), []  # no exchanges, however small a pivot is
+    regular = eliminate(lu)
+    for group, width in enumerate(np.diff(lu.first)):
+        entries = lu.entries[lu.places[group] : lu.places[group + 1]]
+        count = lu.below[group + 1] - lu.below[group]
+        top = entries[: width * (width + count)].reshape(width, -1)[:, :width]
+        left = entries[width * (width + count) :].reshape(width, count)
+        inverse_pivots = np.diag(top)
+        if not (regular and np.all(inverse_pivots > 0.0)):
+            raise np.linalg.LinAlgError("the matrix is not positive definite")
+        unit = np.tril(top, -1) + np.identity(width)
+        inverse = solve_triangular(unit, np.identity(width), lower=True, unit_diagonal=True)
+        panel = np.vstack([np.sqrt(inverse_pivots)[:, None] * inverse, left.T @ inverse])
+        parts.append(panel.T.ravel())
+    places = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+    panels = np.concatenate(parts)
+    return SymmetricFactor(lu.first, lu.below, lu.rows, lu.parent, places, panels, lu.image)
 
 
 def _layout(matrix: sparse.csr_matrix, elimination: Elimination, smallest: float) -> Panels:
@@ -329,77 +351,101 @@ def four(panel, column, height):  # type: ignore
     )
 
 
-@kernel
-def solve_panels(panels, vector):  # type: ignore
-    """Solve in place by the factor."""
-    solve_lower(panels, vector)
-    for group in range(len(panels.parent) - 1, -1, -1):
-        solve_upper(panels, vector, group)
-
-
 @summing_kernel
-def solve_lower(panels, vector):  # type: ignore
-    """Solve with the lower triangle, of unit diagonal; groups with only zeros cost nothing."""
+def solve_panels(panels, vector):  # type: ignore
+    """Solve in place by the factor of `eliminate`."""
     for group in range(len(panels.parent)):
         start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
         rows = panels.rows[panels.below[group] : panels.below[group + 1]]
-        own, count, zero = vector[start : start + width], len(rows), True
+        own, size = vector[start : start + width], width + len(rows)
         block = panels.entries[panels.places[group] :]
-        for value in own:
-            zero = zero and value == 0.0
-        if zero:
-            continue
-        for i in range(1, width):
-            row, value = block[i * (width + count) :], own[i]
-            for k in range(i):
-                value -= row[k] * own[k]
-            own[i] = value
-        # columns below the group, four at a time: each entry of the sum is loaded once
-        total, lower = panels.image[:count], block[width * (width + count) :]
-        for i in range(count):
-            total[i] = 0.0
-        for k in range(0, width - width % 4, 4):
-            p, q, r, s = four(lower, k, count)
-            a, b, c, d = own[k], own[k + 1], own[k + 2], own[k + 3]
-            for i in range(count):
-                total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
-        for k in range(width - width % 4, width):
-            column, value = lower[k * count :], own[k]
-            for i in range(count):
-                total[i] += value * column[i]
-        for i in range(count):
-            vector[rows[i]] -= total[i]
+        for k in range(width):
+            row, value = block[k * size :], own[k]
+            for j in range(k):
+                value -= row[j] * own[j]
+            own[k] = value
+            column = block[width * size + k * len(rows) :]
+            for i in range(len(rows)):
+                vector[rows[i]] -= column[i] * value
+    for group in range(len(panels.parent) - 1, -1, -1):
+        start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
+        rows = panels.rows[panels.below[group] : panels.below[group + 1]]
+        own, later, size = vector[start : start + width], panels.image, width + len(rows)
+        block = panels.entries[panels.places[group] :]
+        for i in range(len(rows)):
+            later[i] = vector[rows[i]]
+        for k in range(width - 1, -1, -1):
+            row, value = block[k * size :], own[k]
+            for j in range(k + 1, width):
+                value -= row[j] * own[j]
+            for i in range(len(rows)):
+                value -= row[width + i] * later[i]
+            own[k] = value * row[k]
+
+
+@kernel
+def _is_zero(vector):  # type: ignore
+    """Return whether a vector has only zeros."""
+    zero = True
+    for value in vector:
+        zero = zero and value == 0.0
+    return zero
 
 
 @summing_kernel
-def solve_upper(panels, vector, group):  # type: ignore
-    """Solve with the rows of a group of the upper triangle, after those of its ancestors."""
-    start, width = panels.first[group], panels.first[group + 1] - panels.first[group]
-    rows = panels.rows[panels.below[group] : panels.below[group + 1]]
-    own, later, count = vector[start : start + width], panels.image[: len(rows)], len(rows)
-    block, size = panels.entries[panels.places[group] :], width + count
-    for i in range(count):
-        later[i] = vector[rows[i]]
-    # columns right of the group, four rows at a time
-    right = block[width:]
-    for k in range(0, width - width % 4, 4):
-        p, q, r, s = four(right, k, size)
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for j in range(count):
-            a += p[j] * later[j]
-            b += q[j] * later[j]
-            c += r[j] * later[j]
-            d += s[j] * later[j]
-        own[k], own[k + 1] = own[k] - a, own[k + 1] - b
-        own[k + 2], own[k + 3] = own[k + 2] - c, own[k + 3] - d
-    for k in range(width - width % 4, width):
-        row, value = right[k * size :], 0.0
-        for j in range(count):
-            value += row[j] * later[j]
-        own[k] -= value
-    # its own triangle, whose pivots are inverted
-    for k in range(width - 1, -1, -1):
-        row, value = block[k * size :], own[k]
-        for j in range(k + 1, width):
-            value -= row[j] * own[j]
-        own[k] = value * row[k]
+def solve_forward(factor, vector):  # type: ignore
+    """Solve C x = b in place; groups with only zeros cost nothing."""
+    for group in range(len(factor.parent)):
+        start, width = factor.first[group], factor.first[group + 1] - factor.first[group]
+        own = vector[start : start + width]
+        if _is_zero(own):
+            continue
+        rows = factor.rows[factor.below[group] : factor.below[group + 1]]
+        panel, size = factor.panels[factor.places[group] :], width + len(rows)
+        # columns of the panel, four at a time: each entry of the sum is loaded once for all
+        total = factor.image[:size]
+        for i in range(size):
+            total[i] = 0.0
+        for k in range(0, width - width % 4, 4):
+            p, q, r, s = four(panel, k, size)
+            a, b, c, d = own[k], own[k + 1], own[k + 2], own[k + 3]
+            for i in range(size):
+                total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
+        for k in range(width - width % 4, width):
+            column, value = panel[k * size :], own[k]
+            for i in range(size):
+                total[i] += value * column[i]
+        for i in range(width):
+            own[i] = total[i]
+        for i in range(len(rows)):
+            vector[rows[i]] -= total[width + i]
+
+
+@summing_kernel
+def solve_backward(factor, vector, marked):  # type: ignore
+    """Solve Cᵀ x = b in place, in the groups that are marked (groups,), with all ancestors."""
+    for group in range(len(marked) - 1, -1, -1):
+        if not marked[group]:
+            continue
+        start, width = factor.first[group], factor.first[group + 1] - factor.first[group]
+        rows = factor.rows[factor.below[group] : factor.below[group + 1]]
+        panel, size = factor.panels[factor.places[group] :], width + len(rows)
+        own, known = vector[start : start + width], factor.image[:size]
+        for i in range(width):
+            known[i] = own[i]
+        for i in range(len(rows)):
+            known[width + i] = -vector[rows[i]]
+        for k in range(0, width - width % 4, 4):
+            p, q, r, s = four(panel, k, size)
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for i in range(size):
+                a += p[i] * known[i]
+                b += q[i] * known[i]
+                c += r[i] * known[i]
+                d += s[i] * known[i]
+            own[k], own[k + 1], own[k + 2], own[k + 3] = a, b, c, d
+        for k in range(width - width % 4, width):
+            column, value = panel[k * size :], 0.0
+            for i in range(size):
+                value += column[i] * known[i]
+            own[k] = value

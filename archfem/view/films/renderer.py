@@ -29,8 +29,8 @@ from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import ground_acceleration
+from archfem.view.stress import Triangles
 from archfem.view.style import Colour, annotate, style_colour_bar
-from archfem.view.triangles import Triangles
 
 
 class Canvas:

@@ -16,8 +16,8 @@ from archfem.view.films.frames import frames_of_run
 from archfem.view.films.settings import Setup
 from archfem.view.joint_marks import support_outlines
 from archfem.view.positions import fields_at, recorded_fields
+from archfem.view.stress import Triangles
 from archfem.view.style import Colour
-from archfem.view.triangles import Triangles
 
 
 class Viewer:

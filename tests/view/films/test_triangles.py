@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from archfem.models.model import Cells
-from archfem.view.triangles import Triangles
+from archfem.view.stress import Triangles
 
 
 def cells_of(*outlines):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 import archfem as af
-from archfem.motion.averages import mean_accelerations
+from archfem.dynamics.solvers.equation import mean_accelerations
 
 
 @pytest.mark.parametrize("step", [0.002, 0.01, 0.0137, 0.05])
