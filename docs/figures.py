@@ -293,5 +293,6 @@ def verdict_range() -> None:
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    for draw in (signs, law, section, rules, frame, ladder, states, programme, tutorial, verdict_range):
+    drawings = (signs, law, section, rules, frame, ladder, states, programme)
+    for draw in (*drawings, tutorial, verdict_range):
         draw()

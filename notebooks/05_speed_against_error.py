@@ -46,7 +46,8 @@ for fidelity in ("rigid", "faces", "condensed", "full"):
 # ## How they differ
 #
 # Five springs a joint, as in Demirel and Aldemir (2021), on all nodes, are compared with three
-# coordinates a stone and the traction integrated in closed form. Rayleigh damping is the paper's too.
+# coordinates a stone and the traction integrated in closed form. Rayleigh damping is the
+# paper's too.
 
 # %%
 springs = af.build(ring, fidelity="full", quadrature="nodal")

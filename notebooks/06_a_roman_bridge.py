@@ -255,7 +255,7 @@ for name, scales in factors.items():
 #   still.
 # - **R, and the sign of the motion.** Each changes a verdict that is this close to its limit.
 #
-# How failures are counted decides more than all of these. Pairs of six with a mechanism at R = 3, by
+# How failures are counted decides more than these. Pairs of six with a mechanism at R = 3, by
 # four joints anywhere at once, four of one ring or pier at once, and four of one ring or pier over
 # the record, where a joint that has once failed counts from then on:
 #
@@ -267,7 +267,7 @@ for name, scales in factors.items():
 # | paper's law, restored, synthetic or reversed | 0 | 0 | 0 |
 # | joints that slide, synthetic or recorded | 0 | 0 | 0 |
 #
-# No motion of the blocks is verified in any of them. The paper has six and none. That it counts over
+# No motion of the blocks is verified in any. The paper has six and none. That it counts over
 # the record is an inference from its text ("hinging at various interfaces at different instants").
 #
 # The table gives the range at R = 3 under the first pair, by `tests/benchmarks/bridge_range.py`,

@@ -37,3 +37,22 @@ def test_a_copy_takes_along_what_it_refers_to(tmp_path):
 def test_a_name_that_is_none():
     with pytest.raises(af.InvalidInput, match=r"no case 'rign', but these: .*ring"):
         read_example("rign")
+
+
+def test_the_shipped_ring_stands_without_doubt_and_slides():
+    case = af.Case.read(list_examples()["ring"])
+    dead = af.cases.dead_load_of_case(case)
+    damping, _ = af.cases.damping_of(case, dead)
+    run = af.cases.run_time_history(case, case.ground_motion(), dead, damping)
+    assert (run.verdict.outcome, run.verdict.doubts) == ("stands", ())
+    assert 0.1 < run.verdict.displacement < 0.15
+    assert float(abs(run.joints["slip"]).max()) > 0.01
+    assert isinstance(damping, af.StiffnessDamping)
+
+
+def test_the_ring_of_the_paper_has_its_geometry_and_rayleigh_damping():
+    case = af.Case.read(list_examples()["ring_paper"])
+    ring = af.Case.read(list_examples()["ring"]).structure
+    assert (case.structure.blocks, case.structure.joints) == (ring.blocks, ring.joints)
+    assert case.damping == af.Rayleigh(0.05, (8.0, 16.0))
+    assert (case.model["fidelity"], case.discretisation.displacements) == ("full", "small")

@@ -30,7 +30,7 @@ def test_check_command(capsys):
 def test_run_of_a_ring_that_falls(tmp_path, capsys):
     given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
     assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 1
-    assert "does not stand under its own weight: joints hinge" in capsys.readouterr().err
+    assert "joints hinge" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_words_that_are_no_command_end_with_two(capsys):
 def test_a_quoted_name_may_be_changed(capsys):
     given = ["--set", 'contacts."stone to stone".friction=0.1', "--set", "model.fidelity=rigid"]
     assert af.commands.main(["check", str(RING), *given]) == 1
-    assert "does not stand under its own weight: joints slide" in capsys.readouterr().err
+    assert "joints slide" in capsys.readouterr().err
 
 
 def test_a_missing_record_is_told_before_anything_is_computed(tmp_path, capsys):

@@ -66,7 +66,10 @@ def test_criteria_of_a_case_are_obeyed(tmp_path, undrawn, capsys):
     assert run.criteria == af.Criteria(hinge=0.38)
     assert run.ending is af.dynamics.Ending.EVENT
     assert run.mechanism.time == run.time[-1]
-    assert f"local mechanism of arch at {run.mechanism.time:.3f}" in capsys.readouterr().out
+    assert (
+        f"Demirel and Aldemir: local mechanism of arch at {run.mechanism.time:.3f}"
+        in capsys.readouterr().out
+    )
     assert af.Case.read(tmp_path / "loose" / "case.toml").criteria == run.criteria
     assert af.Case.read(RING).criteria == af.Criteria()
 
@@ -99,12 +102,9 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
         "joints.png",
     }
     table = (out / "suite.txt").read_text()
-    assert re.search(
-        r"^first +no mechanism +none +0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE
-    )  # 1 m/s² by R = 2
-    assert re.search(
-        r"^second +no mechanism +none .*( +none){2} +-( +none){3} +reached 1\.00 s$", table, re.M
-    )
+    # 1 m/s² by R = 2
+    assert re.search(r"^first .* 0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE)
+    assert re.search(r"^second +no mechanism +none .* none +reached 1\.00 s$", table, re.MULTILINE)
     assert "finished before" not in capsys.readouterr().out
 
     before = (out / "second" / "history.nc").stat().st_mtime_ns
@@ -119,7 +119,7 @@ def test_one_line_runs_all_and_the_same_line_keeps_what_is_finished(small, undra
     assert run(small, "suite.scale=2") == 0
     assert "finished before" not in capsys.readouterr().out
     table = (out / "suite.txt").read_text()
-    assert re.search(r"^first +no mechanism +none +1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
+    assert re.search(r"^first .* 1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
 
 
 def told(small, shake):

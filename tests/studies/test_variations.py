@@ -1,4 +1,4 @@
-"""Runs over properties that nobody knows exactly: what is varied, and what each run gets."""
+"""Runs over uncertain properties: what is varied, and what each run gets."""
 
 from dataclasses import replace
 
