@@ -109,6 +109,8 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
     verdicts = [run.verdict for run in runs.values()]
     counts = [
         f"{sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)} of {len(runs)}"
+        if any(name in verdict.mechanisms for verdict in verdicts)
+        else "-"  # the definition does not apply
         for name in definitions
     ]
     rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])

@@ -68,7 +68,7 @@ class VerdictRange(ResultDisplay):
         """Return the share of the variance of the damage that each property explains [-].
 
         Damage is the rank of a run by its outcome and residual displacement. The share is the
-        correlation ratio of the ranks, numbers in three groups of equal size (a first-order index
+        correlation ratio of the ranks, numbers in three parts of their range (a first-order index
         of sensitivity; Saltelli and others, Global Sensitivity Analysis, 2008, section 1.2.6).
 
         Returns:
@@ -214,7 +214,9 @@ def _group_values(values: Array, groups: int = 3) -> list[tuple[str, NDArray[np.
             (f"{value:.3g}" if values.dtype.kind == "f" else str(value), values == value)
             for value in np.unique(values)
         ]
-    edges = np.quantile(values, np.linspace(0.0, 1.0, groups + 1))
+    # thirds of the range, of factors in their logarithm: the value as given is in the middle one
+    space = np.geomspace if values.min() > 0.0 else np.linspace
+    edges = space(values.min(), values.max(), groups + 1)
     members = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, groups - 1)
     return [
         (f"{edges[k]:.3g} to {edges[k + 1]:.3g}", members == k)
