@@ -2,32 +2,24 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from time import process_time
 
 import numpy as np
 from tqdm import tqdm
 
 from archfem._files import align_columns
-from archfem._typing import Array
-from archfem.dynamics.error_estimation import largest_difference, peak_eccentricities
-from archfem.dynamics.history import Ending
+from archfem.dynamics.error_estimation import TimedRun, largest_difference, time_run
 from archfem.dynamics.model_selection import (
-    MODEL_LEVELS,
     DampingChoice,
     discretisation_label,
-    reference_discretisation,
+    exact_discretisation,
     resolve_damping,
     stone_fidelity,
 )
-from archfem.dynamics.schemes import Viscous
-from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.masonry.structure import Structure
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
-from archfem.models.model import Model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium
 
 # Settings tried by default; quadratures with their points on a facet (None: default), steps in [s]
 TRIED_FIDELITIES = ("rigid", "faces", "condensed")
@@ -47,15 +39,6 @@ class Setting:
     def label(self) -> str:
         """Short text."""
         return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
-
-
-@dataclass(frozen=True)
-class TimedRun:
-    """Size, processor time and peaks of a run."""
-
-    size: int  # number of coordinates
-    seconds: float  # processor time of the time steps, without building the model [s]
-    peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
 
 
 @dataclass(frozen=True)
@@ -157,7 +140,7 @@ def accuracy(
 
 def reference_settings(structure: Structure, dt: float = 0.00125) -> tuple[Setting, Setting]:
     """Return the reference, and a coarser setting for the error of the reference."""
-    finest = reference_discretisation(structure, MODEL_LEVELS[-1])
+    finest = exact_discretisation(structure, "condensed", (12, 12))
     halved = replace(finest, cells=(finest.through // 2, finest.along // 2))
     return Setting(finest, dt), Setting(halved, 2.0 * dt)
 
@@ -178,26 +161,6 @@ def candidate_settings(
             for cells in [(1, 1)] if meshless else meshes:
                 settings = Discretisation(fidelity, cells, quadrature=rule, points=points)
                 yield from (Setting(settings, dt) for dt in steps)
-
-
-def time_run(
-    model: Model,
-    motion: Motion,
-    damping: Viscous | None,
-    dt: float,
-    start: Equilibrium | None = None,
-) -> TimedRun:
-    """Run a model and measure the processor time."""
-    # two steps beforehand, so that compilation is not measured
-    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
-    begin = process_time()
-    try:
-        run = time_history(model, motion, damping=damping, dt=dt, start=start)
-    except DidNotConverge:
-        return TimedRun(model.size, process_time() - begin, None)
-    if run.ending is Ending.INTERRUPTED:
-        raise KeyboardInterrupt
-    return TimedRun(model.size, process_time() - begin, peak_eccentricities(run))
 
 
 def compare_runs(
