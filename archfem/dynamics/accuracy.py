@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from time import process_time
 
 import numpy as np
 from tqdm import tqdm
 
 from archfem._files import align_columns
-from archfem.dynamics.error_estimation import TimedRun, largest_difference, time_run
+from archfem._typing import Array
+from archfem.dynamics.error_estimation import largest_difference, run_peaks
 from archfem.dynamics.model_selection import (
     DampingChoice,
     discretisation_label,
@@ -15,11 +17,15 @@ from archfem.dynamics.model_selection import (
     resolve_damping,
     stone_fidelity,
 )
+from archfem.dynamics.schemes import Viscous
+from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
 from archfem.masonry.structure import Structure
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
+from archfem.models.model import Model
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import Equilibrium
 
 # Settings tried by default; quadratures with their points on a facet (None: default), steps in [s]
 TRIED_FIDELITIES = ("rigid", "faces", "condensed")
@@ -39,6 +45,15 @@ class Setting:
     def label(self) -> str:
         """Short text."""
         return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
+
+
+@dataclass(frozen=True)
+class TimedRun:
+    """Size, processor time and peaks of a run."""
+
+    size: int  # number of coordinates
+    seconds: float  # processor time of the time steps, without building the model [s]
+    peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
 
 
 @dataclass(frozen=True)
@@ -161,6 +176,21 @@ def candidate_settings(
             for cells in [(1, 1)] if meshless else meshes:
                 settings = Discretisation(fidelity, cells, quadrature=rule, points=points)
                 yield from (Setting(settings, dt) for dt in steps)
+
+
+def time_run(
+    model: Model,
+    motion: Motion,
+    damping: Viscous | None,
+    dt: float,
+    start: Equilibrium | None = None,
+) -> TimedRun:
+    """Run a model and measure the processor time."""
+    # two steps beforehand, so that compilation is not measured
+    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
+    begin = process_time()
+    peaks = run_peaks(model, motion, damping, dt, start).peaks
+    return TimedRun(model.size, process_time() - begin, peaks)
 
 
 def compare_runs(

@@ -15,7 +15,6 @@ the largest rotation of a joint.
 """
 
 from dataclasses import dataclass
-from time import process_time
 
 import numpy as np
 from scipy.sparse.linalg import eigsh
@@ -41,13 +40,13 @@ ERROR_PER_ROTATION = 3.0
 CONVERGENCE_ORDER = 1.5
 
 
-def strongest_window(motion: Motion, share: float = 0.8, least: float = 2.0) -> Motion:
+def strongest_window(motion: Motion, share: float = 0.7, least: float = 2.0) -> Motion:
     """Return the shortest part with a share of the Arias intensity, of at least some seconds."""
     energy = np.cumsum(np.append(0.0, motion.horizontal**2))
     starts = np.flatnonzero(energy <= (1.0 - share) * energy[-1])
     # round-off must not put the end of the last part beyond the motion
     ends = np.searchsorted(energy, np.minimum(energy[starts] + share * energy[-1], energy[-1]))
-    shortest = int(np.argmin(np.maximum(ends - starts, least / motion.dt)))
+    shortest = int(np.argmin(np.maximum(ends - starts, 1)))
     start, end = motion.dt * starts[shortest], motion.dt * ends[shortest]
     return motion.cut(start, min(max(end, start + least), motion.duration))
 
@@ -88,37 +87,31 @@ def largest_difference(first: Array, second: Array) -> float:
 
 
 @dataclass(frozen=True)
-class TimedRun:
-    """Size, processor time and peaks of a run."""
+class RunPeaks:
+    """Peaks of a run."""
 
-    size: int  # number of coordinates
-    seconds: float  # processor time of the time steps, without building the model [s]
     peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
     rotation: float = 0.0  # largest rotation of a joint [rad]
 
 
-def time_run(
+def run_peaks(
     model: Model,
     motion: Motion,
     damping: Viscous | None,
     dt: float,
     start: Equilibrium | None = None,
-) -> TimedRun:
-    """Run a model and measure the processor time."""
-    # two steps beforehand, so that compilation is not measured
-    time_history(model, motion.cut(0.0, 2.0 * dt), damping=damping, dt=dt, start=start)
-    begin = process_time()
+) -> RunPeaks:
+    """Run a model and return its peaks."""
     try:
         run = time_history(model, motion, damping=damping, dt=dt, start=start)
     except DidNotConverge:
-        return TimedRun(model.size, process_time() - begin, None)
+        return RunPeaks(None)
     if run.ending is Ending.INTERRUPTED:
         raise KeyboardInterrupt
-    seconds, rotation = process_time() - begin, float(np.abs(run.joints["rotation"]).max())
-    return TimedRun(model.size, seconds, peak_eccentricities(run), rotation)
+    return RunPeaks(peak_eccentricities(run), float(np.abs(run.joints["rotation"]).max()))
 
 
-def estimate_errors(runs: list[TimedRun]) -> list[float]:
+def estimate_errors(runs: list[RunPeaks]) -> list[float]:
     """Return the error of each run in the largest |e| of a joint [-].
 
     Each run has half the cell size and half the time step of the one before.

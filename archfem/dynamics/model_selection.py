@@ -2,26 +2,26 @@
 
 The selection runs settings over the strongest part of the motion, each with half the cell size and
 half the time step of the one before, until the predicted error is within the tolerance
-(`dynamics.error_estimation`). So it costs less than the run for which it selects.
+(`dynamics.error_estimation`). The series of their costs is geometric, so that a selection takes no
+longer than the run for which it selects.
 """
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import process_time
 
 from tqdm import tqdm
 
 from archfem._validation import check_number, check_type
 from archfem.dynamics.error_estimation import (
     ERROR_PER_ROTATION,
-    TimedRun,
+    RunPeaks,
     default_damping,
     estimate_errors,
+    run_peaks,
     severe_motion,
     strongest_window,
-    time_run,
 )
 from archfem.dynamics.schemes import Viscous
 from archfem.errors import InvalidInput
@@ -33,7 +33,6 @@ from archfem.models.discretisation import Discretisation
 from archfem.models.model import Doubt, Model, Prediction
 from archfem.models.rigid import build_rigid_model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import dead_load
 
 logger = logging.getLogger("archfem")
 
@@ -87,8 +86,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             Or fidelities by block name or part, with "rest" for all others, for example
             {"backfill": "full", "rest": "faces"}.
             Or "auto": fidelity, mesh and time step with a predicted error below the tolerance,
-            stored as `prediction` of the model. The selection takes no longer than the run; a
-            cheaper setting is left out where finding it takes longer than running it.
+            stored as `prediction` of the model; selected by short runs, the cheapest first.
         cells: minimum number of cells through the thickness (facets on a joint) and along each
             block.
         cell: "quadrilateral" or "triangle".
@@ -173,23 +171,18 @@ def select_model(
     Discretisation(displacements=displacements)  # refuses values other than small and large
     settings = _settings_to_try(structure, tolerance, dt)
     trials, history = _try_settings(structure, settings, tolerance, motion, damping, builder)
-    errors, spent = history[-1], sum(trial.spent for trial in trials)
-    # a setting that meets the tolerance, but runs in less time than was spent, came too late
-    chosen = next(
-        (
-            number
-            for number, trial in enumerate(trials)
-            if errors[number] <= tolerance and trial.cost >= spent and trial.dt == (dt or trial.dt)
-        ),
-        -1,
-    )
-    trial, rotation = trials[chosen], max(each.run.rotation for each in trials)
+    # a coarser setting is chosen where running it takes longer than finding it: each setting takes
+    # two to three times as long as the one before, over a quarter of the motion at most
+    coarser = trials[-1].share <= 0.25 and dt is None
+    within = [number for number, error in enumerate(history[-1]) if error <= tolerance]
+    chosen = within[0] if within and coarser else len(trials) - 1
+    trial, error = trials[chosen], history[-1][chosen]
     names = (f"{discretisation_label(each.settings)} {1e3 * each.dt:g} ms" for each in trials)
-    model, small = trial.model, ERROR_PER_ROTATION * rotation
+    model, small = trial.model, ERROR_PER_ROTATION * max(each.run.rotation for each in trials)
     if displacements == "large":
         model, small = builder(structure, replace(trial.settings, displacements="large")), 0.0
-    candidates = tuple(zip(names, errors, strict=True))
-    prediction = Prediction(errors[chosen], tolerance, trial.dt, candidates, small)
+    candidates = tuple(zip(names, history[-1], strict=True))
+    prediction = Prediction(error, tolerance, trial.dt, candidates, small)
     model = model.with_prediction(prediction)
     doubts = tuple(_doubts(prediction, stagnates=_stagnates(history), prescribed=dt is not None))
     for doubt in doubts:
@@ -221,9 +214,8 @@ class _Trial:
     settings: Discretisation
     dt: float  # time step [s]
     model: Model
-    run: TimedRun
-    spent: float  # processor time of building the model, its dead load and the run [s]
-    cost: float  # processor time that the whole motion would take [s]
+    run: RunPeaks
+    share: float  # of the motion that was run [-]
 
 
 def _try_settings(
@@ -240,15 +232,12 @@ def _try_settings(
     for discretisation, dt in tqdm(
         settings, unit="run", disable=None, leave=False, desc="choosing a model"
     ):
-        begin = process_time()
         model = builder(structure, discretisation)
-        dead = dead_load(model)
-        seconds = process_time() - begin
         if not trials:
             motion, window, damping = _resolve_excitation(model, motion, damping)
-        run = time_run(model, window, damping, dt, dead)
-        cost = run.seconds * motion.duration / window.duration
-        trials.append(_Trial(discretisation, dt, model, run, seconds + run.seconds, cost))
+        run = run_peaks(model, window, damping, dt)
+        share = window.duration / motion.duration
+        trials.append(_Trial(discretisation, dt, model, run, share))
         history.append(estimate_errors([trial.run for trial in trials]))
         if history[-1][-1] <= tolerance or _stagnates(history):
             break

@@ -22,11 +22,12 @@ from archfem.cases.run import expected_damping
 from archfem.dynamics.accuracy import (
     Accuracy,
     Setting,
+    TimedRun,
     candidate_settings,
     compare_runs,
     reference_settings,
+    time_run,
 )
-from archfem.dynamics.error_estimation import TimedRun, time_run
 from archfem.dynamics.schemes import Viscous
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.builder import build
