@@ -116,11 +116,11 @@ def estimate_errors(runs: list[RunPeaks]) -> list[float]:
 
     Each run has half the cell size and half the time step of the one before.
     """
-    if len(runs) < 2 or any(run.peaks is None for run in runs[-2:]):
+    finest = runs[-1].peaks
+    if len(runs) < 2 or finest is None or runs[-2].peaks is None:
         return [np.inf] * len(runs)
     differences = [
-        np.inf if run.peaks is None else largest_difference(run.peaks, runs[-1].peaks)
-        for run in runs
+        np.inf if run.peaks is None else largest_difference(run.peaks, finest) for run in runs
     ]
-    finest = differences[-2] / (2.0**CONVERGENCE_ORDER - 1.0)
-    return [difference + finest for difference in differences]
+    remaining = differences[-2] / (2.0**CONVERGENCE_ORDER - 1.0)
+    return [difference + remaining for difference in differences]

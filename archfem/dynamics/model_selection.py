@@ -229,14 +229,14 @@ def _try_settings(
     """Return settings tried until one is accurate enough, and all errors after each trial."""
     trials: list[_Trial] = []
     history: list[list[float]] = []
+    excitation: tuple[Motion, Viscous | None, float] | None = None
     for discretisation, dt in tqdm(
         settings, unit="run", disable=None, leave=False, desc="choosing a model"
     ):
         model = builder(structure, discretisation)
-        if not trials:
-            motion, window, damping = _resolve_excitation(model, motion, damping)
-        run = run_peaks(model, window, damping, dt)
-        share = window.duration / motion.duration
+        excitation = excitation or _resolve_excitation(model, motion, damping)
+        window, viscous, share = excitation
+        run = run_peaks(model, window, viscous, dt)
         trials.append(_Trial(discretisation, dt, model, run, share))
         history.append(estimate_errors([trial.run for trial in trials]))
         if history[-1][-1] <= tolerance or _stagnates(history):
@@ -246,15 +246,15 @@ def _try_settings(
 
 def _resolve_excitation(
     model: Model, motion: Motion | None, damping: DampingChoice
-) -> tuple[Motion, Motion, Viscous | None]:
-    """Return motion, its strongest part and damping; unknown motion and damping are assumed."""
+) -> tuple[Motion, Viscous | None, float]:
+    """Return the strongest part of the motion, damping, and the share of this part in time."""
     structure = model.structure
     soil = bool(find_soft_blocks(structure))
     probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
-    damping = resolve_damping(model, damping) or default_damping(probe)
-    if motion is None:
-        motion = severe_motion(probe)
-    return motion, strongest_window(motion), damping
+    motion = severe_motion(probe) if motion is None else motion
+    window = strongest_window(motion)
+    viscous = resolve_damping(model, damping) or default_damping(probe)
+    return window, viscous, window.duration / motion.duration
 
 
 def resolve_damping(model: Model, damping: DampingChoice) -> Viscous | None:
