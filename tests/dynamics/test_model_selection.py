@@ -79,7 +79,7 @@ def test_a_loose_tolerance_begins_with_a_coarser_setting(chosen):
 
 
 def test_where_none_is_good_enough_the_best_is_taken(chosen):
-    told = chosen.of(0.40, 0.30, 0.25, 0.23)
+    told = chosen.of(0.39, 0.29, 0.24, 0.22)
     assert told.dt == 0.000625
     assert not told.is_met
     assert "no finer setting is tried" in str(chosen.model.doubts[-1])
@@ -90,6 +90,12 @@ def test_refinement_ends_where_it_changes_no_less_than_before(chosen):
     assert len(chosen.steps) == 3
     assert told.error == pytest.approx(0.06 * REST)
     assert "impacts decide" in chosen.model.doubts[-1].remedy
+
+
+@pytest.mark.parametrize(("largest", "rocks"), [(0.39, False), (0.41, True)])
+def test_no_prediction_is_trusted_where_a_stack_rocks(chosen, largest, rocks):
+    chosen.of(largest, largest)
+    assert [f"up to {largest}" in doubt.cause for doubt in chosen.model.doubts] == [True] * rocks
 
 
 def test_a_step_that_is_asked_for_is_compared_with_one_twice_as_long(chosen):
