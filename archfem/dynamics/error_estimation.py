@@ -40,14 +40,15 @@ ERROR_PER_ROTATION = 3.0
 CONVERGENCE_ORDER = 1.5
 
 
-def strongest_window(motion: Motion, share: float = 0.7, least: float = 2.0) -> Motion:
+def strongest_window(motion: Motion, share: float = 0.7, least: float = 4.0) -> Motion:
     """Return the shortest part with a share of the Arias intensity, of at least some seconds."""
     energy = np.cumsum(np.append(0.0, motion.horizontal**2))
     starts = np.flatnonzero(energy <= (1.0 - share) * energy[-1])
     # round-off must not put the end of the last part beyond the motion
     ends = np.searchsorted(energy, np.minimum(energy[starts] + share * energy[-1], energy[-1]))
     shortest = int(np.argmin(np.maximum(ends - starts, 1)))
-    start, end = motion.dt * starts[shortest], motion.dt * ends[shortest]
+    end = motion.dt * ends[shortest]
+    start = max(0.0, min(motion.dt * starts[shortest], motion.duration - least))
     return motion.cut(start, min(max(end, start + least), motion.duration))
 
 
