@@ -72,7 +72,7 @@ af.view.draw_accuracy(found)
 # %% [markdown]
 # ## Automatic selection
 #
-# `fidelity="auto"` runs steps and candidates on the strongest part of the motion, cheapest first.
+# `fidelity="auto"` runs settings on the strongest part of the motion, cheapest first.
 # It stops when the error it predicts for the largest $|e|$ of every joint is within the tolerance.
 
 # %%
@@ -82,8 +82,8 @@ print(chosen.fidelity, chosen.size, chosen.prediction.text)
 # %% [markdown]
 # ## Was the prediction honest?
 #
-# The ratio of the predicted error to the actual one should be slightly above one.
-# The errors of model and steps are added, though they may cancel.
+# The ratio of the predicted error to the actual one should be near one.
+# It is an estimate, and may be half or three times the actual error.
 
 # %%
 reference = af.build(ring, fidelity="condensed", cells=(12, 12), quadrature="exact")

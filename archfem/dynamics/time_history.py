@@ -119,9 +119,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         dt: time step [s]; by default the step for which the model was selected, or else steps of
             varying length by `tolerance`. Accelerations between samples are interpolated.
         tolerance: admissible error of |e| of the joints of rings and piers from time stepping [-],
-            without `dt`; by default that for which the model was selected, or 0.005. Steps are from
-            0.1 to 20 ms long; `tolerance_unmet` of the history is the share of the shortest steps
-            in which the error was larger.
+            without `dt`; by default 0.005. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of
+            the history is the share of the shortest steps in which the error was larger.
         start: dead load, computed if not given, or the `last_state` of an earlier run, which is
             then continued.
         damping: `StiffnessDamping`, also from `effective_damping` or `restitution_damping`;
@@ -229,7 +228,7 @@ def _resolve_steps(
             raise InvalidInput(f"tolerance {tolerance!r} on |e| is not between 0 and 1: try 0.005")
         return None, tolerance
     if dt is None and model.prediction:
-        return model.prediction.dt, model.prediction.step_tolerance or default
+        return model.prediction.dt, default
     if dt is not None and not MIN_TIME_STEP <= check_number(dt, "dt [s]") <= 0.1:
         raise InvalidInput(f"dt {dt!r} s is not between {MIN_TIME_STEP:g} and 0.1 s")
     return dt, default

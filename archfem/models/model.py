@@ -148,27 +148,19 @@ class Prediction:
     """Predicted errors of a model chosen by `build(fidelity="auto")`, and its time step.
 
     Attributes:
-        error: error of the largest |e| of the worst joint, of model and time step [-].
-        time_step_error: part of `error` due to the time step [-].
+        error: estimated error of the largest |e| of the worst joint, of model and time step [-].
         tolerance: requested tolerance of the largest |e| [-].
-        dt: time step with which the error is met [s]; None with adaptive steps.
-        step_tolerance: tolerance of |e| of adaptive steps [-]; None with a fixed time step.
-        candidates: names and predicted errors of the settings tried, in order: time steps first,
-            then models with the chosen step.
-        small_displacement_error: error of assuming small displacements, the same for every
-            fidelity [-]; infinite where blocks fall that stand under this assumption.
-        chaotic_spread: spread of the largest |e| due to impacts, the deviation from linear growth
-            over motions 1 and 2 % weaker and stronger [-]; a lower bound of every error.
+        dt: time step with which the error is met [s].
+        candidates: names and estimated errors of the settings tried, in order.
+        small_displacement_error: estimated error of assuming small displacements, the same for
+            every fidelity [-].
     """
 
     error: float
-    time_step_error: float
     tolerance: float
-    dt: float | None
-    step_tolerance: float | None
+    dt: float
     candidates: tuple[tuple[str, float], ...]
     small_displacement_error: float = 0.0
-    chaotic_spread: float = 0.0
 
     @property
     def is_met(self) -> bool:
@@ -178,16 +170,11 @@ class Prediction:
     @property
     def text(self) -> str:
         """Summary of the prediction and of all settings tried."""
-        steps = (
-            f"{1e3 * self.dt:g} ms" if self.dt else f"tolerance {self.step_tolerance:.2g} in |e|"
-        )
         tried = "; ".join(f"{name}: {error:.2g}" for name, error in self.candidates)
         return (
-            f"predicted error {self.error:.2g} in the largest |e|, of which "
-            f"{self.time_step_error:.2g} by steps of {steps}, and "
-            f"{self.small_displacement_error:.2g} by the assumption of small displacements; "
-            f"tolerance {self.tolerance:g} (tried: {tried}); impacts spread it by "
-            f"{self.chaotic_spread:.2g}"
+            f"predicted error {self.error:.2g} in the largest |e| by model and steps of "
+            f"{1e3 * self.dt:g} ms, and {self.small_displacement_error:.2g} by the assumption of "
+            f"small displacements; tolerance {self.tolerance:g} (tried: {tried})"
         )
 
 

@@ -1,124 +1,126 @@
-"""Selection of model and time step, by known errors and by candidates."""
+"""Selection of model and time step, by runs whose peaks are known."""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import archfem as af
 from archfem.dynamics import model_selection
-from archfem.dynamics.model_selection import (
-    MODEL_LEVELS,
-    candidate_discretisations,
-    discretisation_label,
-    reference_discretisation,
-)
-from archfem.models.builder import build
+from archfem.dynamics.error_estimation import RunPeaks
+from archfem.dynamics.model_selection import discretisation_label, exact_discretisation
 from archfem.models.builder import build as plain
 
 BLOCK = af.column(breadth=1.0, heights=[1.0])
+MOTION = af.Motion(np.append(np.ones(401), np.zeros(1600)), 0.01)
+"""Twenty seconds, of which about three hold seven tenths of the intensity."""
 
 
-class Known:
-    """An estimator of known errors: of steps by their tolerance, of models in the order asked."""
+class Chosen:
+    """A selection by known peaks; what it runs, and the model it returns."""
 
-    model = None
-    window = damping = None
+    def __init__(self, monkeypatch):
+        self.steps, self.model = [], None
+        self._patch = monkeypatch
 
-    def __init__(self, in_time, in_model, chance=0.0):
-        self._time, self._errors, self._chance = in_time, iter(in_model), chance
-        self.paces, self.asked = [], 0
+    def of(self, *peaks, turn=0.0, tolerance=0.01, dt=None, **given):
+        """Select by runs of these largest |e|."""
+        self.steps, rigid = [], plain(BLOCK, af.models.Discretisation("rigid"))
 
-    def time_step_error(self, steps):
-        self.paces.append(steps.step_tolerance)
-        return self._time[len(self.paces) - 1]
+        def run(model, motion, damping, step):
+            number = len(self.steps)
+            self.steps.append(step)
+            return RunPeaks(np.array([0.1, peaks[number]]), turn)
 
-    def model_error(self, model, steps):
-        self.asked += 1
-        return next(self._errors)
-
-    def with_reference(self, finer):
-        return self
-
-    def chaotic_spread(self, model, steps):
-        return self._chance
+        self._patch.setattr(model_selection, "run_peaks", run)
+        self.model = model_selection.select_model(
+            BLOCK, tolerance, MOTION, dt=dt, builder=lambda *_: rigid, **given
+        )
+        return self.model.prediction
 
 
 @pytest.fixture
-def choose(monkeypatch):
-    """Select by such an estimator, all models the same."""
-
-    def chosen(known, tolerance=0.01, dt=None):
-        known.model = plain(BLOCK, af.models.Discretisation("rigid"))
-        monkeypatch.setattr(model_selection, "_make_estimator", lambda *_: known)
-        monkeypatch.setattr(model_selection, "small_displacement_error", lambda *_: 0.0)
-        return model_selection.select_model(BLOCK, tolerance, dt=dt, builder=lambda *_: known.model)
-
-    return chosen
+def chosen(monkeypatch):
+    return Chosen(monkeypatch)
 
 
-def test_the_first_model_within_what_steps_leave_is_chosen(choose):
-    """Steps err by 0.002 of 0.01: models may by 0.008, to either side of which they lie here."""
-    known = Known([0.002], [0.02, 0.0081, 0.0079, 1.0])
-    told = choose(known).prediction
-    assert known.asked == 3
-    assert told.error == pytest.approx(0.0099)
-    assert (told.time_step_error, told.is_met, told.step_tolerance) == (0.002, True, 0.005)
-    errors = [error for _, error in told.candidates]
-    assert errors == pytest.approx([0.002, 0.022, 0.0101, 0.0099])
-    assert [name.split(" exact")[0] for name, _ in told.candidates[1:]] == [
-        "rigid 1×1",
-        "faces 2×2",
-        "faces 4×4",
+REST = 1.0 / (2.0**1.5 - 1.0)
+
+
+def test_the_first_setting_within_the_tolerance_is_chosen(chosen):
+    told = chosen.of(0.30, 0.27, 0.266)
+    assert chosen.steps == [0.005, 0.0025, 0.00125]
+    assert told.error == pytest.approx(0.004 * (1.0 + REST))
+    assert told.dt == 0.0025
+    assert [name for name, _ in told.candidates] == [
+        "faces 4×4 exact 5 ms",
+        "faces 8×8 exact 2.5 ms",
+        "condensed 8×8 exact 1.25 ms",
     ]
+    errors = [error for _, error in told.candidates]
+    assert errors == pytest.approx([0.034 + 0.004 * REST, told.error, 0.004 * REST])
+    assert told.is_met
+    assert not chosen.model.doubts
 
 
-def test_steps_leave_half_of_the_tolerance_whatever_they_err_by(choose):
-    known = Known([0.007] * 9, [0.0051, 0.0049])
-    told = choose(known).prediction
-    assert known.asked == 2
-    assert told.error == pytest.approx(0.0119)
+def test_a_cheap_setting_that_took_longer_to_find_than_to_run_is_not_chosen(chosen, monkeypatch):
+    """Where the strongest part is most of the motion."""
+    monkeypatch.setattr(model_selection, "strongest_window", lambda motion: motion)
+    told = chosen.of(0.300, 0.299)
+    assert told.dt == 0.0025
+    assert told.error == pytest.approx(0.001 * REST)
+
+
+def test_a_loose_tolerance_begins_with_a_coarser_setting(chosen):
+    assert chosen.of(0.30, 0.299, tolerance=0.02).dt == 0.01
+    assert chosen.steps == [0.01, 0.005]
+    chosen.of(0.30, 0.299, tolerance=0.019)
+    assert chosen.steps == [0.005, 0.0025]
+
+
+def test_where_none_is_good_enough_the_best_is_taken(chosen):
+    told = chosen.of(0.39, 0.29, 0.24, 0.22)
+    assert told.dt == 0.000625
     assert not told.is_met
+    assert "no finer setting is tried" in str(chosen.model.doubts[-1])
 
 
-def test_where_none_is_good_enough_the_best_is_taken(choose):
-    model = choose(Known([0.002], [0.03, 0.012, 0.05, 0.02, 0.04, 0.013]))
-    assert model.prediction.error == pytest.approx(0.014)
-    assert len(model.prediction.candidates) == 1 + 6
-    assert "no finer mesh is tried" in str(model.doubts[-1])
+def test_refinement_ends_where_it_changes_no_less_than_before(chosen):
+    told = chosen.of(0.40, 0.35, 0.29)
+    assert len(chosen.steps) == 3
+    assert told.error == pytest.approx(0.06 * REST)
+    assert "impacts decide" in chosen.model.doubts[-1].remedy
 
 
-def test_steps_are_shortened_until_they_err_by_half_of_the_tolerance(choose):
-    """Their tolerance falls by four at a time, and not below 1e-4; else the best of them is taken.
-
-    The 2^-n of 0.005: 5e-3, 1.25e-3 and 3.1e-4 are tried.
-    """
-    known = Known([0.02, 0.0051, 0.0049, 0.0], [0.0])
-    told = choose(known).prediction
-    assert known.paces == pytest.approx([0.005, 0.00125, 0.0003125])
-    assert (told.time_step_error, told.step_tolerance) == (0.0049, pytest.approx(0.0003125))
-    known = Known([0.02, 0.006, 0.008, 0.0], [0.0])
-    told = choose(known).prediction
-    assert len(known.paces) == 3
-    assert (told.time_step_error, told.step_tolerance) == (0.006, pytest.approx(0.00125))
-    known = Known([0.02, 0.0], [0.0])
-    choose(known, tolerance=1.5e-4)
-    assert known.paces == [1e-4]
+@pytest.mark.parametrize(("largest", "rocks"), [(0.39, False), (0.41, True)])
+def test_no_prediction_is_trusted_where_a_stack_rocks(chosen, largest, rocks):
+    chosen.of(largest, largest)
+    assert [f"up to {largest}" in doubt.cause for doubt in chosen.model.doubts] == [True] * rocks
 
 
-def test_no_error_is_predicted_below_what_is_chance(choose):
-    told = choose(Known([0.001], [0.002], chance=0.003)).prediction
-    assert told.error == pytest.approx(0.004)
-    assert told.chaotic_spread == 0.003
-    model = choose(Known([0.001], [0.002], chance=0.0091))
-    assert "impacts decide" in str(model.doubts[-1])
+def test_a_step_that_is_asked_for_is_compared_with_one_twice_as_long(chosen):
+    told = chosen.of(0.40, 0.30, dt=0.01)
+    assert chosen.steps == [0.02, 0.01]
+    assert told.dt == 0.01
+    assert "leave dt out" in chosen.model.doubts[-1].remedy
+    assert chosen.of(0.3, 0.3, dt=0.01).dt == 0.01
 
 
-def test_a_step_that_is_asked_for_is_judged_alone(choose):
-    known = Known([0.02], [0.0])
-    model = choose(known, dt=0.01)
-    assert known.paces == [None]
-    assert (model.prediction.dt, model.prediction.step_tolerance) == (0.01, None)
-    assert "leave dt out" in str(model.doubts[-1])
+def test_what_joints_turn_is_doubted_of_small_displacements(chosen):
+    told = chosen.of(0.3, 0.3, turn=0.004)
+    assert told.small_displacement_error == pytest.approx(0.012)
+    assert "by the assumption of small displacements" in told.text
+    (doubt,) = chosen.model.doubts
+    assert "small errs by about 0.012" in doubt.cause
+    assert "displacements='large'" in doubt.remedy
+
+
+def test_a_choice_may_be_of_large_displacements(chosen):
+    """They are built once, of the choice; nothing is left to doubt about their size."""
+    assert chosen.of(0.3, 0.3, turn=0.004, displacements="large").small_displacement_error == 0.0
+    assert not chosen.model.doubts
+    with pytest.raises(af.InvalidInput, match="displacements 'huge' are not known"):
+        chosen.of(0.3, 0.3, displacements="huge")
 
 
 def test_damping_is_found_of_a_model_where_it_is_asked_for():
@@ -132,28 +134,6 @@ def test_damping_is_found_of_a_model_where_it_is_asked_for():
     assert model_selection.resolve_damping(found, None) is None
 
 
-FIRST = ["rigid 1×1 exact", "faces 2×2 exact", "faces 4×4 exact", "condensed 4×4 exact"]
-SECOND = ["faces 8×8 exact", "condensed 8×8 exact"]
-FINER = ["condensed 8×8 exact", "condensed 12×12 exact"]
-"""Another copy of what `build` with "auto" goes through, the cheapest first."""
-
-
-def test_models_come_the_cheapest_first(ring):
-    found = [
-        [discretisation_label(each) for each in candidate_discretisations(ring, level)]
-        for level in MODEL_LEVELS
-    ]
-    assert found == [FIRST, SECOND]
-    assert [
-        discretisation_label(reference_discretisation(ring, level)) for level in MODEL_LEVELS
-    ] == FINER
-    sizes = [
-        build(af.column(breadth=1.0, heights=[1.0]), each).size
-        for each in candidate_discretisations(ring, MODEL_LEVELS[0])
-    ]
-    assert sizes == sorted(sizes)
-
-
 def test_soil_keeps_its_nodes_and_is_never_rigid():
     stack = af.column(breadth=1.0, heights=[1.0])
     soft = af.Block(
@@ -162,12 +142,9 @@ def test_soil_keeps_its_nodes_and_is_never_rigid():
     contact = af.masonry.SOIL_TO_STONE
     bed = af.Joint((1, 2), (-0.5, 1.0), (0.5, 1.0), contact, "bed", "fill", "other")
     structure = af.Structure((*stack.blocks, soft), (*stack.joints, bed))
-    found = [
-        discretisation_label(each) for each in candidate_discretisations(structure, MODEL_LEVELS[0])
-    ]
-    assert found == [f"{each.replace(' ', ' + soil ', 1)}" for each in FIRST[1:]]
-    (first, *_) = candidate_discretisations(structure, MODEL_LEVELS[0])
-    assert first.fidelity == {"soil": "full", "rest": "faces"}
+    found = exact_discretisation(structure, "faces", (2, 2))
+    assert discretisation_label(found) == "faces + soil 2×2 exact"
+    assert found.fidelity == {"soil": "full", "rest": "faces"}
 
 
 @pytest.mark.parametrize(

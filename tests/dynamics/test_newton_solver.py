@@ -39,7 +39,11 @@ def _steps(equation, start, widest):
 
 
 @pytest.mark.parametrize("damping", [None, af.StiffnessDamping(0.05, 8.0)])
-@pytest.mark.parametrize("widest", [40, 0], ids=["band", "sparse factor"])
+# the sparse factor of small displacements, which "auto" never selects, compiles for 20 s
+@pytest.mark.parametrize(
+    "widest",
+    [pytest.param(40, id="band"), pytest.param(0, id="sparse factor", marks=pytest.mark.slow)],
+)
 def test_it_gives_the_history_of_snes(damping, widest):
     """And the same bits again, whether the tangent is a band or sparse."""
     equation, start = sliding_ring(damping=damping)

@@ -25,10 +25,8 @@ GIVEN = {"damping": DAMPING, "dt": 0.005}
 def test_a_model_knows_what_was_predicted_of_it(model):
     foreseen = af.models.Prediction(
         error=0.003,
-        time_step_error=0.001,
         tolerance=0.005,
         dt=0.0025,
-        step_tolerance=None,
         candidates=(),
     )
     chosen = model.with_prediction(foreseen)
@@ -161,10 +159,7 @@ def test_steps_are_those_asked_for_or_foreseen_or_chosen_by_a_tolerance(model):
     for dt in (0.99e-6, 0.101):
         with pytest.raises(af.InvalidInput, match=r"is not between 1e-06 and 0\.1 s"):
             _resolve_steps(model, dt, None)
-    told = {"error": 0.0, "time_step_error": 0.0, "tolerance": 0.01, "candidates": ()}
-    paced = model.with_prediction(af.models.Prediction(dt=None, step_tolerance=0.003, **told))
-    stepped = model.with_prediction(af.models.Prediction(dt=0.002, step_tolerance=None, **told))
-    assert _resolve_steps(paced, None, None) == (None, 0.003)
+    stepped = model.with_prediction(af.models.Prediction(0.0, 0.01, 0.002, ()))
     assert _resolve_steps(stepped, None, None) == (0.002, 0.005)
     assert _resolve_steps(stepped, 0.004, None) == (0.004, 0.005)
 

@@ -1,0 +1,131 @@
+"""Cost of `fidelity="auto"`, and its predicted error beside the actual one: twelve scenes.
+
+    python tests/benchmarks/predicted_error.py [--tolerance 0.005] [SCENE …]
+
+The cost of choosing is that of `build` less that of building the chosen model by name; the cost of
+running is that of the whole motion in the chosen steps. Both are processor times without
+compilation. The actual error is that of this run in the largest |e| of the worst joint. Its
+reference has 12 × 12 cells on each stone and steps of 0.625 ms, with soil 12 × 12 and 1.25 ms.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+from time import process_time
+
+from scenes import arch_on_piers, ring, with_friction
+from setting import plain_options
+from timing import table
+
+import archfem as af
+from archfem.dynamics.accuracy import time_run
+from archfem.dynamics.error_estimation import (
+    default_damping,
+    largest_difference,
+    run_peaks,
+)
+from archfem.dynamics.model_selection import TRIED_SETTINGS, exact_discretisation
+from archfem.masonry.stiffness_ratio import find_soft_blocks
+from archfem.models.builder import build as build_model
+from archfem.models.fem.mesh import _recent_meshes
+
+FINEST_STEP = 0.000625
+"""Time step of the reference without soil [s]."""
+
+STIFF = af.Contact(1.48e10, 0.3e10)
+"""Joints a third as soft as the stones."""
+
+
+def thin_ring() -> af.Structure:
+    """Build a thin segmental ring."""
+    return af.circular_arch(radius=4.0, thickness=0.4, embrace=120.0, voussoirs=15)
+
+
+def stiff_ring() -> af.Structure:
+    """Build a ring of few voussoirs on stiff joints."""
+    return af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9, contact=STIFF)
+
+
+def semicircle() -> af.Structure:
+    """Build a semicircular ring."""
+    return af.circular_arch(radius=3.0, thickness=0.6, embrace=180.0, voussoirs=15)
+
+
+def small_bridge() -> af.Structure:
+    """Build an arch under backfill."""
+    arch = af.shapes.Arch(span=4.0, rise=1.5, thickness=0.45, voussoirs=11)
+    return af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4), width=4.0)
+
+
+SCENES: dict[str, tuple[Callable[[], af.Structure], float | None, float, float, int]] = {
+    "ring, held": (ring, None, 20.0, 2.5, 11),
+    "ring": (ring, 0.6, 20.0, 2.5, 12),
+    "ring, slippery": (ring, 0.3, 25.0, 2.0, 13),
+    "stiff ring": (stiff_ring, 0.6, 15.0, 2.0, 14),
+    "thin ring, held": (thin_ring, None, 20.0, 2.0, 15),
+    "thin ring, slippery": (thin_ring, 0.3, 20.0, 2.0, 16),
+    "semicircle": (semicircle, 0.6, 30.0, 0.8, 17),
+    "piers, held": (arch_on_piers, None, 20.0, 2.0, 18),
+    "piers, slippery": (arch_on_piers, 0.3, 20.0, 2.0, 19),
+    "column": (lambda: af.column(breadth=1.0, heights=[1.0] * 3), 0.6, 20.0, 1.6, 20),
+    "column, slippery": (lambda: af.column(breadth=1.2, heights=[0.6] * 4), 0.3, 20.0, 3.5, 21),
+    "bridge": (small_bridge, 0.6, 15.0, 2.5, 22),
+}
+"""Structure, friction of all joints [-], and duration [s], peak [m/s²] and seed of the motion."""
+
+
+def compare(name: str, tolerance: float, duration: float | None) -> list[str]:
+    """Return one row: largest |e|, choice, costs, predicted and actual error."""
+    shape, friction, seconds, pga, seed = SCENES[name]
+    structure = with_friction(shape(), friction)
+    motion = af.Motion.synthetic(duration=duration or seconds, pga=pga, seed=seed)
+    finest = build_model(structure, exact_discretisation(structure, "condensed", (12, 12)))
+    damping = default_damping(finest)
+
+    def choose(motion: af.Motion) -> af.models.Model:
+        _recent_meshes.clear()
+        return af.build(
+            structure, fidelity="auto", tolerance=tolerance, motion=motion, damping=damping
+        )
+
+    choose(motion.cut(0.0, 0.5))  # compiles, and loads, what the timed choice needs
+    begin = process_time()
+    told = choose(motion).prediction
+    choosing = process_time() - begin
+    chosen = next(
+        (fidelity, cells) for (fidelity, cells, step) in TRIED_SETTINGS if step == told.dt
+    )
+    _recent_meshes.clear()
+    begin = process_time()
+    model = build_model(structure, exact_discretisation(structure, *chosen))
+    choosing -= process_time() - begin
+    run = time_run(model, motion, damping, told.dt)
+    step = FINEST_STEP * (2 if find_soft_blocks(structure) else 1)
+    reference = run_peaks(finest, motion, damping, step).peaks
+    actual = largest_difference(run.peaks, reference)
+    return [
+        name,
+        f"{run.peaks.max():.2f}",
+        f"{chosen[0]} {chosen[1][0]}, {1e3 * told.dt:g} ms",
+        f"{choosing:.2f}",
+        f"{choosing / run.seconds:.2f}",
+        f"{told.error:.4f}",
+        f"{actual:.4f}",
+        f"{told.error / actual:.2f}" + ("" if told.is_met else ", not met"),
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table."""
+    parser = plain_options(__doc__)
+    parser.add_argument("scenes", nargs="*", default=list(SCENES), metavar="SCENE")
+    parser.add_argument("--tolerance", type=float, default=0.005, help="of the largest |e|")
+    given = parser.parse_args(arguments)
+    logging.disable(logging.WARNING)
+    head = ["structure", "largest |e|", "choice", "choosing [s]", "over running"]
+    head += ["predicted", "actual", "ratio"]
+    scenes, duration = (["column"], 1.0) if given.quick else (given.scenes, None)
+    print(table(head, [compare(name, given.tolerance, duration) for name in scenes]))
+
+
+if __name__ == "__main__":
+    main()
