@@ -6,9 +6,8 @@
     motion              Motion: a ground acceleration
     records             files of recorded ground motions, one module for each format
     response_spectra    damped oscillator, response spectra
-    signal_processing   filters, integration, baseline, resampling
+    signal_processing   filters, integration, baseline, resampling, artificial accelerograms
     suite               Suite of motions
-    synthetic           artificial accelerograms
 
 Imports the support modules only. Start reading at `motion`.
 """

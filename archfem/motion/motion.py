@@ -14,7 +14,6 @@ from archfem._validation import check_type, is_number, short_repr, validate_meth
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records.reader import read_components
-from archfem.motion.synthetic import generate_accelerogram
 from archfem.units import STANDARD_GRAVITY
 
 COMPONENTS = "horizontal", "vertical", "transverse"
@@ -121,7 +120,7 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: fewer than 50 samples, or pga, ratio or seed out of range.
         """
-        level, upright = generate_accelerogram(
+        level, upright = signal_processing.generate_accelerogram(
             duration, dt, pga=pga, ratio=vertical_ratio, seed=seed
         )
         return cls(level, dt, upright, name=f"synthetic {seed}")

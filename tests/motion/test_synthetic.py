@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.motion import synthetic
+from archfem.motion import signal_processing
 
 
 def test_synthetic_motion_repeats_and_ends_at_rest():
@@ -49,8 +49,8 @@ def test_envelope_rises_stays_and_fades():
 
 def test_the_horizontal_does_not_depend_on_the_vertical():
     options = {"pga": 2.0, "seed": 4}
-    level, upright = synthetic.generate_accelerogram(5.0, 0.01, ratio=0.5, **options)
-    alone, nothing = synthetic.generate_accelerogram(5.0, 0.01, ratio=0.0, **options)
+    level, upright = signal_processing.generate_accelerogram(5.0, 0.01, ratio=0.5, **options)
+    alone, nothing = signal_processing.generate_accelerogram(5.0, 0.01, ratio=0.0, **options)
     assert nothing is None
     assert np.array_equal(level, alone)
     assert np.abs(upright).max() == pytest.approx(1.0)
@@ -58,14 +58,18 @@ def test_the_horizontal_does_not_depend_on_the_vertical():
 
 def test_the_least_that_can_be_asked_for():
     """Fifty steps, a peak of a millimetre per second squared."""
-    level, upright = synthetic.generate_accelerogram(0.5, 0.01, pga=1e-3, ratio=0.05, seed=0)
+    level, upright = signal_processing.generate_accelerogram(
+        0.5, 0.01, pga=1e-3, ratio=0.05, seed=0
+    )
     assert len(level) == 51
     assert np.abs(level).max() == pytest.approx(1e-3)
     assert np.abs(upright).max() == pytest.approx(5e-5)
     for given in ({"duration": 0.49}, {"pga": 0.0}, {"ratio": -0.05}):
         options = {"duration": 0.5, "pga": 1.0, "ratio": 0.5} | given
         with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
-            synthetic.generate_accelerogram(options.pop("duration"), 0.01, seed=0, **options)
+            signal_processing.generate_accelerogram(
+                options.pop("duration"), 0.01, seed=0, **options
+            )
 
 
 @pytest.mark.parametrize(("component", "ground"), [("horizontal", 15.0), ("vertical", 25.0)])
