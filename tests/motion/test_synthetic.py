@@ -5,6 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.motion import signal_processing
+from archfem.motion.signal_processing import generate_accelerogram
 
 
 def test_synthetic_motion_repeats_and_ends_at_rest():
@@ -34,7 +35,9 @@ def test_a_motion_without_end_or_samples_is_refused():
 @pytest.mark.parametrize("component", ["horizontal", "vertical"])
 def test_noise_has_a_peak_of_one_and_ends_at_rest(component):
     random = np.random.default_rng(2)
-    noise = synthetic.generate_enveloped_noise(1500, 0.01, random=random, component=component)
+    noise = signal_processing.generate_enveloped_noise(
+        1500, 0.01, random=random, component=component
+    )
     assert np.abs(noise).max() == 1.0
     motion = af.Motion(noise, 0.01)
     assert motion.velocity()[-1] == pytest.approx(0.0, abs=1e-9)
@@ -42,15 +45,15 @@ def test_noise_has_a_peak_of_one_and_ends_at_rest(component):
 
 
 def test_envelope_rises_stays_and_fades():
-    shape = synthetic.intensity_envelope(1001)
+    shape = signal_processing.intensity_envelope(1001)
     assert shape[[0, 75, 150, 500]] == pytest.approx([0.0, 0.25, 1.0, 1.0])
     assert shape[[700, 1000]] == pytest.approx(np.exp([-1.0, -2.5]))
 
 
 def test_the_horizontal_does_not_depend_on_the_vertical():
     options = {"pga": 2.0, "seed": 4}
-    level, upright = signal_processing.generate_accelerogram(5.0, 0.01, ratio=0.5, **options)
-    alone, nothing = signal_processing.generate_accelerogram(5.0, 0.01, ratio=0.0, **options)
+    level, upright = generate_accelerogram(5.0, 0.01, ratio=0.5, **options)
+    alone, nothing = generate_accelerogram(5.0, 0.01, ratio=0.0, **options)
     assert nothing is None
     assert np.array_equal(level, alone)
     assert np.abs(upright).max() == pytest.approx(1.0)
@@ -58,18 +61,14 @@ def test_the_horizontal_does_not_depend_on_the_vertical():
 
 def test_the_least_that_can_be_asked_for():
     """Fifty steps, a peak of a millimetre per second squared."""
-    level, upright = signal_processing.generate_accelerogram(
-        0.5, 0.01, pga=1e-3, ratio=0.05, seed=0
-    )
+    level, upright = generate_accelerogram(0.5, 0.01, pga=1e-3, ratio=0.05, seed=0)
     assert len(level) == 51
     assert np.abs(level).max() == pytest.approx(1e-3)
     assert np.abs(upright).max() == pytest.approx(5e-5)
     for given in ({"duration": 0.49}, {"pga": 0.0}, {"ratio": -0.05}):
         options = {"duration": 0.5, "pga": 1.0, "ratio": 0.5} | given
         with pytest.raises(af.errors.InvalidInput, match="50 samples or more"):
-            signal_processing.generate_accelerogram(
-                options.pop("duration"), 0.01, seed=0, **options
-            )
+            generate_accelerogram(options.pop("duration"), 0.01, seed=0, **options)
 
 
 @pytest.mark.parametrize(("component", "ground"), [("horizontal", 15.0), ("vertical", 25.0)])
@@ -88,9 +87,11 @@ def test_noise_has_the_spectrum_of_kanai_tajimi_and_clough_and_penzien(
             assert size == 2 * count
             return np.eye(1, size)[0]
 
-    monkeypatch.setattr(synthetic, "correct_baseline", lambda samples, dt: samples)
-    monkeypatch.setattr(synthetic, "intensity_envelope", np.ones)
-    found = synthetic.generate_enveloped_noise(count, dt, random=Impulse, component=component)
+    monkeypatch.setattr(signal_processing, "correct_baseline", lambda samples, dt: samples)
+    monkeypatch.setattr(signal_processing, "intensity_envelope", np.ones)
+    found = signal_processing.generate_enveloped_noise(
+        count, dt, random=Impulse, component=component
+    )
     response = np.zeros(count)
     for k in range(count + 1):
         omega = 2.0 * np.pi * k / (2 * count * dt)
