@@ -5,7 +5,7 @@ import pytest
 
 import archfem as af
 from archfem.motion import signal_processing
-from archfem.motion.signal_processing import generate_accelerogram
+from archfem.motion.signal_processing import generate_accelerogram, generate_enveloped_noise
 
 
 def test_synthetic_motion_repeats_and_ends_at_rest():
@@ -35,9 +35,7 @@ def test_a_motion_without_end_or_samples_is_refused():
 @pytest.mark.parametrize("component", ["horizontal", "vertical"])
 def test_noise_has_a_peak_of_one_and_ends_at_rest(component):
     random = np.random.default_rng(2)
-    noise = signal_processing.generate_enveloped_noise(
-        1500, 0.01, random=random, component=component
-    )
+    noise = generate_enveloped_noise(1500, 0.01, random=random, component=component)
     assert np.abs(noise).max() == 1.0
     motion = af.Motion(noise, 0.01)
     assert motion.velocity()[-1] == pytest.approx(0.0, abs=1e-9)
@@ -89,9 +87,7 @@ def test_noise_has_the_spectrum_of_kanai_tajimi_and_clough_and_penzien(
 
     monkeypatch.setattr(signal_processing, "correct_baseline", lambda samples, dt: samples)
     monkeypatch.setattr(signal_processing, "intensity_envelope", np.ones)
-    found = signal_processing.generate_enveloped_noise(
-        count, dt, random=Impulse, component=component
-    )
+    found = generate_enveloped_noise(count, dt, random=Impulse, component=component)
     response = np.zeros(count)
     for k in range(count + 1):
         omega = 2.0 * np.pi * k / (2 * count * dt)
