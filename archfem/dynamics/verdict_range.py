@@ -95,6 +95,9 @@ class VerdictRange(ResultDisplay):
         """How often the structure falls, and where."""
         falls, answered = self.falls[self.answered], int(self.answered.sum())
         missing = len(self.answered) - answered
+        if not (self.answered & self.dataset["sampled"].values).any():
+            errors = [error for error in self.dataset["error"].values if error]
+            return f"{missing} of {len(self.answered)} runs have no answer: {errors[0]}"
         text = f"falls in {int(falls.sum())} of {answered}"
         if 0 < falls.sum() < len(falls):
             text += f": {self._describe_falls()}"
@@ -119,6 +122,8 @@ class VerdictRange(ResultDisplay):
             conditions.append(self._condition_text(best))
             chosen &= best.holds
         inside, total = int(falls[chosen].sum()), int(falls.sum())
+        if not conditions:
+            return "no property separates them from the others"
         where = " and ".join(conditions)
         which = "all" if inside == total else f"{inside} of them"
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"

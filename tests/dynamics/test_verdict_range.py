@@ -59,6 +59,20 @@ def test_a_run_without_an_answer_neither_stands_nor_falls():
     assert found.table() == without.table()
 
 
+def test_falls_of_nearly_all_runs_are_not_explained():
+    """Every condition leaves out more falls than runs that stand."""
+    falls = np.ones(12, bool)
+    falls[3] = False
+    found = made_up(falls, scale=np.tile([0.5, 1.0, 2.0], 4))
+    assert "no property separates them from the others" in found.sentence
+
+
+def test_runs_that_all_fail_are_said_to():
+    found = made_up([False, False], scale=np.array([1.0, 2.0]))
+    found.dataset["error"] = "run", np.array(["DidNotConverge: no equilibrium"] * 2)
+    assert found.sentence == "2 of 2 runs have no answer: DidNotConverge: no equilibrium"
+
+
 def test_importance_is_the_correlation_ratio_of_ranks():
     """By its definition, for a label and for numbers in thirds."""
     rng = np.random.default_rng(0)
