@@ -10,7 +10,7 @@ from archfem._files import atomic_write
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
 from archfem.cases.run import HISTORY_FILE, CaseResult, DeadLoadResult, Run
-from archfem.cases.toml_file import read_tables
+from archfem.cases.toml_file import parse_tables, read_tables
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
@@ -76,7 +76,7 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
     Raises:
         InvalidInput: it is no result folder, the drawing does not exist, or a history is that of
-            another structure.
+            another structure or case.
     """
     place = Path(folder)
     if not place.is_dir():
@@ -91,9 +91,21 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
     runs = {
         name: History.read(path, case.structure) for name, path in files.items() if path.is_file()
     }
+    for name, run in runs.items():
+        _check_case_of_history(files[name], run, case if case.suite is None else case.alone(name))
     # A single motion without a history is no missing pair: the case may have dead load only.
     missing = () if case.suite is None else tuple(name for name in files if name not in runs)
     return ResultFolder(place, case, runs, missing)
+
+
+def _check_case_of_history(path: Path, run: History, case: Case) -> None:
+    """Refuse a history of another case, as a command that was broken off leaves in its folder."""
+    text = run.dataset.attrs.get("case")
+    if text is not None and parse_tables(str(text)) != parse_tables(case.text()):
+        raise InvalidInput(
+            f"{path} is of another case than {CASE_FILE} in the folder: a later command ended "
+            "before it had computed this run; run the case again"
+        )
 
 
 def _motion_name(case: Case) -> str:

@@ -3,7 +3,7 @@
 import argparse
 import io
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -34,7 +34,6 @@ from archfem.statics.modes import Modes
 def run(options: argparse.Namespace) -> int:
     """Carry out a case: limit analysis, dead load and time histories, tables and pictures."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    (folder / "case.toml").write_text(case.text(), encoding="utf-8")
     if options.workers > 1 and case.suite is not None:
         from archfem.studies.comparison_run import run_pairs
 
@@ -44,11 +43,19 @@ def run(options: argparse.Namespace) -> int:
     try:
         # All else is printed after the verdict, which is known last.
         with redirect_stdout(output):
-            headline, doubtful = print_results(case, run_case(case, folder), folder)
+            headline, doubtful = print_results(case, _run_and_write_case(case, folder), folder)
     finally:
         print(f"{case.title}: {headline}" if headline else case.title)
         print(output.getvalue(), end="")
     return EXIT_DOUBTFUL if doubtful else 0
+
+
+def _run_and_write_case(case: Case, folder: Path) -> Iterator[Result]:
+    """Yield the results of a case, whose file is written with the first of them."""
+    for number, result in enumerate(run_case(case, folder)):
+        if number == 0:  # a case that is refused leaves the folder as it was
+            (folder / "case.toml").write_text(case.text(), encoding="utf-8")
+        yield result
 
 
 def check(options: argparse.Namespace) -> int:

@@ -69,10 +69,8 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
-def test_pairs_that_lack_and_cases_that_differ_are_said(kept):
+def test_pairs_that_lack_are_said_and_cases_that_differ_refused(kept):
     (kept / "second" / "history.nc").unlink()
-    text = (kept / "case.toml").read_text()
-    (kept / "case.toml").write_text(text.replace("reduction = 2.0", "reduction = 3.0"))
     found = af.cases.open_results(kept)
     assert (list(found.runs), found.missing) == (["first"], ("second",))
     assert found.player().scene.run is found.runs["first"]
@@ -81,7 +79,10 @@ def test_pairs_that_lack_and_cases_that_differ_are_said(kept):
     assert found.report() == kept / "report.html"
     words = " ".join(read_page((kept / "report.html").read_text(encoding="utf-8")).words)
     assert "Not among the results: runs of second" in words
-    assert "first: the run carries another case than that of this report" in words
+    text = (kept / "case.toml").read_text()
+    (kept / "case.toml").write_text(text.replace("reduction = 2.0", "reduction = 3.0"))
+    with pytest.raises(af.InvalidInput, match=r"is of another case than case\.toml in the folder"):
+        af.cases.open_results(kept)
 
 
 def test_folders_that_hold_no_results_are_refused(kept, tmp_path):

@@ -31,6 +31,7 @@ def test_run_of_a_ring_that_falls(tmp_path, capsys):
     given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
     assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 1
     assert "joints hinge" in capsys.readouterr().err
+    assert not (tmp_path / "case.toml").exists()  # nor would it replace that of an earlier run
 
 
 @pytest.mark.parametrize(

@@ -251,4 +251,4 @@ def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):
     options = ["--set", "limit.horizontal=1", "--out", str(tmp_path)]
     assert af.commands.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1
     assert "'backfill'] are softer than the joints around them" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+    assert not list(tmp_path.iterdir())

@@ -139,16 +139,6 @@ def build_source_section(data: ReportData) -> Section:
     ]
     rows.append(("SHA-256 of the case", hash_bytes(data.case.text().encode())))
     blocks: list[Any] = [Grid((), rows)]
-    # Histories contain their case, which may have been changed in the folder since.
-    blocks += [
-        TextBlock(
-            f"{name}: the run carries another case than that of this report; its SHA-256 is "
-            f"{hash_bytes(str(run.dataset.attrs['case']).encode())}. Run the case again.",
-            "doubt",
-        )
-        for name, run in runs
-        if "case" in run.dataset.attrs and run.dataset.attrs["case"] != _case_text(data, name)
-    ]
     if data.folder is not None:
         files = sorted(path for path in data.folder.rglob("*") if _is_source(path))
         table = [
@@ -165,11 +155,6 @@ def build_source_section(data: ReportData) -> Section:
     return Section("Versions, hashes and the case as a file", blocks)
 
 
-def _case_text(data: ReportData, name: str) -> str:
-    """Return the case of one run as text: for a suite, with this pair alone."""
-    return data.case.text() if data.case.suite is None else data.case.alone(name).text()
-
-
 def hash_bytes(content: bytes) -> str:
     """Return the SHA-256 of bytes."""
     return sha256(content).hexdigest()
@@ -177,6 +162,6 @@ def hash_bytes(content: bytes) -> str:
 
 def _is_source(path: Path) -> bool:
     """Return whether a report is written from a file."""
-    figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy")
+    figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy", "verdict_range")
     text = path.suffix in (".nc", ".toml", ".txt")
     return path.is_file() and (text or (path.suffix == ".png" and path.stem in figures))
