@@ -1,4 +1,4 @@
-"""Text, HTML and pictures of result classes, whose methods may live in rooms to the right.
+"""Text, HTML and pictures of result classes; functions that draw are imported when called.
 
 A result such as a history is defined left of the room that draws it. Its methods `plot`, `player`
 and `report` are therefore bound when they are called, through one table that a test resolves.

@@ -61,5 +61,5 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
 
 
 def _digest(content: bytes) -> bytes:
-    """Compute the digest as hexadecimal text."""
+    """Compute the SHA-256 digest of a file's content, as hexadecimal text."""
     return hashlib.sha256(content).hexdigest().encode()

@@ -110,7 +110,7 @@ def count_cached_functions() -> int:
 
 
 def delete_stale_cache(folder: Path, *others: Path) -> None:
-    """Delete compiled code of a folder that is older than any source of it or of other folders.
+    """Delete compiled code of a folder if it is older than any source in this or the other folders.
 
     Numba checks the source of each function, but not of the functions it calls: a compiled function
     would go on using their old versions.
@@ -124,7 +124,7 @@ def delete_stale_cache(folder: Path, *others: Path) -> None:
 
 
 def _cache_folder() -> Path | None:
-    """Return the first writable folder for compiled code; None for that beside the sources."""
+    """Return the first writable folder for compiled code; None for the default of numba."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen is None and all(_is_writable(source / "__pycache__") for source in SOURCE_FOLDERS):
         return None
@@ -165,7 +165,7 @@ def _source_files() -> list[Path]:
 
 
 def source_digest() -> str:
-    """Compute a digest of the names and contents of these modules."""
+    """Compute a digest of the names and contents of all modules with compiled functions."""
     digest = hashlib.sha256()
     for path in _source_files():
         digest.update(path.name.encode() + path.read_bytes())

@@ -66,7 +66,7 @@ def check_integer(value: Any, name: str, *, minimum: int = 1, maximum: int = 2**
 
 
 def count_pieces(length: float, size: float, name: str, maximum: int = 10_000) -> int:
-    """Return the number of pieces, at least one, of about a given size in a length."""
+    """Return the number of pieces of about a given size in a length, at least one."""
     count = length / size
     if not count <= maximum:
         raise InvalidInput(
@@ -112,7 +112,7 @@ def check_type(value: Any, expected: type | tuple[type, ...], name: str, remedy:
 
 
 def _example(count: int | None) -> str:
-    """Return how a sequence of `count` values is written."""
+    """Return an example of a sequence of `count` values, as text."""
     return "(a, b, …)" if count is None else f"({', '.join('abcdef'[:count])})"
 
 

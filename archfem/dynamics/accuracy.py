@@ -43,13 +43,13 @@ class Setting:
 
     @property
     def label(self) -> str:
-        """Short text."""
+        """Discretisation and time step as short text."""
         return f"{discretisation_label(self.discretisation)} {1e3 * self.dt:g} ms"
 
 
 @dataclass(frozen=True)
 class TimedRun:
-    """Size, processor time and peaks of a run."""
+    """Number of coordinates, processor time and peak eccentricities of a run."""
 
     size: int  # number of coordinates
     seconds: float  # processor time of the time steps, without building the model [s]
@@ -167,7 +167,7 @@ def candidate_settings(
     quadratures: Sequence[tuple[str, int | None]] = TRIED_QUADRATURES,
     steps: Sequence[float] = TRIED_TIME_STEPS,
 ) -> Iterator[Setting]:
-    """Yield all combinations without duplicates."""
+    """Yield settings of all combinations of fidelity, quadrature, mesh and step, none twice."""
     for name in fidelities:
         fidelity = stone_fidelity(structure, name)
         for rule, points in quadratures:

@@ -70,7 +70,7 @@ class EffectiveModeRange:
 
     @property
     def text(self) -> str:
-        """Numbers of both modes, and the four modes up to the last with the largest mass."""
+        """First and last effective mode as text, and the four modes up to it with most mass."""
         ratios, frequencies = self.modes.mass_ratios[: self.last, 0], self.modes.frequencies
         large = ", ".join(
             f"{number + 1} ({frequencies[number]:.2f} Hz, {100.0 * ratios[number]:.1f} %)"
@@ -144,7 +144,7 @@ def _modes_with_share(
     initial_count: int = 32,
     max_count: int = 1024,
 ) -> tuple[Modes, Array]:
-    """Return modes with a share of the mass along x, and the share up to each (modes,)."""
+    """Return modes that reach a share of the mass along x, and their cumulative shares (modes,)."""
     count = 0
     while count < min(max_count, model.size):
         count = min(max(initial_count, 2 * count), max_count, model.size)
@@ -269,7 +269,7 @@ class _RockingBlock:
         return 1.0 - 1.5 * self.breadth**2 / (self.breadth**2 + self.height**2)
 
     def damping(self, ratio: float) -> StiffnessDamping:
-        """Return damping with a ratio of the bounce, stated at the frequency of rotation."""
+        """Return damping with a ratio in bouncing on the base, stated at the rocking frequency."""
         lag = 2.0 * ratio / self.bounce
         return StiffnessDamping(pi * lag * self.rocking, self.rocking)
 
@@ -300,7 +300,7 @@ class _RockingBlock:
 
 
 def _restitution_from_energies(angle: Array, energy: Array, impacts: int = 2) -> float:
-    """Return ω after over ω before an impact, from energies at the largest tilts to each side."""
+    """Return the ratio of ω after and before an impact, from energies at the largest tilts."""
     landings = np.flatnonzero(angle[1:] * angle[:-1] < 0.0) + 1
     sides = np.split(np.arange(len(angle)), landings)
     if len(sides) <= impacts:

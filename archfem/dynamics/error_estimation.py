@@ -53,7 +53,7 @@ def strongest_window(motion: Motion, share: float = 0.7, least: float = 4.0) -> 
 
 
 def severe_motion(model: Model, eccentricity: float = 0.40) -> Motion:
-    """Return a synthetic motion whose peak, acting statically, brings |e| to a value."""
+    """Return a synthetic motion whose peak, as a static load, causes a given eccentricity."""
     solver, rest = EquilibriumSolver(model.size), dead_load(model)
     low, high = 0.0, 2.0
     for _ in range(10):
@@ -89,7 +89,7 @@ def largest_difference(first: Array, second: Array) -> float:
 
 @dataclass(frozen=True)
 class RunPeaks:
-    """Peaks of a run."""
+    """Largest eccentricities and largest rotation of the joints in a run."""
 
     peaks: Array | None  # largest |e| of each assessed joint (n,) [-]; None for a failed run
     rotation: float = 0.0  # largest rotation of a joint [rad]
@@ -102,7 +102,7 @@ def run_peaks(
     dt: float,
     start: Equilibrium | None = None,
 ) -> RunPeaks:
-    """Run a model and return its peaks."""
+    """Run a model and return the largest eccentricities and the largest rotation of its joints."""
     try:
         run = time_history(model, motion, damping=damping, dt=dt, start=start)
     except DidNotConverge:

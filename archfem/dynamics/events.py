@@ -58,7 +58,7 @@ class FailureState:
 
 
 class FailureScan:
-    """Scan of joints for failures at every step; a query runs once per distinct failure pattern.
+    """Scan of joints for failures at every step; it evaluates each distinct failure pattern once.
 
     The query maps a pattern to the names of the conditions that hold; results are cached.
     """
@@ -81,7 +81,7 @@ class FailureScan:
         self._cache: dict[bytes, frozenset[str]] = {}
 
     def __call__(self, resultants: Array, min_failures: int) -> Iterator[frozenset[str]]:
-        """Yield the conditions that hold at each step; none below the number of failures."""
+        """Yield the conditions that hold at each step; none below `min_failures` failed joints."""
         forces = resultants[:, self._numbers]
         e, friction = eccentricity_and_friction(forces, self._depth)
         limits = sliding_ratio(forces[..., 0], e, *self._laws)
@@ -103,7 +103,7 @@ class FailureScan:
             yield self._cache[key]
 
     def joint_states(self, resultants: Array) -> xr.Dataset:
-        """Return labels and flags of all joints at a step, by `joint_dataset`."""
+        """Return the resultants and failure flags of all joints at a step, as a dataset."""
         return joint_dataset(self._structure, resultants, criteria=self._criteria)
 
 
@@ -395,7 +395,7 @@ def _joint_condition(number: int) -> str:
 
 
 def _monitor_record(structure: Structure, criteria: Criteria) -> FailureMonitor:
-    """Return a monitor that ends a run once enough joints of one part have failed over it."""
+    """Return a monitor that ends a run once enough joints of a part have failed during the run."""
     assessed, ever_failed = np.flatnonzero(structure.judged), RecordCounter(structure, criteria)
 
     def failed(state: FailureState) -> frozenset[str]:
@@ -457,7 +457,7 @@ def applicable_definitions(
 
 
 def _as_condition(mechanism: object) -> frozenset[str]:
-    """Return the condition "mechanism", or none."""
+    """Return the set of the one condition "mechanism"; empty if there is no mechanism."""
     return frozenset() if mechanism is None else frozenset({"mechanism"})
 
 

@@ -125,7 +125,7 @@ def _check_suffix(path: str | Path, suffix: str) -> Path:
 
 
 def _xdmf_cell_type(size: int) -> tuple[int, ...]:
-    """Return XDMF's number of a polygon, followed by its number of corners for a general one."""
+    """Return XDMF's cell type of a polygon, and its number of corners from five corners on."""
     return {3: (4,), 4: (5,)}.get(size, (3, size))
 
 

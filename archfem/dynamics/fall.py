@@ -172,7 +172,7 @@ def list_stones(structure: Structure) -> list[int]:
 
 
 def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:
-    """Return a function from poses (n_blocks, 3) to corners of some blocks, less centroids [m]."""
+    """Return a function from poses to corners of blocks, relative to centroids as built [m]."""
     all_blocks = structure.blocks
     corners = [np.asarray(all_blocks[k].points) - all_blocks[k].centroid for k in blocks]
     owner, (x, y) = np.repeat(blocks, [len(each) for each in corners]), np.concatenate(corners).T
@@ -219,7 +219,7 @@ def _between_stones(structure: Structure) -> NDArray[np.bool_]:
 
 
 def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bool:
-    """Return whether blocks rock or fall: a joint has turned [rad] and blocks still move."""
+    """Return whether a joint has rotated by more than an angle [rad] and blocks still move."""
     observer, stones = model.observer(), _between_stones(model.structure)
     rotations = observer.faces(observer.read(state.q))[1, stones]
     overturns = float(np.abs(rotations).max(initial=0.0)) > min_rotation
@@ -229,7 +229,7 @@ def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bo
 def simulate_fall(
     model: Model, start: State, state: State, motion: Motion, settling_time: float = 20.0
 ) -> tuple[xr.Dataset, CollapseState]:
-    """Follow the loose blocks of a model until they rest, at most a time after the motion [s].
+    """Follow loose blocks until they rest, or until `settling_time` after the motion has ended [s].
 
     Displacements count from the start of the run.
     """

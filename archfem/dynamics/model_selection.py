@@ -136,7 +136,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
 def exact_discretisation(
     structure: Structure, fidelity: str, cells: tuple[int, int]
 ) -> Discretisation:
-    """Return a discretisation with exact quadrature and a fidelity for stones."""
+    """Return a discretisation with exact quadrature and a fidelity for all blocks but soft ones."""
     return Discretisation(stone_fidelity(structure, fidelity), cells, quadrature="exact")
 
 
@@ -195,7 +195,7 @@ def select_model(
 def _settings_to_try(
     structure: Structure, tolerance: float, dt: float | None
 ) -> list[tuple[Discretisation, float]]:
-    """Return discretisations and time steps, the coarsest first; two for a prescribed time step."""
+    """Return discretisations and steps to try, coarsest first; a given `dt` is tried after 2 dt."""
     if dt is not None:
         tried = tuple(
             (*setting[:2], step)
@@ -248,7 +248,7 @@ def _try_settings(
 def _resolve_excitation(
     model: Model, motion: Motion | None, damping: DampingChoice
 ) -> tuple[Motion, Viscous | None, float]:
-    """Return the strongest part of the motion, damping, and the share of this part in time."""
+    """Return the strongest part of a motion, the damping, and this part's share of the duration."""
     structure = model.structure
     soil = bool(find_soft_blocks(structure))
     probe = model if soil else build_rigid_model(structure, rule=Quadrature("exact"))
@@ -259,7 +259,7 @@ def _resolve_excitation(
 
 
 def resolve_damping(model: Model, damping: DampingChoice) -> Viscous | None:
-    """Return damping, or that which a function returns for a model."""
+    """Return the damping, evaluated for the model if it is given as a function."""
     return damping(model) if callable(damping) else damping
 
 

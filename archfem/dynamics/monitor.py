@@ -110,7 +110,7 @@ class CornerDisplacements:
         self._square = self._last = np.zeros(len(self.blocks))
 
     def add(self, times: Array, readings: Array) -> None:
-        """Add the readings of the next steps (steps, r)."""
+        """Add the times of the next steps, and the readings of the observer at these (steps, r)."""
         # squares are compared, since their order is that of the distances
         squares = np.square(self._observer.corners(readings) - self._start).sum(axis=-1)
         squares = np.maximum.reduceat(squares, self._first, axis=1)

@@ -275,7 +275,7 @@ def _next_scale(
     ratio: float = sqrt(2.0),
     max_runs: int = 40,
 ) -> float | None:
-    """Return the next scale, or None; `ratio` is that of two scales before bisection."""
+    """Return the scale of the next run, or None; before bisection, scales change by `ratio`."""
     runs, (smallest, largest) = scales.runs, between
     if not runs:
         return min(max(1.0, smallest), largest)
@@ -301,7 +301,7 @@ def _next_scale(
 
 @dataclass(frozen=True)
 class CollapseScale:
-    """Scales between which a structure falls, by several time steps.
+    """Scales of a motion between which a structure falls, searched with several time steps.
 
     A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
     broken off counts neither as a fall nor as standing, and no bracket rests on it. The response
@@ -314,7 +314,7 @@ class CollapseScale:
     searches: dict[float, MechanismScales]
 
     def bracket(self, dt: float) -> Bracket:
-        """Return the bracket of collapse by one time step.
+        """Return the bracket of collapse that was found with one time step.
 
         Args:
             dt: time step [s].
@@ -326,17 +326,17 @@ class CollapseScale:
 
     @property
     def lower(self) -> float:
-        """Largest scale up to which the structure stood by every time step [-]."""
+        """Largest scale up to which the structure stood with all time steps [-]."""
         return min(self.bracket(dt).lower for dt in self.searches)
 
     @property
     def upper(self) -> float:
-        """Smallest scale of falls by every time step [-]; infinite if by one it did not."""
+        """Scale by which it fell with all time steps [-]; infinite if it always stood with one."""
         return max(self.bracket(dt).upper for dt in self.searches)
 
     @property
     def above(self) -> tuple[float, ...]:
-        """Scales at which it stood although it fell at a smaller one [-]."""
+        """Scales at which the structure stood although it fell at a smaller scale [-]."""
         return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).above}))
 
     @property
@@ -345,7 +345,7 @@ class CollapseScale:
         return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).unanswered}))
 
     def falls(self, dt: float) -> tuple[tuple[float, CollapseState | None], ...]:
-        """Return the scale and the state of collapse of each run by one time step.
+        """Return the scale and the state of collapse of each run with one time step.
 
         Args:
             dt: time step [s].
@@ -356,7 +356,7 @@ class CollapseScale:
         return tuple((run.scale, run.fall) for run in self.searches[dt].runs)
 
     def verdict_range(self, structure: Structure, motion: Motion, **options: Any) -> VerdictRange:
-        """Run over uncertain properties, and over the scales of the bracket.
+        """Compute the range of verdicts over uncertain properties and over scales in the bracket.
 
         Args:
             structure: structure that was shaken.

@@ -126,7 +126,7 @@ class Recorder:
         return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
 
     def _block_displacements(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
-        """Return variables over block; fixed blocks do not move."""
+        """Return displacements of all blocks as variables of a dataset; zero for fixed blocks."""
         displacements = self.monitor.displacements
         subject = "displacement of its farthest corner"
         columns = {

@@ -50,7 +50,7 @@ class Rayleigh:
     joints: str = "closed"
 
     def __post_init__(self) -> None:
-        """Refuse negative damping, frequencies out of order and unknown words."""
+        """Refuse negative damping, frequencies out of order and unknown options."""
         low, high = check_numbers(self.frequencies, "damping frequencies [Hz]", 2)
         _check_ratio(self.ratio)
         if not 0.0 < low < high:
@@ -98,7 +98,7 @@ class StiffnessDamping:
     mass = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse negative damping, frequencies out of range and unknown words."""
+        """Refuse negative damping, frequencies out of range and unknown options."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
         if not 1e-3 <= check_number(self.frequency, "damping frequency [Hz]") <= 1e6:
@@ -126,7 +126,7 @@ class EffectiveDamping:
     mass_share: float = EFFECTIVE_MASS_SHARE  # of the modes up to the last effective one [-]
 
     def __post_init__(self) -> None:
-        """Refuse values out of range and unknown words."""
+        """Refuse values out of range and unknown options."""
         _check_ratio(self.ratio)
         _check_joints(self.joints)
         if not is_one_of(self.kind, DAMPING_KINDS):

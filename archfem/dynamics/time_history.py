@@ -283,7 +283,7 @@ def _run_steps(
     monitors: tuple[EventMonitor | None, SeparationMonitor | None],
     end: float,
 ) -> tuple[Ending, str]:
-    """Record steps up to an event or the end of the motion; return which, also in words."""
+    """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
     batches = (
         stepper.batches(start, end)

@@ -129,7 +129,7 @@ class VerdictRange(ResultDisplay):
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:
-        """Return a condition in words, with stiffness as a value."""
+        """Return a condition in words, with joint stiffness in GPa/m rather than as a factor."""
         name, value, below = condition.name, condition.value, condition.below
         if below is None:
             return f"{name.replace('_', ' ')} '{value}'"
@@ -207,7 +207,7 @@ def _list_conditions(
 
 
 def _separation(falls: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> float:
-    """Return how well chosen runs and runs that fall agree: F1, the mean of both shares [-]."""
+    """Return the F1 score of chosen runs as a prediction of which runs fall [-]."""
     inside = float(falls[chosen].sum())
     return 2.0 * inside / max(float(chosen.sum() + falls.sum()), 1.0)
 

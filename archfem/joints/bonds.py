@@ -55,7 +55,7 @@ class Bonds:
 
     @cached_property
     def cohesion(self) -> Array:
-        """Cohesion of the shifted law: c - μ f_t where intact, 0 where broken (p,) [Pa]."""
+        """Cohesion for gaps less `stretch`: c - μ f_t if bonded, 0 if broken (p,) [Pa]."""
         points = self.law.points
         with np.errstate(invalid="ignore"):  # infinite friction times zero strength
             lowered = points.cohesion - points.friction * self._strength
@@ -63,11 +63,11 @@ class Bonds:
         return np.where(self._strength > 0.0, bonded, points.cohesion)
 
     def energy_of_pull(self, gaps: Array) -> Array:
-        """Return the energy of the pull at each point, from shifted gaps (p,) [J]."""
+        """Return the energy of the forces `pull`, from gaps less `stretch` (p,) [J]."""
         return self.pull * (gaps + 0.5 * self.stretch)
 
     def find_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
-        """Return which bonds are pulled beyond their strength, from shifted gaps (p,)."""
+        """Return which bonds are pulled beyond their strength, from gaps less `stretch` (p,)."""
         return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * self.stretch)
 
     def most_exceeded(self, gaps: Array) -> NDArray[np.bool_]:

@@ -95,7 +95,7 @@ def is_closed(opening: Array) -> NDArray[np.bool_]:
 
 
 def mean_closing_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
-    """Return the derivative of `mean_closing` by a parameter, given those of both gaps [-]."""
+    """Return the derivative of `mean_closing` from those of the gaps at start and end [-]."""
     fraction = contact_fraction(start, end)
     # the fraction is 0 / 0 where both gaps just touch
     fraction = np.where(is_closed(start) & is_closed(end), 1.0, fraction)
@@ -106,7 +106,7 @@ def mean_closing_rate(start: Array, end: Array, rates: tuple[float, float]) -> A
 
 
 def contact_fraction_rate(start: Array, end: Array, rates: tuple[float, float]) -> Array:
-    """Return the derivative of `contact_fraction` by a parameter, from those of both gaps [1/m]."""
+    """Return the derivative of `contact_fraction` from those of the gaps at start and end [1/m]."""
     fraction, changes = contact_fraction(start, end), is_closed(start) != is_closed(end)
     total = np.where(changes, abs(start) + abs(end), np.inf)  # no derivative without a change
     by_start, by_end = (np.where(is_closed(gap), 1.0 - fraction, fraction) for gap in (start, end))

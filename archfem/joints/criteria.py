@@ -205,7 +205,7 @@ def failure_flags(
 
 
 def tension_margin(normal: Array, tension: Array) -> Array:
-    """Return normal forces, but their magnitude in joints with a bond, which are not open [N]."""
+    """Return normal forces, in absolute value in joints with a bond, which are never open [N]."""
     return np.where(tension > 0.0, np.abs(normal), normal)
 
 

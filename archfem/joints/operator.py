@@ -205,7 +205,7 @@ class JointOperator:
 
     @property
     def _effective_cohesion(self) -> Array:
-        """Cohesion beside the effective gaps (p,) [Pa]."""
+        """Cohesion to be used with `effective_gaps` (p,) [Pa]."""
         return self.points.cohesion if self.bonds is None else self.bonds.cohesion
 
     def add_bond_pull(self, normal: Array) -> Array:

@@ -75,7 +75,7 @@ def _fit_matrices(
 
 
 def face_measures(faces: Array, depth: Array) -> dict[str, Array]:
-    """Return what `FACE_MEASURES` names, from gaps at mid-depth, rotations and slips."""
+    """Return opening, rotation and slip of joints, from gaps at mid-depth, rotations and slips."""
     gap, rotation, slip = np.moveaxis(faces, -2, 0)
     opening = np.maximum(gap + 0.5 * depth * np.abs(rotation), 0.0)
     return {"opening": opening, "rotation": rotation, "slip": slip}
@@ -182,7 +182,7 @@ def check_instant(structure: Structure, joints: xr.Dataset) -> None:
 
 
 def select_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
-    """Return the variables of one joint, over time where the joints are.
+    """Return the variables of one joint, at one instant or over time.
 
     Args:
         joints: of all joints, as made by `joint_dataset`.

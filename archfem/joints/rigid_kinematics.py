@@ -11,7 +11,7 @@ from archfem.masonry.structure import Structure, rigid_motion_matrix
 
 
 def facet_ends(depth: float, cells: int) -> Array:
-    """Return the ends of equal facets along a joint (cells + 1,), from mid-depth outwards [m]."""
+    """Return offsets from mid-depth of the ends of equal facets along a joint (cells + 1,) [m]."""
     return depth * np.linspace(-0.5, 0.5, cells + 1)
 
 
@@ -50,7 +50,7 @@ Jump = tuple[Numbers, Numbers, Array]
 
 
 def _jump_entries(structure: Structure, points: JointPoints, places: Array) -> Jump:
-    """Return nonzero blocks of the jump, higher less lower block: row, first column, (2, 3)."""
+    """Return the nonzero blocks of the jump's matrix: their rows, first columns and values."""
     first_coordinate = np.full(len(structure.blocks), -1)
     first_coordinate[list(structure.free)] = 3 * np.arange(len(structure.free))
     centroids = np.array([block.centroid for block in structure.blocks])

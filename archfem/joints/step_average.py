@@ -44,7 +44,7 @@ class StepForces:
         return self.operator.effective_gaps(self.start), self.operator.trial_shear(self.start)
 
     def _gap_path(self, q: Array) -> tuple[Array, Array]:
-        """Return the gaps at both ends of the step, shifted by the lag of damping, each (p,)."""
+        """Return the gaps at start and end, plus their change times `damping_lag`, each (p,)."""
         before, after = self._before[0], self.operator.effective_gaps(q, self.end_opening)
         ahead = self.damping_lag * (after - before)
         return before + ahead, after + ahead

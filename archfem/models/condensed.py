@@ -34,7 +34,7 @@ def project_model(
     fidelity: str,
     operator: JointOperator | None = None,
 ) -> LinearBlockModel:
-    """Return a model in the coordinates of a basis; its joints may be others."""
+    """Return a model in the coordinates of a basis, on request with another joint operator."""
     cells, transposed = model.cells, basis.T.tocsr()
     return LinearBlockModel(
         model.structure,
@@ -161,7 +161,7 @@ def _condense_inner_nodes(
 
 
 def _merge_plane_facets(model: LinearBlockModel, plane: set[int]) -> JointOperator:
-    """Return the joints with one exact facet on each without slip between plane faces."""
+    """Return joints with a single facet where plane faces can neither slide nor bond."""
     # each end of a facet slides separately and has a bond of its own: joints that can slide, or are
     # bonded, need several
     if not isinstance(model.operator.law, Facets):

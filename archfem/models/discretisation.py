@@ -132,7 +132,7 @@ def _check_fidelity(fidelity: object) -> None:
 
 
 def _check_cells(cells: object) -> tuple[int, int]:
-    """Return both numbers of cells, or refuse impossible ones."""
+    """Return numbers of cells through the thickness and along a block; refuse impossible ones."""
     through, along = check_sequence(cells, "cells through the thickness and along each block", 2)
     for key, count in (("through", through), ("along", along)):
         if check_integer(count, f"cells {key}") > 1000:

@@ -219,10 +219,10 @@ class Observer(Protocol):
     corner_blocks: NDArray[np.intp]
 
     def read(self, q: Array) -> Array:
-        """Return all readings (r,)."""
+        """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
 
     def read_many(self, states: Array) -> Array:
-        """Return the readings of many states (steps, r)."""
+        """Return the rows of `read` for many states (steps, r)."""
 
     def joint_ends(self, q: Array) -> Array:
         """Return the displacements of both ends of each joint (n_joints, 2, 2) [m].
@@ -448,7 +448,7 @@ class Model(Protocol):
         return float(self.load(action) @ q)
 
     def face_mismatch(self, q: Array) -> tuple[float, str]:
-        """Return the largest slip past opposite facets, over their length, and its joint.
+        """Return the largest slip between paired facets, over their length, and its joint.
 
         Zero where joints are integrated over whole faces.
 
@@ -485,7 +485,7 @@ def check_model(model: object) -> None:
 
 
 def check_coordinate_count(model: Model, count: int) -> None:
-    """Refuse as many coordinates as another model has."""
+    """Refuse a number of coordinates that is not that of the model."""
     if count != model.size:
         raise InvalidInput(
             f"there are {count} coordinates, and the model has {model.size}: give the model, of "

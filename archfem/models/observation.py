@@ -34,11 +34,11 @@ class LinearObserver(Observer):
     support_motion: Array  # (n_blocks, 3) [m, m, rad]
 
     def read(self, q: Array) -> Array:
-        """Return all readings (r,)."""
+        """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
         return np.asarray(self.matrix @ q + self.offset)
 
     def read_many(self, states: Array) -> Array:
-        """Return the readings of many states (steps, r)."""
+        """Return the rows of `read` for many states (steps, r)."""
         return np.asarray((self.matrix @ states.T).T + self.offset)
 
     def joint_ends(self, q: Array) -> Array:

@@ -48,7 +48,7 @@ def import_gmsh_mesh(model: Any) -> tuple[Any, Any, Any]:
 
 
 def find_connectivity(grid: Any, start: int, end: int) -> Any:
-    """Return a function from an entity of dimension `start` to those of `end` at it."""
+    """Return a function from an entity of dimension `start` to adjacent ones of dimension `end`."""
     topology = getattr(grid.topology, "_cpp_object", grid.topology)
     topology.create_connectivity(start, end)
     return grid.topology.connectivity(start, end).links

@@ -224,7 +224,7 @@ def _side_cells(edges: Edges, number: int, settings: Discretisation) -> list[int
 
 
 def _minimum_edge_cells(edges: Edges, settings: Discretisation) -> tuple[Numbers, Array]:
-    """Return the minimum number of cells on each edge, and whether it is a stone's or joint's."""
+    """Return minimum numbers of cells on edges, and which ones a block's side or joint sets."""
     # cells on the edges of a side, or of a joint between two blocks without corners, are not longer
     # than those of the whole side
     minimum = np.ones(len(edges.ends), dtype=np.intp)
@@ -312,7 +312,7 @@ def _block_cell_sizes(
 def _grade_edges(
     edges: Edges, sizes: dict[int, CellSizes], intervals: int = 500
 ) -> dict[int, Array]:
-    """Return the number of cells up to equidistant places on edges of freely meshed blocks only."""
+    """Return cumulative numbers of cells along edges that belong to freely meshed blocks only."""
     structured = {edge for number in edges.structured for edge in edges.around[number]}
     cells: dict[int, Array] = {}
     for number, size in sizes.items():

@@ -51,7 +51,7 @@ Fields = tuple[Any, Any]
 
 @dataclass(frozen=True, eq=False)
 class ContactFaces:
-    """UFL expressions of gap, slip and tractions on the facets of one contact and colour."""
+    """UFL expressions of gap, slip and tractions on facets of one contact and one graph colour."""
 
     facets: JointFacets  # on all joints
     patch: Patch  # those of this contact and of one colour
@@ -99,7 +99,7 @@ class ContactFaces:
         return self._tractions(u, 0.0)
 
     def tangent_tractions(self, u: Any, fixed: Any) -> Fields:
-        """Return tractions for the tangent: points that slide by round-off alone hold.
+        """Return tractions to differentiate, with a limit raised so that round-off causes no slip.
 
         The limit is a little larger; `fixed` equals u, but the derivative by u leaves it constant.
         """
@@ -109,7 +109,7 @@ class ContactFaces:
         return self._tractions(u, SLIP_LIMIT_TOLERANCE * limit + CONTACT_PERTURBATION * closed)
 
     def _tractions(self, u: Any, reserve: Any) -> Fields:
-        """Tractions with a reserve on Coulomb's limit [Pa]."""
+        """Tractions with Coulomb's limit raised by `reserve` [Pa]."""
         normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
         shear = self._trial_shear(u)
         if self.patch.contact.slides:
@@ -121,7 +121,7 @@ class ContactFaces:
         return ufl.conditional(ufl.lt(self.opening(u) - CONTACT_PERTURBATION, 0.0), 1.0, 0.0)
 
     def _limit_of(self, u: Any) -> Any:
-        """Coulomb's limit of a displacement [Pa]."""
+        """Coulomb's limit at the normal traction that a displacement causes [Pa]."""
         normal = normal_traction(self.opening(u) - CONTACT_PERTURBATION, self._stiffness[0])
         return self._limit(normal, self._is_closed(u))
 
@@ -141,7 +141,7 @@ class ContactFaces:
         return self.slip(u) - shear / self._stiffness[1]
 
     def _gap_path(self, step: Fields, lag: Any) -> Fields:
-        """Gaps at both ends of the step, shifted by the lag of damping [m]."""
+        """Gaps at start and end of the step, plus their change times `lag`, due to damping [m]."""
         before, after = (self.opening(u) - CONTACT_PERTURBATION for u in step)
         ahead = lag * (after - before)
         return before + ahead, after + ahead
@@ -158,7 +158,7 @@ class ContactFaces:
         return self._limit(self._stiffness[0] * mean_closing(*path), contact_fraction(*path))
 
     def _mean_shear(self, step: Fields, lag: Any, shear_lag: Any) -> Fields:
-        """Mean shear with the limit at `lag`, and its elastic part at the end [Pa]."""
+        """Mean shear and its elastic part at the end, for damping lags of limit and shear [Pa]."""
         first, change = self._shear_path(step)
         if not self.patch.contact.slides:
             return first + (0.5 + shear_lag) * change, first + change
@@ -288,7 +288,7 @@ class Forms:
 
     @cached_property
     def _displacements(self) -> Fields:
-        """The displacement, and an equal one that derivatives leave constant."""
+        """The displacement, and a copy by which no form is differentiated."""
         return fem.Function(self.space.functions), fem.Function(self.space.functions)
 
     def _set_state(self, displacement: Array, slip: Array | None) -> None:

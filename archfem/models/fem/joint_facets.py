@@ -167,7 +167,7 @@ class JointFacets:
         return "GLL", 2 * self.size - 3
 
     def _cellwise_space(self, size: int) -> tuple[Any, Numbers]:
-        """Space of functions constant in each cell, `size` a colour; entries (f, 2, size)."""
+        """Space of cellwise constants, `size` for each colour; entries of facets (f, 2, size)."""
         functions = _fenicsx.vector_space(self.space.mesh.grid, "DG", 0, size * self._colour_count)
         nodes = _fenicsx.cell_dofs(functions)[self._cells, 0]
         number = nodes.astype(np.intp) * self._colour_count + self.colours[:, None]
@@ -175,7 +175,7 @@ class JointFacets:
 
     @cached_property
     def _values(self) -> tuple[Any, Numbers]:
-        """Function with the place of each facet and a value for each point; entries of those."""
+        """Function with geometry and point values of each facet; entries of the point values."""
         functions, entries = self._cellwise_space(FACET_VALUE_COUNT + self.size)
         structure = self.space.mesh.structure
         start, length = self._facet_order[2][:, :1], np.diff(self._facet_order[2], axis=1)
@@ -187,7 +187,7 @@ class JointFacets:
         return function, entries[..., FACET_VALUE_COUNT:]
 
     def set_point_values(self, values: Array) -> None:
-        """Set the values of all joint points that `point_values` has in forms (p,)."""
+        """Set the values at all joint points (p,), which forms read through `point_values`."""
         function, entries = self._values
         function.x.array[entries] = values[self.points][:, None]
 

@@ -143,7 +143,7 @@ def _generate(structure: Structure, settings: Discretisation) -> None:
 
 
 def _add_lines(division: Division, edge: int, corners: list[int]) -> list[int]:
-    """Add lines along an edge, each with the cells of which the edge has a multiple."""
+    """Add lines along an edge, each of `division.units` cells; the edge has a multiple of these."""
     geo = gmsh.model.geo
     unit = int(division.units[edge])
     first, last = division.edges.ends[edge]

@@ -189,7 +189,7 @@ class LargeDisplacementModel(Model):
         return measures.reshape(*q.shape[:-1], *measures.shape[1:])
 
     def face_mismatch(self, q: Array) -> tuple[float, str]:
-        """Return the largest slip past opposite facets, over their length, and its joint."""
+        """Return the largest slip between paired facets, over their length, and its joint."""
         law = self.joints.face_law
         if not law.paired.any():
             return 0.0, ""
@@ -255,7 +255,7 @@ class LargeDisplacementModel(Model):
         return poses, velocities
 
     def _momentum_projection(self, block: int, own: slice) -> Array:
-        """Return the matrix to the rigid motion of a fill with the same momentum (3, s)."""
+        """Return the matrix from fill coordinates to a rigid motion of equal momentum (3, s)."""
         cells = self.small.cells
         nodes = np.flatnonzero(cells.block == block)
         rows = (2 * nodes[:, None] + np.arange(2)).ravel()
@@ -317,11 +317,11 @@ class LargeObserver(Observer):
     corner_cells: RotatingCells
 
     def read(self, q: Array) -> Array:
-        """Return all readings (r,)."""
+        """Return gaps, rotations and slips of joints, then corner displacements, in a row (r,)."""
         return self.read_many(q[None])[0]
 
     def read_many(self, states: Array) -> Array:
-        """Return the readings of many states (steps, r)."""
+        """Return the rows of `read` for many states (steps, r)."""
         gap, slip, turn = np.moveaxis(self.model.measures(states), -1, 0)
         corners = self.corner_cells.displacement(states)
         corners = corners.reshape(len(states), 2 * len(self.corner_blocks))
