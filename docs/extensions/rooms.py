@@ -91,7 +91,7 @@ def public() -> dict[str, dict[str, Any]]:
             getattr(value, "__module__", "").startswith("archfem.masonry")
             and id(value) not in known
         ):
-            found["masonry"][f"archfem.shapes.{name}"] = value
+            found["masonry"][f"archfem.masonry.shapes.{name}"] = value
     return found
 
 
@@ -192,7 +192,10 @@ def aliases() -> dict[str, str]:
             if hasattr(value, "__qualname__"):
                 found[f"{value.__module__}.{value.__qualname__}"] = name
             found[name.rpartition(".")[2]] = name
-            found["af." + name.removeprefix("archfem.")] = name
+            short = name.removeprefix("archfem.")
+            # users write af.shapes for the module of masonry
+            for written in (short, short.replace("masonry.shapes.", "shapes.")):
+                found["af." + written] = found["archfem." + written] = name
     return found
 
 
