@@ -155,7 +155,7 @@ def _add_case_commands(commands: Any) -> None:
 
 
 def _load_command(module: str, name: str) -> Command:
-    """Return a command that is imported when it is called, since most import all rooms."""
+    """Return a command whose module is imported when it is called, since imports take time."""
 
     def command(options: argparse.Namespace) -> int | None:
         return getattr(import_module(f"archfem.commands.{module}"), name)(options)

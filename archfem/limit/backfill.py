@@ -1,4 +1,4 @@
-"""Backfill in limit analysis: earth pressure on stones, load spreading, self-weight programme.
+"""Backfill in limit analysis: earth pressure, load spreading, linear programme of self-weight.
 
 A fill is not a body here but an action on the stones below it. The structure is cut into vertical
 strips: the weight of each column of fill rests on the stone at its foot, the vertical stress in it
@@ -137,7 +137,7 @@ class Fill:
 
     @property
     def edge(self) -> float:
-        """Slope of the fan's edges, horizontal to vertical [-]."""
+        """Slope of the outermost rays along which a load spreads, horizontal to vertical [-]."""
         return tan(radians(self.spread))
 
     def pressures(self, overburden: Array) -> tuple[Array, Array]:
@@ -168,7 +168,7 @@ class Fill:
 
 
 def _flamant(slope: Array) -> Array:
-    """Return θ + sin θ cos θ, proportional to the force between the vertical and a ray."""
+    """Return θ + sin θ cos θ, proportional to the force in the sector from vertical to ray."""
     return np.asarray(np.arctan(slope) + slope / (1.0 + slope**2), dtype=float)
 
 
@@ -247,7 +247,7 @@ class FillProfile:
 
     @cached_property
     def near(self) -> float:
-        """Distance of points that count as one [m]."""
+        """Distance below which points coincide [m]."""
         return CONTACT_TOLERANCE * self.structure.size
 
     @cached_property
@@ -287,7 +287,7 @@ class FillProfile:
 
     @cached_property
     def _skyline(self) -> tuple[NDArray[np.intp], Array, Array]:
-        """Highest stone below each of many narrow pieces: number or -1, x and y of its sides."""
+        """Top surface of the stones, in narrow pieces: block or -1, and x and y of both sides."""
         cut, stone = self.slices, self.stones[self.slices.block]
         blocks, sides, levels = [], [], []
         for strip in range(int(cut.strip.max()) + 1):
@@ -307,7 +307,7 @@ class FillProfile:
         return np.concatenate(blocks), np.concatenate(sides), np.concatenate(levels)
 
     def fan(self, point: Array, fill: Fill) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return stones, points and parts of a load that spreads through the fill in a fan."""
+        """Return the stones that a load reaches through the fill, points there, and its shares."""
         halves = [self._half_fan(point, fill, sense) for sense in (1, -1)]
         block, points, part = (np.concatenate(values) for values in zip(*halves, strict=True))
         return block, points, part
@@ -315,7 +315,7 @@ class FillProfile:
     def _half_fan(
         self, point: Array, fill: Fill, sense: int
     ) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return the fan on one side of a load, outwards: to the right where sense is 1."""
+        """Return `fan` for the rays on one side of the load: right if sense is 1, left if -1."""
         block, side, level = self._skyline
         distance = sense * (side[:, ::sense] - point[0])
         beyond = np.flatnonzero(distance[:, 1] > self.near)[::sense]
@@ -374,7 +374,7 @@ class BlocksWithFill:
 
     @cached_property
     def _place(self) -> NDArray[np.intp]:
-        """Number in the rigid regions of each block of the whole, -1 for the fill (n_blocks,)."""
+        """Index of each block of `whole` in the rigid regions, -1 for the fill (n_blocks,)."""
         place = np.full(self.rigid_regions.size, -1)
         place[list(self.rigid_regions.blocks)] = np.arange(len(self.rigid_regions.blocks))
         return place
@@ -516,7 +516,7 @@ class BlocksWithFill:
         return sparse.csr_matrix((entries[rows].ravel(), (rows.repeat(3), columns.ravel())), shape)
 
     def _sum_forces(self, block: NDArray[np.intp], points: Array, forces: Array) -> Array:
-        """Return the sum of those generalised forces (3 n_free,)."""
+        """Return the sum of the generalised forces of forces at points (3 n_free,)."""
         return np.asarray(self._apply_forces(block, points, forces).sum(axis=0)).ravel()
 
 
@@ -545,7 +545,7 @@ def attach_fill(structure: Structure, fill: Fill | None) -> BlocksWithFill:
 
 
 def _check_options(structure: Structure, friction: str | None, strength: float | None) -> None:
-    """Refuse unknown options, and bonds, which break and do not yield."""
+    """Refuse unknown options, and joints with tensile strength, which break and do not yield."""
     if not is_one_of(friction, choices := ("coulomb", "nonassociated", None)):
         raise InvalidInput(f"friction {short_repr(friction)} is not known: use one of {choices}")
     if strength is not None and not check_number(strength, "strength [Pa]") > 0.0:
@@ -561,7 +561,7 @@ def _check_options(structure: Structure, friction: str | None, strength: float |
 def self_weight_programme(
     structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
 ) -> tuple[BlocksWithFill, Programme]:
-    """Return the rigid stones, and the programme of their self-weight without an objective."""
+    """Return the rigid stones, and the linear programme of their self-weight without objective."""
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
     _check_options(structure, friction, strength)
     stones = attach_fill(structure, fill)

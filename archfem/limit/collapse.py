@@ -270,7 +270,7 @@ def closed_cohesion(structure: Structure, joints: xr.Dataset) -> Structure:
 
 
 def contact_fractions(structure: Structure, normal: Array, moment: Array) -> Array:
-    """Return the closed part of each joint, by a linear pressure; 0 without any (n_joints,)."""
+    """Return the closed fraction of each joint, for linear pressure; 0 without any (n_joints,)."""
     pressed = normal > 0.0
     eccentricity = np.abs(moment) / np.where(pressed, normal, 1.0) / structure.depths
     return np.where(pressed, np.clip(3.0 * (0.5 - eccentricity), 0.0, 1.0), 0.0)
@@ -336,7 +336,7 @@ def _read_bound(
     solutions: NonassociatedBounds,
     lower: bool,
 ) -> Collapse:
-    """Return the safe end of the bracket, where the search without dilatancy has no state."""
+    """Return the safe bound of the factor, where no state without dilatancy was found."""
     logger.warning(
         "no state without dilatancy was found; the factor is only a bound: %s", solutions
     )

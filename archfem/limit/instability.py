@@ -20,13 +20,13 @@ UNLIMITED_DEPTH, UNLIMITED_FRICTION = 1e3, 1e3
 
 @dataclass(frozen=True, eq=False)
 class DeepenedBlocks(RigidBlocks):
-    """Rigid blocks of the same weight whose joints are deeper, about their middles."""
+    """Rigid blocks with joints deepened about their mid-points by a factor, at unchanged weight."""
 
     factor: float = 1.0
 
     @property
     def balance(self) -> sparse.csr_matrix:
-        """Balance of the free blocks with forces at the ends of the deeper joints."""
+        """Equilibrium matrix of the free blocks for forces at the ends of the deepened joints."""
         count = len(self.structure.depths)
         # an end at ± f h/2 is the sum of (1 ± f)/2 of the forces at the ends at ± h/2
         near, far = (0.5 * (1.0 + s * self.factor) * sparse.identity(count) for s in (1.0, -1.0))
@@ -83,7 +83,7 @@ def explain_instability(structure: Structure) -> str | None:
 
 
 def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) -> bool:
-    """Return whether blocks stand with at least a friction, and joints deeper by a factor."""
+    """Return whether blocks stand with at least this friction, and joints deepened by a factor."""
     blocks: RigidBlocks = dead.blocks
     coefficient: Array = blocks.structure.friction
     if friction is not None:

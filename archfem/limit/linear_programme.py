@@ -100,7 +100,7 @@ class RigidBlocks:
 
     @cached_property
     def balance(self) -> sparse.csr_matrix:
-        """Balance of the free blocks, in the programme's units (3 n_free, 3 n_joints)."""
+        """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
         sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
         return sparse.diags(self.coordinate_units) @ self.kinematics.T @ sparse.diags(sign)
 
@@ -211,7 +211,7 @@ class Programme:
         return self.with_unknowns(column, np.array([-1.0]))
 
     def minimise_residual(self) -> Optimum:
-        """Return the least sum of forces missing for equilibrium; the multipliers are a fall."""
+        """Minimise the sum of residual forces; the multipliers are the motion of the fall."""
         identity = sparse.identity(len(self.load))
         columns = sparse.hstack([identity, -identity], format="csr")
         optimum = self.with_unknowns(columns, np.ones(2 * len(self.load))).solve()
@@ -219,7 +219,7 @@ class Programme:
         return optimum
 
     def objective(self, state: Optimum) -> float:
-        """Return a·x + b·z of a state of another programme over the same unknowns."""
+        """Return the objective a·x + b·z at a state of another programme of the same unknowns."""
         force_cost = 0.0 if self.force_cost is None else self.force_cost @ state.forces
         return float(force_cost + self.unknown_cost @ state.unknowns)
 

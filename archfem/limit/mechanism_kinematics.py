@@ -36,7 +36,7 @@ from archfem.masonry.structure import Structure
 
 @dataclass(frozen=True, eq=False)
 class VerifiedMechanism:
-    """Mechanism by motion at an instant, beside the mechanism by count.
+    """Mechanism found as a rigid-block motion at an instant, and that found by counting joints.
 
     Attributes:
         moved: mechanism by motion, with the blocks that move and the joints that open or slip; its
@@ -75,7 +75,7 @@ def verified_mechanism(
     *,
     limit: float | None = None,
 ) -> VerifiedMechanism:
-    """Search a rigid-block motion that the joints failed at one instant permit.
+    """Search for a rigid-block motion that the joints failed at one instant permit.
 
     The largest motion v, within a box, that opens a joint only where it hinges (away from the face
     that stays in contact) or has come apart, slides only where friction and cohesion are used up
@@ -187,11 +187,11 @@ class Verifier:
 
     @cached_property
     def loop_check(self) -> "LoopCheck":
-        """Fast check of most states that permit no motion of the judged parts."""
+        """Fast check that excludes most states in which the assessed parts cannot move."""
         return LoopCheck(self.blocks, self.parts)
 
     def verify(self, joints: xr.Dataset) -> VerifiedMechanism:
-        """Search a motion at one instant, as `verified_mechanism` does.
+        """Search for a motion at one instant, as `verified_mechanism` does.
 
         Args:
             joints: of the whole structure, as made by `joint_dataset`, with their flags.
@@ -224,7 +224,7 @@ class Verifier:
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
 
     def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
-        """Search a motion as `verify` does, after the fast check of the loops.
+        """Search for a motion as `verify` does, after the fast check of the loops.
 
         Args:
             joints: as for `verify`.
@@ -259,7 +259,7 @@ class Verifier:
 def joint_freedoms(
     side: NDArray[Any], slides: NDArray[np.bool_], apart: NDArray[np.bool_], sense: NDArray[Any]
 ) -> Array:
-    """Return the freedoms of joints, as `Verifier.freedoms` does (…, 3 n_joints)."""
+    """Return the permitted openings and slips of joints, as `Verifier.freedoms` (…, 3 n_joints)."""
     either = apart | (slides & (sense == 0.0))  # no friction and no shear force: either way
     slips = np.where(either, 2.0, np.where(slides, sense, 0.0))
     return np.concatenate([(side > 0) | apart, (side < 0) | apart, slips], axis=-1)

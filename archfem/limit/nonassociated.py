@@ -46,7 +46,7 @@ OBJECTIVE_DECREASE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class AlternatingIterate:
-    """Forces and mechanism after one alternation, and their gap."""
+    """Forces and dual mechanism after one alternation, and their duality gap."""
 
     state: Optimum  # forces and objective, with the mechanism as its multipliers
     gap: float  # [units of the objective]
@@ -56,7 +56,7 @@ class AlternatingIterate:
 def find_solution(
     programme: Programme, forces: Array, max_alternations: int = 30
 ) -> AlternatingIterate | None:
-    """Alternate from given forces to a solution without dilatancy; None where the gap stagnates."""
+    """Find a solution without dilatancy from given forces; None if the duality gap stagnates."""
     smallest = np.inf
     for _ in range(max_alternations):  # most end within three
         iterate = _alternate(programme, programme, forces, 1.0)
@@ -71,7 +71,7 @@ def find_solution(
 def descend(
     programme: Programme, first: AlternatingIterate | None, forces: Array, patience: int
 ) -> Iterator[AlternatingIterate]:
-    """Yield ever weaker solutions, until `patience` alternations in a row find none."""
+    """Yield solutions of increasing objective until `patience` alternations in a row find none."""
     rng, fruitless, perturb, smallest = np.random.default_rng(1), 0, first is not None, np.inf
     restricted = programme
     if first is not None:
@@ -92,7 +92,7 @@ def descend(
 def _alternate(
     programme: Programme, restricted: Programme, forces: Array, factor: Array | float
 ) -> AlternatingIterate | None:
-    """Find the mechanism for forces, then forces of `restricted` for its slips times a factor."""
+    """Find the mechanism dual to forces, then the forces of least gap for its scaled slips."""
     resistance = shear_resistance(programme, normal_forces(forces)) + RESISTANCE_MARGIN
     try:
         mechanism = replace(programme, limits=shear_limits(programme, resistance)).solve()
@@ -114,7 +114,7 @@ def _alternate(
 
 
 def _minimise_gap(programme: Programme, slips: Array, preference: float = 1e-4) -> Optimum | None:
-    """Return the forces of least gap for given slips, among equal gaps the weakest."""
+    """Return the forces of least gap for given slips; ties go to the largest objective."""
     # The small `preference` for a weak objective decides between states of the same gap.
     dissipation = friction_coefficients(programme) * slips
     cost = np.concatenate([dissipation, dissipation, np.zeros(len(dissipation))])
@@ -125,7 +125,7 @@ def _minimise_gap(programme: Programme, slips: Array, preference: float = 1e-4) 
 
 
 def _require_weaker(programme: Programme, value: float) -> Programme:
-    """Return the programme restricted to objectives above a value: weaker states."""
+    """Return the programme with the objective bounded from below, by slightly more than a value."""
     least = value + OBJECTIVE_DECREASE * abs(value)
     if programme.force_cost is None:  # the first unknown is the load factor, at a cost of -1
         upper_bounds = np.concatenate([[max(-least, 0.0)], programme.upper_bounds[1:]])
@@ -208,7 +208,7 @@ class NonassociatedBounds:
 def search_nonassociated(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
-    """Search the weakest state whose joints slide without opening, from many starts downwards."""
+    """Search from many starts for the state of largest objective that slides without dilatancy."""
     # the number of starts falls with the joints squared
     joints = len(programme.blocks.structure.depths)
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
@@ -243,7 +243,7 @@ def _objective(iterate: AlternatingIterate) -> float:
 
 
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
-    """Return the weakest solution without dilatancy reached from given forces, or None."""
+    """Return the solution of largest objective found from given forces, or None."""
     iterates = [find_solution(programme, forces) for forces in starts]
     solutions = [iterate.state for iterate in iterates if iterate is not None]
     return max(solutions, key=lambda state: state.value, default=None)
@@ -275,7 +275,7 @@ def _random_vertices(
 def _random_vertex(
     programme: Programme, start: Optimum | None, rng: np.random.Generator
 ) -> Optimum | None:
-    """Return the state of least randomly weighted compressions under a random part of the load."""
+    """Minimise a randomly weighted sum of compressions, under a random fraction of the load."""
     joints = len(programme.blocks.structure.depths)
     cost = np.concatenate([rng.random(2 * joints), np.zeros(joints)])
     if programme.force_cost is not None:  # a settlement: its work at random weight

@@ -90,7 +90,7 @@ class Stage:
     names: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Describe share, work, and hinges, in one line."""
+        """Describe the share of the movement, the work, and the hinges, in one line."""
         hinges = [
             f"{name} at the {side}" for (_, side), name in zip(self.hinges, self.names, strict=True)
         ]
@@ -276,7 +276,7 @@ def _rotation_matrix(turn: float) -> Array:
 
 
 class _PathEnd(Exception):
-    """The movement ends here."""
+    """Raised with the reason where no further equilibrium is found."""
 
     def __init__(self, end: End) -> None:
         super().__init__(end.sentence)
@@ -314,7 +314,7 @@ class _MovementPath:
         return Movement(self.structure, self.settlement, share, end, tuple(stages), displacement)
 
     def _programme(self, blocks: DisplacedBlocks, further: Array | None = None) -> Programme:
-        """Return the programme of least work on the gaps, with those of a further movement."""
+        """Return the linear programme of least work on gaps, present and by a further movement."""
         gaps = blocks.current_gaps
         # gaps of round-off make the solver of programmes stall
         gaps = np.where(np.abs(gaps) > 1e-10 * self.structure.size, gaps, 0.0)
@@ -325,7 +325,7 @@ class _MovementPath:
         return Programme(blocks, load, limits, force_cost=np.concatenate([*gaps[:2], -gaps[2]]))
 
     def _solve(self, programme: Programme) -> Optimum:
-        """Return the optimum, or raise the end that its absence means."""
+        """Return the optimum; where there is none, raise the reason for which the movement ends."""
         try:
             optimum = programme.solve()
         except NoEquilibrium as error:
@@ -359,7 +359,7 @@ class _MovementPath:
         raise _PathEnd(End.LEAPS)
 
     def _check_friction(self, blocks: DisplacedBlocks) -> None:
-        """Raise the end by sliding where no state at these places is within friction."""
+        """End the movement by sliding where no equilibrium satisfies the friction limits."""
         if not self.has_friction:
             return
         limits = friction_limits(self.structure.friction, blocks.cohesion)

@@ -166,7 +166,7 @@ def _axles_on_structure(
 def _collapse_factors(
     stones: BlocksWithFill, dead: Programme, rows: Sequence[AxleRow], options: dict[str, Any]
 ) -> dict[AxleRow, float]:
-    """Return the collapse factor of each row of axles, where possible by the common programme."""
+    """Return the collapse factor of each row of axles; a full search only where it is needed."""
     factors = dict.fromkeys(rows, np.inf)
     loads = {row: stones.load(row) for row in rows}
     # rows whose load reaches the stones, beyond round-off of the fan
@@ -192,7 +192,7 @@ def _search_nonassociated(
     associated: dict[AxleRow, Optimum | None],
     random_starts: int = 2,
 ) -> dict[AxleRow, Optimum | None]:
-    """Search the weakest state without dilatancy of each place, from place to place."""
+    """Find the state of least factor without dilatancy at each place, started from neighbours."""
     # Forwards from the associated optimum, a few random states and the solution of the place
     # before; then backwards once more from the solution of the place behind.
     states: dict[AxleRow, Optimum | None] = dict.fromkeys(programmes)
@@ -211,7 +211,7 @@ def _search_nonassociated(
 
 
 def _find_worst(factors: Array, count: NDArray[np.intp]) -> tuple[int, int]:
-    """Return direction and place of the least factor; where none is finite, of most axles."""
+    """Return direction and position of the least factor; if none is finite, of the most axles."""
     finite = np.isfinite(factors)
     flat = np.where(finite, factors, np.inf).argmin() if finite.any() else count.argmax()
     direction, place = np.unravel_index(flat, factors.shape)

@@ -78,7 +78,7 @@ def intersect_arc(ends: Array, centre: Array, x: float) -> list[float]:
 
 
 def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[int] = ()) -> int:
-    """Return on which side of a line an outline lies whose straight edges cover it (1 is left)."""
+    """Return the side of a line on which an outline lies: 1 left, -1 right, 0 if not along it."""
     # An anticlockwise outline has its interior on the left: an edge in the direction of the line
     # belongs to an outline on its left, an opposite one to an outline on its right.
     (x, y), (x_end, y_end) = line.tolist()  # for few numbers, floats are faster than arrays
@@ -200,7 +200,7 @@ class Block:
         return max(met, default=None)
 
     def side_of(self, line: Array, near: float) -> int:
-        """Return on which side of a line it lies that it touches with straight edges.
+        """Return on which side of a line the block lies, if its straight edges cover the line.
 
         Args:
             line: its start and end (2, 2) [m].

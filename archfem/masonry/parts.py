@@ -140,7 +140,7 @@ class Direction:
         return bool(2.0 * (step @ self.outward(line.mean(axis=0))) ** 2 > step @ step)
 
     def along(self, place: Array) -> float:
-        """Return the coordinate of a point along: to the right, upwards, or the clockwise angle."""
+        """Return a point's coordinate along the part: rightwards, upwards, or clockwise angle."""
         # angles start at the gap between the springings, so at the left springing
         if self.centre is None:
             return float(place[1] if self.upright else place[0])

@@ -185,7 +185,7 @@ class _TargetAccelerations:
         self.wave_periods = np.maximum(self.periods, band[0])
 
     def distance(self, samples: Array, dt: float, peaks: Array) -> float:
-        """Compute the misfit of samples with given peaks [-]."""
+        """Compute the misfit of the spectrum of samples, and of their peak acceleration [-]."""
         response = response_spectra.find_peak_responses(samples, dt, self.checks, self.damping)[0]
         apart = _relative_misfit(np.abs(response), self.check_values)
         if self.periods[0] > 0.0:

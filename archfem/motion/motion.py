@@ -55,7 +55,7 @@ class Motion(ResultDisplay):
                 )
 
     def _summary(self) -> str:
-        """What it is, in a line or two."""
+        """Describe the motion in one line."""
         return f"Motion '{self.name}': {self.duration:.4g} s, peak {self.pga:.3g} m/s²"
 
     @classmethod
@@ -108,7 +108,7 @@ class Motion(ResultDisplay):
         dt: float = 0.005,
         vertical_ratio: float = 2.0 / 3.0,
     ) -> "Motion":
-        """Return an artificial accelerogram without drift, as `synthetic` makes it from noise.
+        """Return an artificial accelerogram without drift, generated from noise with an envelope.
 
         Args:
             duration: time of the last sample [s].
@@ -298,7 +298,7 @@ class Motion(ResultDisplay):
         )
 
     def rotated(self, angle: float) -> "Motion":
-        """Return the motion along horizontal axes turned from the horizontal to the transverse.
+        """Return the motion in horizontal axes rotated by an angle, from horizontal to transverse.
 
         Args:
             angle: by which the axes turn [rad].

@@ -56,7 +56,7 @@ class Suite:
         scale: float = 1.0,
         reduction: float = 1.0,
     ) -> "Suite":
-        """Combine horizontals and verticals; of six and three, each vertical serves two.
+        """Combine horizontal and vertical motions; fewer verticals serve several horizontals each.
 
         Args:
             name: of the suite.

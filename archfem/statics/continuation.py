@@ -67,7 +67,7 @@ class GrowingLoad:
         return sum(self.model.load_rate(action, q) for action in self.actions)
 
     def displacement(self, q: Array) -> float:
-        """Return the displacement of the load along itself [m]."""
+        """Return the displacement conjugate to the load: work of the load by its magnitude [m]."""
         if self.model.large_displacements:
             return sum(self.model.work(action, q) for action in self.actions) / self.size
         return float(self.first @ q) / self.size
@@ -110,7 +110,7 @@ class LoadPath:
 
     @property
     def displacements(self) -> Array:
-        """Displacement of the load along itself, since the dead load (steps,) [m]."""
+        """Displacement conjugate to the load, since the dead load (steps,) [m]."""
         first = self.load.displacement(self.states[0])
         return np.array([self.load.displacement(q) - first for q in self.states])
 

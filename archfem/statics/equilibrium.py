@@ -274,7 +274,7 @@ def _increment_load(
     what: str,
     searches: SearchSequence = LOAD_SEARCHES,
 ) -> Equilibrium:
-    """Follow an equilibrium while a load or a motion grows: `at` gives model and load of a part."""
+    """Follow an equilibrium while a load or motion grows; `at(factor)` returns model and load."""
     find, find_halved, find_smallest = searches
     factor, step = 0.0, 1.0
     while factor < 1.0:

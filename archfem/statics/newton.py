@@ -127,7 +127,7 @@ class EquilibriumSolver:
         return bool(residual <= rounding_unit * np.linalg.norm(abs(tangent) @ abs(q)))
 
     def _check_tangents(self, tangent: Tangent) -> Tangent:
-        """Wrap a tangent: record its first stiffness, refuse symmetric methods if unsymmetric."""
+        """Wrap a tangent: record its largest entry, refuse symmetric solvers if unsymmetric."""
         # Only the tangent at the start counts: later iterates may be anywhere.
         symmetric = {"pc_type": ("cholesky", "icc"), "ksp_type": ("cg", "minres", "symmlq")}
         petsc = self.settings.petsc

@@ -193,7 +193,7 @@ def pushover(
 
 
 def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
-    """Add states until a rule ends the path, and return it as text."""
+    """Add states until a rule ends the path, and return this rule as text."""
     # normals (displacement, factor) of the added equation; that of arc length turns with the curve
     fixed = {"displacement": np.array([1.0, 0.0]), "force": np.array([0.0, 1.0])}
     min_distance, easy_iterations, easy_growth = 1e-3, 4, 1.4

@@ -122,7 +122,7 @@ class PetscNewton:
             self._loaded = tangent
 
     def _call(self, function: Callable[[Array], Any], q: PETSc.Vec) -> Any:
-        """Return a function of a vector; store an exception for `attempt` to raise."""
+        """Evaluate a function at a vector; store an exception for `attempt` to raise."""
         try:
             return function(q.array_r)
         except BaseException as error:

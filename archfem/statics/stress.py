@@ -237,13 +237,13 @@ def check_state(model: Model, q: Array) -> None:
 
 
 def corner_stress_operator(cells: Cells) -> sparse.csr_matrix:
-    """Return stress at the corners, (σ_xx, σ_yy, σ_xy) in turn, from coordinates (3 m, n)."""
+    """Return the matrix from coordinates to corner stresses, σ_xx, σ_yy, σ_xy in turn (3 m, n)."""
     fit = sparse.kron(_fit_planes(cells), sparse.identity(3))
     return (fit @ _cell_stress_operator(cells)).tocsr()
 
 
 def _cell_stress_operator(cells: Cells) -> sparse.csr_matrix:
-    """Return the mean stress of the cells from coordinates."""
+    """Return the matrix from coordinates to the mean stresses of the cells."""
     if cells.stress is None:
         raise InvalidInput(
             "rigid blocks have no stress: build the model with fidelity='faces' or a higher one, "

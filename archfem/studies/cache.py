@@ -1,4 +1,4 @@
-"""Cache of a process between points: models under dead load, damping, modes, steppers, motions.
+"""Cache of one process between points of a study: models, damping, modes, steppers, motions.
 
 The points of a study often differ in few keys. Everything that a later point shares with an earlier
 one, by the contents of its case and files, is taken from here, and has the same bits as if it were
@@ -42,7 +42,7 @@ _cache: dict[str, OrderedDict[str, Any]] = {}
 
 
 class SharedStepper(Stepper):
-    """Stepper whose matrices are copies of those that steppers of the same model share.
+    """Stepper with copies of the matrices that are assembled once for all runs of a model.
 
     A run changes its matrices, for instance by the compliance rows that it computes. Copies of the
     matrices as they were assembled make each run independent of earlier runs.
@@ -60,7 +60,7 @@ class SharedStepper(Stepper):
         return SharedStepper(equation, self.solver, self._shared_systems)
 
     def allocate_batch(self, state: State, dt: float, times: Array) -> tuple[Any, ...]:
-        """Return the arguments of `base.advance`, as `Stepper.allocate_batch` does."""
+        """Return the arguments of `base.advance`, with copies of the shared matrices."""
         shared = self._shared_systems
         if dt not in self._systems:
             assert self.solver is not None

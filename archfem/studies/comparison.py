@@ -73,7 +73,7 @@ class Finding:
 
     @property
     def factors(self) -> dict[str, Array]:
-        """Smallest failing scales by definition, as `least`."""
+        """Smallest failing scale of each pair (pairs,) [-], for each definition of a mechanism."""
         return {definition: self.least(definition) for definition in MECHANISM_DEFINITIONS}
 
 
@@ -316,7 +316,7 @@ def findings_of_run(run: History) -> Findings:
 
 
 def _prefix(prefix: str, values: Mapping[str, Any]) -> Findings:
-    """Prepend a prefix to all names; a flat table has no tables in it."""
+    """Prepend a prefix to the names of findings."""
     return {f"{prefix}: {name}": value for name, value in values.items()}
 
 

@@ -271,7 +271,7 @@ def case_accuracy(
 
 
 def _case_keys(setting: Setting) -> dict[str, Any]:
-    """Keys of a case for a setting."""
+    """Values of a setting by their keys in a case file."""
     model = setting.discretisation
     keys: dict[str, Any] = {
         "model.fidelity": model.fidelity,
@@ -291,7 +291,7 @@ def evaluate_time(case: Case, damping: Viscous | None) -> Findings:
 
 
 def _to_run(row: xr.Dataset) -> TimedRun:
-    """The run of a row; the row of a point that failed is NaN."""
+    """Convert the row of a point to a timed run; the row of a failed point is NaN."""
     if not row["coordinates"].notnull():
         return TimedRun(0, inf, None)
     peaks = row["peaks"].values

@@ -27,7 +27,7 @@ Findings = dict[str, Any]
 
 
 def evaluate_dead_load(case: Case) -> Findings:
-    """Return the largest joint ratios under dead load, and the first mode about it."""
+    """Return the largest |e| and friction of joints under dead load, and the first mode."""
     result = dead_load_of(case)
     joints, first = assessed_joints(result.dead.joints), first_mode(result)
     return {

@@ -99,7 +99,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     seed: int = 0,
     workers: int = 1,
 ) -> VerdictRange:
-    """Run a motion with large displacements over its uncertain properties.
+    """Run a structure under a motion with large displacements, for ranges of uncertain properties.
 
     The run as given comes first, then each property at each of its values alone, then a Latin
     hypercube over all (McKay, Beckman and Conover, 1979). By default these are varied:
@@ -184,7 +184,7 @@ def verdict_range_of_case(case: Case, **options: Any) -> VerdictRange:
 def verdict_range_of_bracket(
     bracket: CollapseScale, structure: Structure, motion: Motion, **options: Any
 ) -> VerdictRange:
-    """Run over its uncertain properties, and over the scales of a bracket."""
+    """Run a structure over its uncertain properties, and over motion scales within a bracket."""
     if bracket.lower == 0.0:
         raise InvalidInput(
             "it fell at the smallest scale that was tried, so that no scale is known to stand: "

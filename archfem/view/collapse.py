@@ -183,7 +183,7 @@ def draw_fall(run: History) -> Figure:
 def _select_instants(
     falls: FallingBlocks, shares: Sequence[float] = (0.0, 1.0 / 3.0, 2.0 / 3.0)
 ) -> list[float]:
-    """Return the times [s] at which the blocks' mean descent reaches its shares, and the end."""
+    """Return the times [s] when mean descent reaches shares of its final value, and the last."""
     descent = -falls.poses[:, list(falls.structure.free), 1].mean(axis=1)
     # blocks may bounce: only the progress counts
     progress = np.maximum.accumulate(descent - descent[0])

@@ -127,7 +127,7 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
 
 
 def _draw_band(axes: Axes, joints: xr.Dataset, label: str, colour: str, *, shade: float) -> None:
-    """Draw the least and the largest eccentricity of joints; dotted where there is no shade."""
+    """Draw the least and the largest eccentricity of joints, dotted if the band is not shaded."""
     span, number = envelope(joints), np.arange(joints.sizes["joint"])
     style: dict[str, Any] = {"color": colour, "lw": 1.3, "marker": "o", "ms": 2.8}
     if shade > 0.0:

@@ -76,7 +76,7 @@ def draw_study(
 
 
 def _draw_ranges(axes: Axes, scales: Mapping[str, Array], end: float) -> None:
-    """Draw median and range of scales (cases, pairs) by definition; arrows at the end."""
+    """Draw median and range of scales (cases, pairs) by definition; arrows for infinite medians."""
     explanations = {
         "any joints at once": "enough joints fail at once",
         "one part at once": "enough of one ring or pier fail at once",

@@ -32,7 +32,7 @@ class ReportData:
 
     @cached_property
     def dead(self) -> xr.Dataset | None:
-        """Joints under dead load (joint), where runs start; None without a run."""
+        """Joints under dead load (joint), at the first instant of a run; None without a run."""
         for run in self.runs.values():
             return run.joints.isel(time=0, drop=True)
         return None

@@ -125,7 +125,7 @@ class Sidewall:
     name: str = "sidewall"
 
     def __post_init__(self) -> None:
-        """Check the state and the lengths."""
+        """Check the lengths, and that the courses are free, retained or fixed."""
         _check_lengths(self, "length", "height", "course")
         _check_lengths(self, "above", "setback", zero=True)
         if self.state not in ("free", "retained", "fixed"):

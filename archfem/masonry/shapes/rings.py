@@ -312,7 +312,7 @@ def _stack_blocks(
     part: str,
     names: tuple[str, str],
 ) -> list[Block]:
-    """Build rectangular blocks between levels, the lowest fixed; names of it and of the others."""
+    """Build rectangular blocks between levels; the lowest is fixed and has its own name."""
     left, right = middle - breadth / 2.0, middle + breadth / 2.0
     return [
         Block(

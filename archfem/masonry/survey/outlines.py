@@ -229,7 +229,7 @@ def _assign_corners(blocks: Sequence[Block], snap: float) -> tuple[Block, ...]:
 
 
 def _find_corners(block: Block, direction: Direction | None) -> tuple[int, int, int, int] | None:
-    """Return four clear corners, the first and third side along the ring or else the longer."""
+    """Return four clear corners, so that sides 1 and 3 run along the ring, or are the longer."""
     steps = np.roll(block.points, -1, axis=0) - block.points
     before = np.roll(steps, 1, axis=0)
     turns = np.arctan2(

@@ -120,7 +120,7 @@ def _find_ties(boundaries: Boundaries, places: Array, snap: float) -> dict[int, 
 def _find_bends(
     boundaries: Boundaries, places: Array, ties: dict[int, Edge], snap: float
 ) -> dict[int, Edge]:
-    """Return the inner places of joints straight to the tolerance, each with the joint ends."""
+    """Return the inner vertices of nearly straight joints, each with the ends of its joint."""
     on: dict[frozenset[int], list[int]] = {}
     for place, edge in ties.items():
         on.setdefault(frozenset(edge), []).append(place)

@@ -102,7 +102,7 @@ class RecordText:
         return np.array(numbers), line
 
     def _check_print(self, first: int, end: int, width: int | None) -> None:
-        """Refuse a number with other decimals than nearly all others of its block."""
+        """Refuse a number with more or fewer decimals than nearly all others of its block."""
         tails = [
             (len(token.partition(".")[2]), line)
             for line in range(first, end)

@@ -211,7 +211,7 @@ def film_modes(
 def _draw_swings(
     figure: Figure, panels: Sequence[ModePanel], swings: int, frames: int = 32
 ) -> Iterator[Image]:
-    """Yield the images of some swings of so many frames, with even numbers of pixels."""
+    """Yield the images of several oscillations, cropped to even numbers of pixels."""
     figure.set_dpi(100.0)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()

@@ -145,10 +145,10 @@ def slow_motion_timing(known: Array, fps: float, window: tuple[float, float]) ->
 
 
 def decisive_window(run: History, falls: FallingBlocks | None) -> tuple[float, float]:
-    """Return the time around the decisive instant of a run [s].
+    """Return a time window around collapse, first mechanism or largest |e| of a run [s].
 
-    It is the instant of collapse, or else of the first mechanism by count, or else of the largest
-    |e| of a joint.
+    It surrounds the instant of collapse, or else of the first mechanism by count, or else of the
+    largest |e| of a joint.
     """
     if falls is not None:
         instant = float(falls.times[0])

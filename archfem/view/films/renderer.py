@@ -210,7 +210,7 @@ class FrameLayout:
         self._scale_text = self._write(0.985, middle, "")
 
     def _write(self, x: float, y: float, text: str, **style: Any) -> Text:
-        """Write a line of text, by default up to a place."""
+        """Write a line of text, by default right-aligned at a position."""
         style = {"ha": "right", "va": "center", "color": Colour.TEXT} | style
         return self._figure.text(x, y, text, parse_math=False, **style)
 

@@ -238,7 +238,7 @@ class Scene:
             every *= 2
 
     def _pack(self, every: int) -> PackedArrays:
-        """Pack one of so many steps, and frames at most as dense."""
+        """Pack one of `every` steps, and one of `every // 2` frames."""
         times = self.run.time
         steps = np.append(_thin_out(len(times), every), np.argmin(abs(times - self.initial_time)))
         pack, joints = PackedArrays(), self.run.joints.isel(time=np.unique(steps))
@@ -319,7 +319,7 @@ class Scene:
 
 
 def _thin_out(count: int, every: int) -> NDArray[np.intp]:
-    """Return every so many of the numbers below a count, and the last."""
+    """Return the indices below a count in steps of `every`, and the last index."""
     return np.unique(np.append(np.arange(0, count, max(1, every)), count - 1))
 
 
