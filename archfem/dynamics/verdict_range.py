@@ -132,13 +132,13 @@ class VerdictRange(ResultDisplay):
         """Return a condition in words, with joint stiffness in GPa/m rather than as a factor."""
         name, value, below = condition.name, condition.value, condition.below
         if below is None:
-            return f"{name.replace('_', ' ')} '{value}'"
+            return f"{_property_text(name)} '{value}'"
         word = "below" if below else "above"
         if name in ("k_n", "k_s"):
             return f"{name} {word} {value * self.dataset.attrs[name] / 1e9:.3g} GPa/m"
         if name == "friction":
             return f"friction {word} that given {value:+.2g}"
-        return f"{name.replace('_', ' ')} {word} × {value:.3g}"
+        return f"{_property_text(name)} {word} × {value:.3g}"
 
     def save(self, path: str | Path) -> Path:
         """Write all runs to a NetCDF file, which `read` reads.
@@ -170,7 +170,7 @@ class VerdictRange(ResultDisplay):
                 f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
-            rows.append([name.replace("_", " "), f"{share:.0%}", ", ".join(cells)])
+            rows.append([_property_text(name), f"{share:.0%}", ", ".join(cells)])
         return align_columns(["property", "explains", "falls"], rows)
 
     def __str__(self) -> str:
@@ -188,6 +188,11 @@ class Condition(NamedTuple):
     value: Any
     below: bool | None
     holds: NDArray[np.bool_]  # (runs,)
+
+
+def _property_text(name: str) -> str:
+    """Return the name of a property as users read it; k_n and k_s are symbols."""
+    return name if name in ("k_n", "k_s") else name.replace("_", " ")
 
 
 def _list_conditions(
