@@ -1,4 +1,4 @@
-"""Solvers of time steps, which all give the history of equilibrium solves by SNES.
+"""Solvers of a time step: "snes" by PETSc, and "newton" and "compliance", compiled, as its equals.
 
 `equation` is the equation of motion; `snes` solves it step by step. `integrator` takes many steps
 at a time in the compiled loop of `base` by one of two solvers, which `selection` selects by a rule,
@@ -20,6 +20,17 @@ and SNES takes the steps at which they fail.
     active_compliance  its compliance and workspace
     supernodal_lu      sparse factors in dense panels
     sparse_products    products of sparse matrices
+
+Symbols, which all of them share:
+
+    w           contact displacement, at which the equation of a step is written [m, rad]
+    z, row      gaps z = G w + z₀: each row is an opening of a joint point, or a slip of a segment [m]
+    λ, λ′       released forces of the rows, the elastic forces of closed joints less the actual
+                ones [N], and their derivative by z [N/m]
+    F           compliance of the rows, F = G (K + μ M + ν R)⁻¹ Gᵀ [m/N]
+    active      row that is open or slides, so that its λ is not zero
+    column      active row that has a number in the dense problem of a step
+    image       product of the state with one of the matrices M, K and R
 """
 
 from archfem import _numba
