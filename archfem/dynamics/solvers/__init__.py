@@ -24,7 +24,7 @@ and SNES takes the steps at which they fail.
 Symbols, which all of them share:
 
     w           contact displacement, at which the equation of a step is written [m, rad]
-    z, row      gaps z = G w + z₀: a row is an opening of a joint point, or the slip of a segment [m]
+    z, row      gaps z = G w + z₀; a row is an opening of a point, or the slip of a segment [m]
     λ, λ′       released forces of the rows, the elastic forces of closed joints less the actual
                 ones [N], and their derivative by z [N/m]
     F           compliance of the rows, F = G (K + μ M + ν R)⁻¹ Gᵀ [m/N]
