@@ -142,7 +142,7 @@ def test_an_interrupted_suite_goes_on_with_what_is_left(small, undrawn, capsys):
     assert "run the same command again" in capsys.readouterr().err
     assert run(small) == 3  # what is kept keeps its doubts
     summary = (small.parent / "out" / "first" / "summary.txt").read_text()
-    assert summary.startswith("in doubt: energy drifts\n")
+    assert summary.startswith("no mechanism; 1 doubt\nin doubt: energy drifts\n")
     table = (small.parent / "out" / "suite.txt").read_text()
     assert "in doubt, as their summaries say: first\n" in table
     said = capsys.readouterr().out

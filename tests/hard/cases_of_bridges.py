@@ -221,4 +221,6 @@ def falls(structure):
     """Limit analysis says that it cannot stand, and so does the dead load."""
     assert not af.stands(structure)
     model = af.build(structure, fidelity="faces", cells=(2, 2))
-    return refused(lambda: af.dead_load(model), af.DidNotConverge, "no equilibrium")
+    return refused(
+        lambda: af.dead_load(model), af.DidNotConverge, "does not stand under its own weight"
+    )

@@ -77,7 +77,7 @@ def falls_by_stones(duration, peak):
     stones, motion = arch(1e9, 5.0), pulse(duration, peak)
     falling, start = (
         af.dynamics.RigidBlockSimulation(stones, dt=1e-3),
-        af.dynamics.LooseBlocks.built(stones),
+        af.dynamics.LooseBlocks.as_built(stones),
     )
     frames = falling.frames(start, motion.duration, motion, spacing=0.05)
     return any(np.abs(frame.poses[:, :2]).max() > 2.0 for frame in frames)
