@@ -97,7 +97,7 @@ def test_fill_in_pieces_creeps_to_rest(bridge):
 def test_upright_ends_of_dry_sand_flow(bridge):
     fill = af.masonry.jointed_fill(bridge, 0.8, angle=20.0)
     with pytest.raises(
-        af.DidNotConverge, match="joints slide .* it stands from a coefficient of friction"
+        af.DidNotConverge, match=r"joints slide .* it stands from a coefficient of friction"
     ):
         af.dead_load(af.build(fill, fidelity="rigid", cells=(1, 1)))
 
