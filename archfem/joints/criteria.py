@@ -262,11 +262,16 @@ def first_time(flags: xr.DataArray) -> xr.DataArray:
 
 def longest_duration(flags: xr.DataArray) -> xr.DataArray:
     """Return the longest unbroken time for which each joint is flagged [s]."""
-    step, flagged = step_lengths(flags["time"].values), flags.transpose("time", ...).values
-    elapsed = np.cumsum(np.where(flagged, step[:, None], 0.0), axis=0)
-    # elapsed flagged time at the last record without the flag
+    longest = unbroken_durations(flags.transpose("time", ...).values, flags["time"].values)
+    return xr.DataArray(longest.max(axis=0), {"joint": flags["joint"]}, ("joint",))
+
+
+def unbroken_durations(flagged: NDArray[np.bool_], time: Array) -> Array:
+    """Return the time [s] for which each joint has by then been flagged (steps, joints)."""
+    elapsed = np.cumsum(np.where(flagged, step_lengths(time)[:, None], 0.0), axis=0)
+    # less the flagged time until the last record without the flag
     before = np.maximum.accumulate(np.where(flagged, 0.0, elapsed), axis=0)
-    return xr.DataArray((elapsed - before).max(axis=0), {"joint": flags["joint"]}, ("joint",))
+    return np.asarray(elapsed - before)
 
 
 def envelope(joints: xr.Dataset) -> xr.Dataset:

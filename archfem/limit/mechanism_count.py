@@ -20,6 +20,7 @@ from archfem.joints.criteria import (
     find_lasting,
     part_roles,
     step_lengths,
+    unbroken_durations,
     with_failure_flags,
 )
 from archfem.masonry.parts import select_assessed_parts
@@ -292,9 +293,7 @@ def _lasting_flags(flags: xr.DataArray, duration: float) -> NDArray[np.bool_]:
     failed = flags.values
     if len(failed) == 1:
         return failed
-    elapsed = np.cumsum(failed * step_lengths(flags["time"].values)[:, None], axis=0)
-    # time failed until the last record at which the joint had not
-    unbroken = elapsed - np.maximum.accumulate(np.where(failed, 0.0, elapsed), axis=0)
+    unbroken = unbroken_durations(failed, flags["time"].values)
     # a sum of steps may fall short of the duration by round-off
     return failed & (unbroken >= (1.0 - 1e-6) * duration)
 
