@@ -42,6 +42,11 @@ class VerdictRange(ResultDisplay):
         return self.dataset["error"].values == ""
 
     @property
+    def answers(self) -> xr.Dataset:
+        """The runs with an answer."""
+        return self.dataset.isel(run=np.flatnonzero(self.answered))
+
+    @property
     def share(self) -> float:
         """Share of the sampled runs with an answer in which the structure falls [-]."""
         sampled = self.dataset["sampled"].values & self.answered
@@ -83,7 +88,7 @@ class VerdictRange(ResultDisplay):
 
     def _damage_ranks(self) -> Array:
         """Return the rank of each answered run by outcome and residual displacement (runs,)."""
-        rows = self.dataset.isel(run=np.flatnonzero(self.answered))
+        rows = self.answers
         kind = np.array([COLLAPSE_STATES.index(str(name)) for name in rows["outcome"].values])
         # among fallen structures distances to the ground say nothing
         fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
@@ -107,7 +112,7 @@ class VerdictRange(ResultDisplay):
 
     def _describe_falls(self) -> str:
         """Return the one or two conditions that separate runs that fall from others best."""
-        rows = self.dataset.isel(run=np.flatnonzero(self.answered))
+        rows = self.answers
         falls, conditions = self.falls[self.answered], []
         chosen = np.ones(len(falls), dtype=bool)
         for _ in range(2):
@@ -163,7 +168,7 @@ class VerdictRange(ResultDisplay):
     def table(self) -> str:
         """Return the share of the variance that each property explains, and falls by value."""
         falls, rows = self.falls[self.answered], []
-        data = self.dataset.isel(run=np.flatnonzero(self.answered))
+        data = self.answers
         for name, share in self.importance().items():
             groups = _group_values(data[name].values)
             cells = [

@@ -233,7 +233,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     Returns:
         The figure, with a panel for each property, that which explains most of the damage first.
     """
-    rows = verdicts.dataset.isel(run=np.flatnonzero(verdicts.answered))
+    rows = verdicts.answers
     falls, residual = verdicts.falls[verdicts.answered], 1e3 * rows["residual"].values
     standing = residual[~falls]
     top = 3.0 * float(standing.max(initial=1.0))
