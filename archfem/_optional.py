@@ -1,6 +1,6 @@
 """Optional packages: which features require them, and the command that installs them.
 
-Everything but FEniCSx comes with `pip install archfem`; FEniCSx has no wheels.
+pip installs everything but FEniCSx, which has no wheels.
 """
 
 import os

@@ -120,7 +120,9 @@ def _convert(text: str, unit: str, key: str) -> float:
     registry = _registry()
     target = "dimensionless" if unit == "1" else unit
     if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
-        text = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", text))
+        # a digit may stand before them, as in "0.3g"
+        text = re.sub(r"(?<![^\W\d])gal\b", "Gal", text)
+        text = re.sub(r"(?<![^\W\d])g\b", "g_0", text)
     try:
         quantity = registry.Quantity(text)
         # pint takes angles for pure numbers

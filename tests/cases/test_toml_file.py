@@ -24,7 +24,10 @@ def test_quantities():
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("0.3 g", 2.941995), ("0.3 g_0", 2.941995), ("300 gal", 3.0), ("300 cm/s^2", 3.0)],
+    [
+        *[("0.3 g", 2.941995), ("0.3g", 2.941995), ("0.3 g_0", 2.941995)],
+        *[("300 gal", 3.0), ("300gal", 3.0), ("300 cm/s^2", 3.0), ("3e2cm/s^2", 3.0)],
+    ],
 )
 def test_of_an_acceleration_g_is_gravity_and_gal_no_gallon(text, value):
     assert af.units.in_unit(text, "m/s**2", "pga") == pytest.approx(value, rel=1e-9)
