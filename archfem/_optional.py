@@ -36,6 +36,10 @@ OPTIONAL_PACKAGES = {
     ),
     "PETSc": Requirement("its solvers", "it comes with FEniCSx, " + FENICSX_REMEDY),
     "SLEPc": Requirement("modes of large models", "it comes with FEniCSx, " + FENICSX_REMEDY),
+    "Chromium": Requirement(
+        "reports as PDF",
+        "'apt-get install chromium', or install Google Chrome; or print the page in a browser",
+    ),
     "EGL": Requirement(
         "pyvista's viewer of a run", "'apt-get install libegl1 libgl1', elsewhere Mesa's libEGL"
     ),

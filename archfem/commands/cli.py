@@ -181,6 +181,7 @@ def _add_report(command: argparse.ArgumentParser) -> None:
     command.add_argument("folder", metavar="FOLDER", help="that `archfem run` has written")
     command.add_argument("--out", metavar="FILE.html", help="the page (FOLDER/report.html)")
     command.add_argument("--inputs", metavar="DIR", help="folder of the case's drawing (FOLDER)")
+    command.add_argument("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     command.set_defaults(command=_load_command("run", "report"))
 
 

@@ -131,6 +131,10 @@ def report(options: argparse.Namespace) -> None:
 
     path = open_results(options.folder, inputs=options.inputs).report(options.out)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    if options.pdf:
+        from archfem.view.pages.document import print_page
+
+        print(f"wrote {print_page(path, path.with_suffix('.pdf'))}")
 
 
 def motion(options: argparse.Namespace) -> None:

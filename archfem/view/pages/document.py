@@ -7,6 +7,9 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 from re import sub
+from shutil import which
+from subprocess import run
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import matplotlib
@@ -14,6 +17,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from archfem._files import atomic_write
+from archfem._optional import missing_package_message
+from archfem.errors import InvalidInput, NotInstalled
 from archfem.view.style import disable_math
 
 
@@ -91,6 +97,41 @@ class Document:
     def page(self) -> str:
         """The complete page (HTML), without references to other files."""
         return render("document.html", document=self)
+
+
+def print_page(page: Path, target: Path) -> Path:
+    """Print a page to a PDF file by an installed Chromium or Chrome.
+
+    Args:
+        page: HTML file.
+        target: PDF file to write.
+
+    Returns:
+        The path of the PDF file.
+
+    Raises:
+        InvalidInput: the suffix is not that of a PDF file.
+        NotInstalled: no browser is found, or the browser writes no file.
+    """
+    if target.suffix.lower() != ".pdf":
+        raise InvalidInput(f"{target} has suffix '{target.suffix}': a printed report is .pdf")
+    browser = next(
+        filter(None, map(which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
+    if browser is None:
+        raise NotInstalled(missing_package_message("Chromium", "it is not on the PATH"))
+    with atomic_write(target) as draft, TemporaryDirectory() as profile:
+        # the page is our own and loads no other file; Chromium's sandbox refuses to run for root
+        command = [browser, "--headless=new", "--no-sandbox", "--disable-gpu"]
+        command += ["--disable-dev-shm-usage", f"--user-data-dir={profile}"]
+        # time for the players to unpack and draw their data
+        command += ["--virtual-time-budget=30000", "--no-pdf-header-footer"]
+        command += [f"--print-to-pdf={draft}", page.resolve().as_uri()]
+        done = run(command, capture_output=True, timeout=300, check=False)
+        if done.returncode or not draft.is_file():
+            said = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+            raise NotInstalled(missing_package_message("Chromium", f"it ended with {said}"))
+    return target
 
 
 def render(template: str, **values: Any) -> str:

@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from chromium import browser, complaints, opened, printed
+from chromium import BROWSER, browser, complaints, opened, printed
 
 import archfem as af
+from archfem.view.pages.document import print_page
 from archfem.view.pages.player_data import Outlines
 
 pytestmark = pytest.mark.slow
@@ -110,3 +111,54 @@ def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
         high = (297 - 18 - 20) / 25.4 * 96
         assert all(how == "avoid" and tall <= high and wide <= 0 for how, tall, wide in figures)
         assert complaints(driver) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("wide", [390, 1280])
+def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path, wide, scheme):
+    """Wide tables scroll by themselves, and the page is as wide as the screen."""
+    *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
+    path = run.report(tmp_path / "report.html")
+    with browser(wide=wide) as driver:
+        screen = {"width": wide, "height": 1400, "deviceScaleFactor": 1, "mobile": wide < 500}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        scheme_asked = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", scheme_asked)
+        opened(driver, path)
+        assert driver.execute_script("return document.documentElement.scrollWidth") <= wide
+        paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (sum(map(int, re.findall(r"\d+", paper))) < 200) == (scheme == "dark")
+        assert complaints(driver) == []
+
+
+def test_time_and_joint_of_the_player_are_set_by_keyboard(rocked, tmp_path):
+    model, run = rocked
+    path = af.view.player(run, model).save(tmp_path / "player.html")
+    with browser() as driver:
+        opened(driver, path)
+        driver.execute_script(SET, "time", 0.0)
+        slider = driver.find_element("css selector", ".player-time")
+        slider.send_keys("\ue014")  # arrow to the right
+        moved = driver.execute_script(SCALE)[4]
+        # a round share of the run, from a hundredth to a five-hundredth
+        assert float(run.time[-1]) / 500 <= moved <= float(run.time[-1]) / 100
+        slider.send_keys("\ue00f")  # page down
+        assert driver.execute_script(SCALE)[4] == 0.0
+        driver.find_element("css selector", ".player-choice").send_keys(
+            model.structure.joints[-1].name
+        )
+        readout = driver.find_element("css selector", ".player-readout").text
+        assert model.structure.joints[-1].name in readout
+
+
+def test_a_report_is_printed_as_pdf(small, tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    if BROWSER is None:
+        pytest.skip("there is no chromium")
+    *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
+    page = run.report(tmp_path / "report.html")
+    pages = pypdf.PdfReader(print_page(page, tmp_path / "report.pdf")).pages
+    assert len(pages) > 2
+    assert "a column under two pairs" in pages[0].extract_text()
+    # players have drawn their data before the page is printed
+    assert "reading …" not in "".join(each.extract_text() for each in pages)

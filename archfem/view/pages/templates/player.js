@@ -187,6 +187,18 @@
     control() {
       const { scene } = this, time = this.find("time"), by = this.find("magnification"), note = this.find("note");
       time.max = scene.end;
+      // a key moves by a round two-hundredth of the run, as a millisecond would take thousands
+      const keys = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 };
+      const stride = step(scene.end, 200);
+      time.addEventListener("keydown", (event) => {
+        if (!(event.key in keys)) return;
+        event.preventDefault();
+        this.pause();
+        this.show(Math.min(Math.max(this.time + keys[event.key] * stride, 0), scene.end));
+      });
+      const choice = this.find("choice");
+      scene.joints.forEach(({ name }, j) => choice.append(new Option(name, j)));
+      choice.addEventListener("input", () => this.choose(Number(choice.value)));
       time.addEventListener("input", () => { this.pause(); this.show(Number(time.value)); });
       this.find("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
       this.find("by").hidden = !(this.arrays.frame_time || this.arrays.opening);
@@ -215,13 +227,14 @@
       this.charts = { ground: new Chart(this.find("ground"), scene.end, (time) => { this.pause(); this.show(time); }) };
       const curves = [{ times, values: level, name: "first" }];
       if (both) curves.unshift({ times, values: upright, name: "second" });
-      this.charts.ground.draw({ title: `ground acceleration [m/s²]${both ? ": horizontal dark, vertical light" : ""}`, range: [-top, top], ticks, lines: [], curves, instants });
+      this.charts.ground.draw({ title: `ground acceleration [m/s²]${both ? ": horizontal strong, vertical faint" : ""}`, range: [-top, top], ticks, lines: [], curves, instants });
     }
 
     /** Show another joint below. */
     choose(number) {
       const { scene, arrays } = this, joint = scene.joints[number], times = arrays.time.row(0);
       this.chosen = number;
+      this.find("choice").value = number;
       const onTime = (time) => { this.pause(); this.show(time); };
       for (const name of ["e", "ratio"]) this.charts[name] ??= new Chart(this.find(name), scene.end, onTime);
       const e = arrays.e.row(number), ratio = arrays.ratio.row(number);
