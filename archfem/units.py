@@ -23,8 +23,23 @@ STANDARD_GRAVITY = 9.80665
 _POWER_PATTERN = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
 _SUPERSCRIPT_PATTERN = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
 
-# Degrees, read without loading the registry of units, which is slow
+# Degrees and common units are read without the registry of units, which takes a second to load
 _DEGREES_PATTERN = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+_PLAIN_PATTERN = re.compile(r"([-+]?\d+(?:\.\d*)?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)")
+
+# SI unit and factor of common units
+COMMON_UNITS = {
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "m/s**2": ("m/s**2", 1.0),
+    "Pa": ("Pa", 1.0),
+    "MPa": ("Pa", 1e6),
+    "GPa": ("Pa", 1e9),
+    "MPa/mm": ("Pa/m", 1e9),
+    "GPa/m": ("Pa/m", 1e9),
+}
 
 
 @cache
@@ -57,7 +72,12 @@ def in_unit(value: Any, unit: str, key: str) -> float:
         1480000000.0
     """
     if isinstance(value, str):
-        number = _convert(value, unit, key)
+        plain = _PLAIN_PATTERN.fullmatch(value.strip())
+        common = COMMON_UNITS.get(plain[2]) if plain else None
+        if plain and common and common[0] == unit:
+            number = float(plain[1]) * common[1]
+        else:
+            number = _convert(value, unit, key)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         number = float(value) if is_number(value) else inf
     else:

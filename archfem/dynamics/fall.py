@@ -21,6 +21,7 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Model, check_model
 from archfem.motion.motion import Motion
+from archfem.units import G
 
 # Kinds of collapse, in order of severity
 COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
@@ -87,7 +88,8 @@ class CollapseState:
         blocks: names of the lost blocks, in the order of the structure.
         displacement: largest displacement of any corner of a free block, see `Verdict` [m].
         residual: the same at the end [m].
-        resting: whether all blocks were at rest at the end; if not, more may fall.
+        resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
+            not, more may fall.
     """
 
     kind: str
@@ -154,8 +156,7 @@ def _collapse_kind(
 ) -> str:
     """Return the kind of collapse; `dislocation` is relative to the shallowest joint [-]."""
     if not lost:
-        depths = structure.depths[structure.judged] if structure.judged.any() else structure.depths
-        return COLLAPSE_STATES[int(residual > dislocation * depths.min())]
+        return COLLAPSE_STATES[int(residual > dislocation * _smallest_depth(structure))]
     blocks = structure.blocks
     roles = {blocks[number].role for number in structure.free}
     role = next((role for role in ("ring", "pier") if role in roles), None)
@@ -163,6 +164,12 @@ def _collapse_kind(
         return "fallen"
     parts = {blocks[number].part for number in structure.free if blocks[number].role == role}
     return "partly fallen" if parts - {blocks[number].part for number in lost} else "fallen"
+
+
+def _smallest_depth(structure: Structure) -> float:
+    """Return the depth of the shallowest joint of rings and piers [m]."""
+    depths = structure.depths[structure.judged] if structure.judged.any() else structure.depths
+    return float(depths.min())
 
 
 def list_stones(structure: Structure) -> list[int]:
@@ -220,10 +227,15 @@ def _between_stones(structure: Structure) -> NDArray[np.bool_]:
 
 def is_overturning(model: Model, state: State, min_rotation: float = 0.05) -> bool:
     """Return whether a joint has rotated by more than an angle [rad] and blocks still move."""
+    overturns = _largest_rotation(model, state) > min_rotation
+    return overturns and not _rests(release_blocks(model, state).start)
+
+
+def _largest_rotation(model: Model, state: State) -> float:
+    """Return the largest rotation of a joint between stones [rad]."""
     observer, stones = model.observer(), _between_stones(model.structure)
     rotations = observer.faces(observer.read(state.q))[1, stones]
-    overturns = float(np.abs(rotations).max(initial=0.0)) > min_rotation
-    return overturns and not _rests(release_blocks(model, state).start)
+    return float(np.abs(rotations).max(initial=0.0))
 
 
 def simulate_fall(
@@ -266,11 +278,34 @@ def _fall_dataset(
     )
 
 
-def standing_state(model: Model, start: State, state: State) -> CollapseState:
-    """Return the state of collapse of a structure without separated blocks."""
+def standing_state(model: Model, start: State, state: State, shaken: bool) -> CollapseState:
+    """Return the state of collapse without separated blocks; `shaken`: the ground still moves."""
     loose = release_blocks(model, state).start
     poses, _ = model.rigid_motions(start.q, start.velocity)
-    return replace(classify_collapse(model.structure, [loose], poses), resting=_rests(loose))
+    resting = _rests(loose) or (not shaken and _only_vibrates(model, state, loose))
+    return replace(classify_collapse(model.structure, [loose], poses), resting=resting)
+
+
+def _only_vibrates(
+    model: Model,
+    state: State,
+    loose: LooseBlocks,
+    max_rise: float = 2e-4,
+    max_rotation: float = 0.02,
+) -> bool:
+    """Return whether blocks move too weakly to overturn on a ground at rest.
+
+    The kinetic energy of each block suffices to raise it by less than `max_rise` of the depth of
+    the shallowest joint, and no joint is rotated by more than `max_rotation` [rad].
+    """
+    # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
+    if _largest_rotation(model, state) > max_rotation:
+        return False
+    free = list(model.structure.free)
+    mass, inertia = make_bodies(model.structure, 0.0).mass[free].T
+    velocities = loose.velocities[free]
+    squares = np.sum(velocities[:, :2] ** 2, axis=1) + inertia / mass * velocities[:, 2] ** 2
+    return bool(np.max(squares / (2.0 * G)) <= max_rise * _smallest_depth(model.structure))
 
 
 def _rests(loose: LooseBlocks, rest_speed: float = 5e-4) -> bool:

@@ -195,7 +195,8 @@ def _follow_fall(
     """Add the fall of separated or overturning blocks, and the state of collapse, to a history."""
     tilts = history.ending is Ending.FINISHED and is_overturning(model, state)
     if history.ending is not Ending.PARTED and not tilts:
-        return with_fall(history, standing_state(model, start, state))
+        shaken = history.ending is not Ending.FINISHED
+        return with_fall(history, standing_state(model, start, state, shaken))
     try:
         frames, fall = simulate_fall(model, start, state, motion)
     except DidNotConverge as error:

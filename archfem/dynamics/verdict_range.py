@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import binomtest, rankdata
+from scipy.special import betaincinv
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
@@ -59,9 +59,11 @@ class VerdictRange(ResultDisplay):
             confidence: probability that the interval contains the share [-].
         """
         sampled = self.dataset["sampled"].values & self.answered
-        test = binomtest(int(self.falls[sampled].sum()), int(sampled.sum()))
-        bounds = test.proportion_ci(confidence)
-        return float(bounds.low), float(bounds.high)
+        falls, count, tail = self.falls[sampled].sum(), sampled.sum(), 0.5 * (1.0 - confidence)
+        # without any fall, or any other outcome, the bound is 0 or 1, and the function undefined
+        low = betaincinv(falls, count - falls + 1, tail) if falls > 0 else 0.0
+        high = betaincinv(falls + 1, count - falls, 1.0 - tail) if falls < count else 1.0
+        return float(low), float(high)
 
     @property
     def properties(self) -> tuple[str, ...]:
@@ -93,7 +95,10 @@ class VerdictRange(ResultDisplay):
         # among fallen structures distances to the ground say nothing
         fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
         residual = np.where(fallen, 0.0, rows["residual"].values)
-        return rankdata(np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12)))
+        damage = np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12))
+        _, places, counts = np.unique(damage, return_inverse=True, return_counts=True)
+        # runs of equal damage share the mean of their ranks
+        return (np.cumsum(counts) - 0.5 * (counts - 1))[places]
 
     @property
     def sentence(self) -> str:

@@ -45,9 +45,9 @@ class Triangles:
     def __init__(self, cells: Cells) -> None:
         cut = [np.asarray(c)[triangulate_polygon(cells.places[c])] for c in cells.polygons]
         corners = np.concatenate(cut)
-        # each refinement divides a triangle into four; in about 600 triangles the linear variation
+        # each refinement divides a triangle into four; in about 200 triangles the linear variation
         # of colours cannot be seen
-        refinements = int(np.clip(np.round(0.5 * np.log2(600 / len(corners))), 0, 2))
+        refinements = int(np.clip(np.round(0.5 * np.log2(200 / len(corners))), 0, 2))
         unit = Triangulation([0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
         fine = UniformTriRefiner(unit).refine_triangulation(subdiv=refinements)
         shares = np.column_stack([1.0 - fine.x - fine.y, fine.x, fine.y])  # of the three corners

@@ -13,6 +13,7 @@ from archfem.dynamics.fall import (
     classify_collapse,
     is_overturning,
     release_blocks,
+    standing_state,
 )
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.time_stepping import RigidBlockSimulation
@@ -72,6 +73,34 @@ def test_blocks_that_lean_and_move_are_followed(tower, turn, speed, falls):
     velocity[3] = speed
     state = af.dynamics.State(1.0, np.array(leant(turn)), velocity, np.zeros(tower.size))
     assert is_overturning(tower, state) is falls
+
+
+@pytest.mark.parametrize(
+    ("turn", "speed", "shaken", "rests"),
+    [
+        (0.0, 0.044, False, True),
+        (0.0, 0.045, False, False),
+        (0.0, 0.044, True, False),
+        (0.0195, 0.0, True, True),
+        (0.0195, 0.044, False, True),
+        (0.0205, 0.044, False, False),
+    ],
+)
+def test_blocks_rest_that_can_only_vibrate(tower, turn, speed, shaken, rests):
+    """A speed of 44.3 mm/s raises a block by 0.1 mm, a five-thousandth of the depth of a joint."""
+    assert pytest.approx(2e-4 * BREADTH, rel=1e-2) == 0.0443**2 / (2.0 * G)
+    velocity = np.zeros(tower.size)
+    velocity[4] = speed
+    start = State(0.0, *np.zeros((3, tower.size)))
+    state = State(1.0, np.array(leant(turn)), velocity, np.zeros(tower.size))
+    assert standing_state(tower, start, state, shaken).resting is rests
+
+
+def test_vibration_that_counts_as_rest_cannot_overturn_a_slender_column():
+    """Height by which a column of slenderness 20 rises about its edge, from 20 mrad to its tip."""
+    slope = np.arctan(1.0 / 20.0)
+    to_edge = 0.5 * BREADTH / np.sin(slope)
+    assert to_edge * (1.0 - np.cos(slope - 0.02)) > 20 * 2e-4 * BREADTH
 
 
 def test_a_fall_is_followed_for_twenty_seconds_after_the_motion(tower, monkeypatch):

@@ -62,7 +62,11 @@ def _start_encoder(path: Path, shape: tuple[int, ...], fps: float) -> Generator[
         quality=None,
         macro_block_size=2,
         # for flat colours and thin lines: files as small as by slower presets in half the time
-        output_params=["-preset", "veryfast", "-crf", "13", "-x264-params", "subme=1:weightp=0"],
+        output_params=[
+            *("-preset", "veryfast", "-crf", "13", "-x264-params", "subme=1:weightp=0"),
+            # images keep their size: the filter affects the averages of two colours only
+            *("-sws_flags", "fast_bilinear"),
+        ],
     )
     encoder.send(None)
     return encoder
