@@ -25,7 +25,7 @@ _SUPERSCRIPT_PATTERN = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
 
 # Degrees and common units are read without the registry of units, which takes a second to load
 _DEGREES_PATTERN = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
-_PLAIN_PATTERN = re.compile(r"([-+]?\d+(?:\.\d*)?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)")
+_PLAIN_PATTERN = re.compile(r"([-+]?\d{1,20}(?:\.\d{0,20})?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)")
 
 # SI unit and factor of common units
 COMMON_UNITS = {

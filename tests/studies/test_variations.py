@@ -290,7 +290,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, undrawn,
     assert (out / "verdict_range.txt").read_text().strip() == str(found)
 
 
-def test_a_report_shows_the_range(tmp_path, calls):
+def test_a_report_shows_the_range(tmp_path, undrawn, calls):
     path, out = tmp_path / "column.toml", tmp_path / "out"
     path.write_text(CASE)
     assert af.commands.main(["run", str(path), "--out", str(out)]) == 0
