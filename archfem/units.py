@@ -20,12 +20,6 @@ G = 9.81
 # Standard gravity, the unit g of accelerograms and spectra [m/s²]
 STANDARD_GRAVITY = 9.80665
 
-_POWER_PATTERN = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
-_SUPERSCRIPT_PATTERN = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
-
-# Degrees and common units are read without the registry of units, which takes a second to load
-_DEGREES_PATTERN = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
-_PLAIN_PATTERN = re.compile(r"([-+]?\d{1,20}(?:\.\d{0,20})?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)")
 
 # SI unit and factor of common units
 COMMON_UNITS = {
@@ -71,8 +65,11 @@ def in_unit(value: Any, unit: str, key: str) -> float:
         >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
         1480000000.0
     """
+    plain_pattern = re.compile(
+        r"([-+]?\d{1,20}(?:\.\d{0,20})?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)"
+    )
     if isinstance(value, str):
-        plain = _PLAIN_PATTERN.fullmatch(value.strip())
+        plain = plain_pattern.fullmatch(value.strip())
         common = COMMON_UNITS.get(plain[2]) if plain else None
         if plain and common and common[0] == unit:
             number = float(plain[1]) * common[1]
@@ -101,7 +98,9 @@ def in_degrees(value: Any, key: str) -> float:
     Raises:
         InvalidInput: it is no angle, text without a unit, or a bare number up to 2π.
     """
-    if isinstance(value, str) and (plain := _DEGREES_PATTERN.fullmatch(value.strip())):
+    # degrees and common units are read without the registry of units, which takes a second to load
+    degrees_pattern = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
+    if isinstance(value, str) and (plain := degrees_pattern.fullmatch(value.strip())):
         return float(plain[1])
     if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
         raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
@@ -116,15 +115,17 @@ def in_degrees(value: Any, key: str) -> float:
 
 def _check_text(text: str, unit: str, key: str) -> None:
     """Refuse long text and high powers, which pint would evaluate for hours."""
+    power_pattern = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")
+    superscript_pattern = re.compile(r"[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
     if len(text) > 100:
         raise InvalidInput(
             f"{key} = {short_repr(text)} is no quantity, for it has {len(text)} letters: write a "
             f"number in {unit}"
         )
-    powers = [match[1] for match in _POWER_PATTERN.finditer(text)]
+    powers = [match[1] for match in power_pattern.finditer(text)]
     # no unit of mechanics has a power above 12
     if (
-        _SUPERSCRIPT_PATTERN.search(text)
+        superscript_pattern.search(text)
         or None in powers
         or prod(int(power) for power in powers) > 12
     ):

@@ -36,9 +36,6 @@ from archfem.statics.relaxation import solve_local
 # structures under two motions each, with values from 0.5 to 8.5
 ERROR_PER_ROTATION = 3.0
 
-# Order with which errors vanish as cells and time steps shrink together [-]
-CONVERGENCE_ORDER = 1.5
-
 
 def strongest_window(motion: Motion, share: float = 0.7, least: float = 4.0) -> Motion:
     """Return the shortest part with a share of the Arias intensity, of at least some seconds."""
@@ -117,11 +114,13 @@ def estimate_errors(runs: list[RunPeaks]) -> list[float]:
 
     Each run has half the cell size and half the time step of the one before.
     """
+    # order with which errors vanish as cells and time steps shrink together [-]
+    convergence_order = 1.5
     finest = runs[-1].peaks
     if len(runs) < 2 or finest is None or runs[-2].peaks is None:
         return [np.inf] * len(runs)
     differences = [
         np.inf if run.peaks is None else largest_difference(run.peaks, finest) for run in runs
     ]
-    remaining = differences[-2] / (2.0**CONVERGENCE_ORDER - 1.0)
+    remaining = differences[-2] / (2.0**convergence_order - 1.0)
     return [difference + remaining for difference in differences]

@@ -52,10 +52,6 @@ TRIED_SETTINGS = (
     ("condensed", (16, 16), 0.000625),
 )
 
-# Smallest tolerance on |e| that faces 4×4 in steps of 5 ms may meet [-]: in twelve scenes they
-# erred by 0.003 to 0.024
-COARSE_TOLERANCE = 0.02
-
 
 def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection)
     structure: Structure,
@@ -196,13 +192,16 @@ def _settings_to_try(
     structure: Structure, tolerance: float, dt: float | None
 ) -> list[tuple[Discretisation, float]]:
     """Return discretisations and steps to try, coarsest first; a given `dt` is tried after 2 dt."""
+    # smallest tolerance on |e| that faces 4×4 in steps of 5 ms may meet [-]: in twelve scenes they
+    # erred by 0.003 to 0.024
+    coarse_tolerance = 0.02
     if dt is not None:
         tried = tuple(
             (*setting[:2], step)
             for setting, step in zip(TRIED_SETTINGS[1:], (2.0 * dt, dt), strict=False)
         )
     else:
-        tried = TRIED_SETTINGS[int(tolerance < COARSE_TOLERANCE) :]
+        tried = TRIED_SETTINGS[int(tolerance < coarse_tolerance) :]
     return [
         (exact_discretisation(structure, fidelity, cells), step) for fidelity, cells, step in tried
     ]

@@ -35,9 +35,6 @@ ENERGY_DRIFT_WARNING = 0.05
 # Energy drift above which a run is wrong [-]: half of the energy comes from the scheme
 ENERGY_DRIFT_ERROR = 0.5
 
-# Steps between two checks of the slip of paired facets
-FACET_CHECK_INTERVAL = 32
-
 
 class EnergyMeter:
     """Kinetic and potential energy, work and loss of the steps of a model."""
@@ -172,6 +169,8 @@ class RunMonitor:
 
     def add(self, batch: Batch, readings: Array) -> Array:
         """Add the next steps and return the energy drift at each (steps,) [J]."""
+        # steps between two checks of the slip of paired facets
+        facet_check_interval = 32
         drift, fractions = self._balance.add(batch.energy)
         worst = int(np.abs(fractions).argmax())  # a NaN is the largest
         if not abs(fractions[worst]) <= abs(self.worst_drift):
@@ -195,7 +194,7 @@ class RunMonitor:
             rotation = float(np.abs(self._observer.faces(readings)[:, 1]).max())
             self.largest_turn = max(self.largest_turn, rotation)
         # facets cost a sparse product, hence not at every step
-        for k in range(-self._steps % FACET_CHECK_INTERVAL, len(batch.times), FACET_CHECK_INTERVAL):
+        for k in range(-self._steps % facet_check_interval, len(batch.times), facet_check_interval):
             slip = self.model.face_mismatch(batch.state(k).q)
             self._mismatch = max(self._mismatch, slip)
         self._steps += len(batch.times)

@@ -19,12 +19,6 @@ from archfem.joints.resultants import joint_dataset
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
-_EFFORT_ATTRIBUTES = {
-    "iterations": {"long_name": "Newton iterations, or passes, since the last record"},
-    "smallest_step": {"units": "s", "long_name": "smallest step taken since the last record"},
-    "energy_drift": {"units": "J", "long_name": "energy from nowhere since the start"},
-}
-
 
 class GrowingArray:
     """Array filled row by row, reallocated at twice the size when full."""
@@ -106,6 +100,14 @@ class Recorder:
 
     def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
         """Return the record as a history."""
+        effort_attributes = {
+            "iterations": {"long_name": "Newton iterations, or passes, since the last record"},
+            "smallest_step": {
+                "units": "s",
+                "long_name": "smallest step taken since the last record",
+            },
+            "energy_drift": {"units": "J", "long_name": "energy from nowhere since the start"},
+        }
         structure, resultants = self.model.structure, self._resultants.values
         times, faces = (rows.values[: len(resultants)] for rows in (self._times, self._faces))
         moved = self.model.large_displacements
@@ -115,7 +117,7 @@ class Recorder:
         attributes = {"units": "m/s2", "long_name": "acceleration of the ground"}
         variables: dict[str, Any] = self._block_displacements()
         variables["ground"] = ("time", "axis"), motion.at(times), attributes
-        for (name, attrs), values in zip(_EFFORT_ATTRIBUTES.items(), self._effort(), strict=True):
+        for (name, attrs), values in zip(effort_attributes.items(), self._effort(), strict=True):
             variables[name] = "time", values, attrs
         dataset = dataset.assign_coords(
             block=[block.name for block in structure.blocks], axis=["x", "y"]

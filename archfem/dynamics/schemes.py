@@ -17,9 +17,6 @@ from archfem.masonry.structure import Structure
 # Shortest time step accepted [s]: anything below is a slip of the unit
 MIN_TIME_STEP = 1e-6
 
-# Values of `joints` of all kinds of damping: closed part of the joints, all joints closed, blocks
-DAMPED_JOINTS = ("closed", "initial", "none")
-
 # Kinds of damping whose frequencies are taken from the modes
 DAMPING_KINDS = ("stiffness", "rayleigh")
 
@@ -141,8 +138,10 @@ def _check_ratio(ratio: float) -> None:
 
 
 def _check_joints(joints: str) -> None:
-    if not is_one_of(joints, DAMPED_JOINTS):
-        raise InvalidInput(f"damping joints = {joints!r}: use one of {DAMPED_JOINTS}")
+    # closed part of the joints, all joints as if closed, blocks only
+    damped_joints = ("closed", "initial", "none")
+    if not is_one_of(joints, damped_joints):
+        raise InvalidInput(f"damping joints = {joints!r}: use one of {damped_joints}")
 
 
 @dataclass(frozen=True)

@@ -44,17 +44,15 @@ class Outcome(StrEnum):
     @property
     def sentence(self) -> str:
         """Meaning of the outcome, as a sentence."""
-        return _OUTCOME_SENTENCES[self]
-
-
-_OUTCOME_SENTENCES = {
-    Outcome.COLLAPSES: "the load turns it into a mechanism",
-    Outcome.UNBOUNDED: "this load never overturns it",
-    Outcome.INFEASIBLE: "it does not stand under its own weight",
-    Outcome.SETTLES: "it follows its support and stands",
-    Outcome.LOCKS: "it cannot follow this movement of its support",
-    Outcome.BRACKETED: "no state without dilatancy was found, and none lies beyond this bound",
-}
+        return {
+            Outcome.COLLAPSES: "the load turns it into a mechanism",
+            Outcome.UNBOUNDED: "this load never overturns it",
+            Outcome.INFEASIBLE: "it does not stand under its own weight",
+            Outcome.SETTLES: "it follows its support and stands",
+            Outcome.LOCKS: "it cannot follow this movement of its support",
+            Outcome.BRACKETED: "no state without dilatancy was found, and none lies beyond this "
+            "bound",
+        }[self]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -60,16 +60,13 @@ class End(StrEnum):
     @property
     def sentence(self) -> str:
         """Meaning of the reason, as a sentence."""
-        return _END_SENTENCES[self]
-
-
-_END_SENTENCES = {
-    End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
-    End.SLIDES: "beyond, a joint needs more than its friction and slides",
-    End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
-    End.LOCKS: "without sliding in its joints it cannot follow any further",
-    End.HOLDS: "it stands at the whole movement",
-}
+        return {
+            End.FALLS: "beyond, no thrust line fits into the shape that it has taken, and it falls",
+            End.SLIDES: "beyond, a joint needs more than its friction and slides",
+            End.LEAPS: "beyond, no equilibrium lies near: it leaps to another, or falls",
+            End.LOCKS: "without sliding in its joints it cannot follow any further",
+            End.HOLDS: "it stands at the whole movement",
+        }[self]
 
 
 @dataclass(frozen=True)

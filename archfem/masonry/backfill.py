@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 # Radius of the inscribed circle of a whole piece over its longest side [-]
 INCIRCLE_RATIO = (sqrt(3.0) - 1.0) / 4.0
 
-# More pieces cannot be solved in reasonable time.
-MAX_PIECES = 20_000
-
 
 @dataclass(frozen=True)
 class _Piece:
@@ -104,6 +101,8 @@ def _fill_contact(angle: float, cohesion: float) -> Contact:
 
 def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
     """Check that there is fill, and that the size of the pieces suits it."""
+    # more pieces cannot be solved in reasonable time
+    max_pieces = 20_000
     if not soft:
         raise InvalidInput(
             "no block is soft beside its joints: there is no fill to cut; give the structure one, "
@@ -115,10 +114,10 @@ def _check_fill(structure: Structure, soft: Sequence[int], size: float) -> None:
         raise InvalidInput(f"size {size:g} m of the pieces is not above 0: give a length in m")
     area = sum(structure.blocks[number].area for number in soft)
     count = area / (size**2 * sqrt(3.0) / 8.0)
-    if not 2.0 <= count <= MAX_PIECES:
+    if not 2.0 <= count <= max_pieces:
         raise InvalidInput(
             f"pieces of {size:g} m make {count:.3g} of a fill of {area:.3g} m²: give a size with "
-            f"which there are 2 to {MAX_PIECES}"
+            f"which there are 2 to {max_pieces}"
         )
 
 

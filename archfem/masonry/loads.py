@@ -10,10 +10,6 @@ from archfem._validation import check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 
-# Larger body forces [g] and point loads [N] must be a mistake of units.
-MAX_BODY_FORCE = 1e3
-MAX_POINT_LOAD = 1e9
-
 
 @dataclass(frozen=True)
 class BodyForce:
@@ -37,11 +33,13 @@ class BodyForce:
 
     def __post_init__(self) -> None:
         """Check that the values are multiples of g."""
+        # larger body forces [g] and point loads [N] must be a mistake of units
+        max_body_force = 1e3
         for name in ("horizontal", "vertical"):
             value = check_number(getattr(self, name), f"body force, {name} [g]")
-            if abs(value) > MAX_BODY_FORCE:
+            if abs(value) > max_body_force:
                 raise InvalidInput(
-                    f"body force, {name} = {value:.4g} g is more than {MAX_BODY_FORCE:g} g: give a "
+                    f"body force, {name} = {value:.4g} g is more than {max_body_force:g} g: give a "
                     "multiple of g, such as 0.3"
                 )
 
@@ -66,13 +64,14 @@ class PointLoad:
 
     def __post_init__(self) -> None:
         """Check position and force."""
+        max_point_load = 1e9
         check_number(self.x, "point load, x [m]")
         object.__setattr__(
             self, "force", check_numbers(self.force, "point load, force (x, y) [N]", 2)
         )
-        if max(map(abs, self.force)) > MAX_POINT_LOAD:
+        if max(map(abs, self.force)) > max_point_load:
             raise InvalidInput(
-                f"a point load of {self.force} N is above {MAX_POINT_LOAD:g} N: give newtons"
+                f"a point load of {self.force} N is above {max_point_load:g} N: give newtons"
             )
 
     def place(self, structure: Structure) -> tuple[int, Array]:

@@ -24,15 +24,6 @@ from archfem.masonry.block import Block
 # Rings and piers are assessed; other parts follow their support.
 PART_ROLES = ("ring", "pier", "other")
 
-# Words of the name of a part, in the singular, that identify its role
-ROLE_WORDS = {
-    "ring": frozenset({"arch", "ring"}),
-    "pier": frozenset({"pier", "column"}),
-    "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock"})
-    | {"backfill", "backing", "earth", "fill", "filling", "infill", "soil"}
-    | {"parapet", "sidewall", "spandrel", "wall", "wingwall"}
-    | {"ballast", "deck", "pavement", "paver", "paving", "road"},
-}
 
 logger = logging.getLogger("archfem")
 
@@ -92,13 +83,22 @@ def _collect_roles(members: Sequence[Member]) -> dict[str, str]:
 
 def infer_role(part: str) -> str:
     """Infer the role of a part from the words of its name; warn where they are ambiguous."""
-    # A name without any of `ROLE_WORDS` is neither ring nor pier; a name with words of several
+    # words of the name of a part, in the singular, that identify its role
+    role_words = {
+        "ring": frozenset({"arch", "ring"}),
+        "pier": frozenset({"pier", "column"}),
+        "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock"})
+        | {"backfill", "backing", "earth", "fill", "filling", "infill", "soil"}
+        | {"parapet", "sidewall", "spandrel", "wall", "wingwall"}
+        | {"ballast", "deck", "pavement", "paver", "paving", "road"},
+    }
+    # A name without any of `role_words` is neither ring nor pier; a name with words of several
     # roles has the first of `PART_ROLES`. A part without a name is a ring.
     if not part:
         return "ring"
     words = re.findall(r"[^\W\d_]+", part.lower())
     singular = {word.removesuffix(plural) for word in words for plural in ("", "s", "es")}
-    named = [role for role in PART_ROLES if singular & ROLE_WORDS[role]]
+    named = [role for role in PART_ROLES if singular & role_words[role]]
     role = named[0] if named else "other"
     if len(named) != 1:
         why = f"has words of {' and '.join(named)}" if named else "has no word of a known role"

@@ -23,9 +23,6 @@ from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, select_assessed_parts
 from archfem.units import G
 
-# Longer lists of names in messages lose their middle.
-MAX_LISTED_NAMES = 8
-
 
 def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
     """Return the number of a block or joint, given by name or by number."""
@@ -62,9 +59,11 @@ def join_joint_names(names: Sequence[str]) -> str:
 
 def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
     """Join a list; of a long one both ends, with its length."""
-    if len(names) <= MAX_LISTED_NAMES:
+    # longer lists of names in messages lose their middle
+    max_listed_names = 8
+    if len(names) <= max_listed_names:
         return put(names)
-    half = MAX_LISTED_NAMES // 2
+    half = max_listed_names // 2
     return f"{put(names[:half])}{comma}…{comma}{put(names[-half:])} ({len(names)} in all)"
 
 

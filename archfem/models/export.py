@@ -98,15 +98,6 @@ class Solids:
         return (first + fraction[:, None] * (second - first)).reshape(-1, 4, 2)
 
 
-# VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
-VTK_NUMBER_TYPES = {
-    "f": ("Float64", "<f8"),
-    "i": ("Int64", "<i8"),
-    "u": ("UInt8", "u1"),
-    "b": ("UInt8", "u1"),
-}
-
-
 def write_vtu(
     path: Path,
     points: Array,
@@ -167,7 +158,14 @@ def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:
 
 def _array(name: str, values: NDArray[Any]) -> str:
     """Return an array as XML: the number of bytes and the bytes, base64-encoded."""
-    kind, number_type = VTK_NUMBER_TYPES[values.dtype.kind]
+    # VTK's and NumPy's names of number types, by NumPy's kind; flags are bytes
+    vtk_number_types = {
+        "f": ("Float64", "<f8"),
+        "i": ("Int64", "<i8"),
+        "u": ("UInt8", "u1"),
+        "b": ("UInt8", "u1"),
+    }
+    kind, number_type = vtk_number_types[values.dtype.kind]
     data = np.ascontiguousarray(values, dtype=number_type).tobytes()
     size = np.array([len(data)], dtype="<u8").tobytes()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""

@@ -33,22 +33,13 @@ class DesignSpectrum(Protocol):
         """
 
 
-# Site factors of TBEC-2018, tables 2.1 and 2.2: linear between the columns, constant outside.
-_SHORT_PERIOD_LEVELS = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50])
+# Site factors of TBEC-2018, table 2.1: linear between the columns, constant outside
 _SHORT_PERIOD_FACTORS = {
     "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
     "ZB": (0.9, 0.9, 0.9, 0.9, 0.9, 0.9),
     "ZC": (1.3, 1.3, 1.2, 1.2, 1.2, 1.2),
     "ZD": (1.6, 1.4, 1.2, 1.1, 1.0, 1.0),
     "ZE": (2.4, 1.7, 1.3, 1.1, 0.9, 0.8),
-}
-_LONG_PERIOD_LEVELS = np.array([0.10, 0.20, 0.30, 0.40, 0.50, 0.60])
-_LONG_PERIOD_FACTORS = {
-    "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-    "ZB": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-    "ZC": (1.5, 1.5, 1.5, 1.5, 1.5, 1.4),
-    "ZD": (2.4, 2.2, 2.0, 1.9, 1.8, 1.7),
-    "ZE": (4.2, 3.3, 2.8, 2.4, 2.2, 2.0),
 }
 
 
@@ -96,13 +87,23 @@ class Tbec2018:
     @property
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
-        factor = np.interp(self.ss, _SHORT_PERIOD_LEVELS, _SHORT_PERIOD_FACTORS[self.site])
+        short_period_levels = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50])
+        factor = np.interp(self.ss, short_period_levels, _SHORT_PERIOD_FACTORS[self.site])
         return self.ss * float(factor)
 
     @property
     def sd1(self) -> float:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
-        factor = np.interp(self.s1, _LONG_PERIOD_LEVELS, _LONG_PERIOD_FACTORS[self.site])
+        # site factors of table 2.2, as those of table 2.1
+        long_period_levels = np.array([0.10, 0.20, 0.30, 0.40, 0.50, 0.60])
+        long_period_factors = {
+            "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
+            "ZB": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
+            "ZC": (1.5, 1.5, 1.5, 1.5, 1.5, 1.4),
+            "ZD": (2.4, 2.2, 2.0, 1.9, 1.8, 1.7),
+            "ZE": (4.2, 3.3, 2.8, 2.4, 2.2, 2.0),
+        }
+        factor = np.interp(self.s1, long_period_levels, long_period_factors[self.site])
         return self.s1 * float(factor)
 
     def horizontal(self, periods: float | Array) -> Array:
@@ -150,7 +151,6 @@ _GROUND_TYPES = {
         "E": (1.6, 0.05, 0.25, 1.2),
     },
 }
-_VERTICAL_RATIOS = {1: 0.90, 2: 0.45}  # a_vg / a_g [-]
 _VERTICAL_PERIODS = (0.05, 0.15, 1.0)  # T_B, T_C, T_D [s]
 
 
@@ -222,9 +222,10 @@ class Eurocode8:
         Raises:
             InvalidInput: a period is negative, or beyond 4 s, where these clauses give none.
         """
+        vertical_ratios = {1: 0.90, 2: 0.45}  # a_vg / a_g [-]
         top = 3.0 * damping_correction(self.damping)
         shape = spectrum_shape(validate_periods(periods, 4.0), _VERTICAL_PERIODS, lowest=1.0 / top)
-        return self.ag * _VERTICAL_RATIOS[self.type] * top * shape
+        return self.ag * vertical_ratios[self.type] * top * shape
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,9 +41,6 @@ from archfem.statics.relaxation import (
 )
 from archfem.units import mm
 
-# Share of a load or a settlement to which steps are halved before the search fails
-MIN_LOAD_STEP = 1.0 / 64.0
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Equilibrium(ResultDisplay):
@@ -275,6 +272,8 @@ def _increment_load(
     searches: SearchSequence = LOAD_SEARCHES,
 ) -> Equilibrium:
     """Follow an equilibrium while a load or motion grows; `at(factor)` returns model and load."""
+    # share of a load or a settlement to which steps are halved before the search fails
+    min_load_step = 1.0 / 64.0
     find, find_halved, find_smallest = searches
     factor, step = 0.0, 1.0
     while factor < 1.0:
@@ -289,8 +288,8 @@ def _increment_load(
         except DidNotConverge as error:
             # the step stays halved for the rest of the load
             step /= 2.0
-            find = find_halved if step > MIN_LOAD_STEP else find_smallest
-            if step >= MIN_LOAD_STEP:
+            find = find_halved if step > min_load_step else find_smallest
+            if step >= min_load_step:
                 continue
             raise DidNotConverge(
                 f"no equilibrium beyond {factor:.3f} of the {what}: {error}", last=state

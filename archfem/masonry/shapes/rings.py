@@ -20,10 +20,6 @@ from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure
 from archfem.units import G, in_degrees
 
-# Limit for the number of voussoirs, and of chords of each
-MAX_VOUSSOIRS = 10_000
-
-
 # Intrados and extrados of a stone, each from left to right (n, 2) [m]
 Faces = tuple[Array, Array]
 
@@ -165,9 +161,11 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
 
 def _check_division(embrace: float, voussoirs: int, pieces: int) -> tuple[int, int]:
     """Check the number of voussoirs and of straight pieces of each."""
+    # limit for the number of voussoirs, and of chords of each
+    max_voussoirs = 10_000
     for key, count in (("voussoirs", voussoirs), ("chords", pieces)):
-        if not 1 <= check_number(count, key) <= MAX_VOUSSOIRS or count != int(count):
-            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {MAX_VOUSSOIRS}")
+        if not 1 <= check_number(count, key) <= max_voussoirs or count != int(count):
+            raise InvalidStructure(f"{key} {count} is not a whole number from 1 to {max_voussoirs}")
     turn = embrace / int(voussoirs) / int(pieces)
     if turn > 120.0:
         raise InvalidStructure(f"a stone turns {turn:.4g}° in one piece: use more voussoirs")

@@ -8,7 +8,6 @@ import numpy as np
 from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 40  # lines, at most
-_DIRECTION_PATTERN = r"[NSEWUD]-[NSEWUD]"
 
 
 def recognises(text: RecordText) -> bool:
@@ -20,12 +19,13 @@ def recognises(text: RecordText) -> bool:
 
 def read(text: RecordText) -> list[Channel]:
     """Read the three components."""
+    direction_pattern = r"[NSEWUD]-[NSEWUD]"
     find = partial(text.find, stop=_HEADER_LINES)
     count_line, count = find(rf"^\s*NUMBER OF DATA\s*:\s*({COUNT_PATTERN})\s*$")
     step_line, step = find(rf"SAMPLING INTERVAL\s*\(sec\)\s*:\s*({NUMBER_PATTERN})\s*$")
     peak_line, peaks = find(r"^\s*(?:RAW )?PGA VALUES\s*(\(.*?\))\s*:(.*)$")
     names_line, names = find(
-        rf"^\s*({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s+({_DIRECTION_PATTERN})\s*$",
+        rf"^\s*({direction_pattern})\s+({direction_pattern})\s+({direction_pattern})\s*$",
         start=max(count_line, step_line, peak_line),
     )
     unit = text.find_unit(peaks[1], "the header does not state the unit of the peaks", peak_line)

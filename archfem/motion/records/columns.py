@@ -14,21 +14,12 @@ from archfem.motion.records.record_file import (
     parse_unit,
 )
 
-_STEP_PATTERN = re.compile(
-    rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(ms)?",
-    re.IGNORECASE,
-)
-_RATE_PATTERN = re.compile(
-    rf"\bsampl\w*\s+(?:rate|freq\w*)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(?:Hz|sps)\b",
-    re.IGNORECASE,
-)
-_DIRECTION_PATTERN = re.compile(r"\b(N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", re.IGNORECASE)
-
 
 def read(
     text: RecordText, *, column: int | None, units: str | None, dt: float | None
 ) -> list[Channel]:
     """Read the acceleration columns of a plain file."""
+    direction_pattern = re.compile(r"\b(N-S|E-W|U-D|NS|EW|UD|UP|DOWN)\b", re.IGNORECASE)
     # Lines before the first line of numbers, and lines that begin with #, %, ! or *, are comments;
     # they may state units and step. An increasing first column is time.
     rows, lines, comments = _read_table(text)
@@ -37,7 +28,7 @@ def read(
     first = 1 if _is_time(rows) else 0
     if column is None:
         chosen = list(range(first, rows.shape[1]))
-        directions = [match.upper() for match in _DIRECTION_PATTERN.findall(comments)]
+        directions = [match.upper() for match in direction_pattern.findall(comments)]
         if len(chosen) != 1 and len(directions) != len(chosen):
             raise text.error(
                 f"{len(chosen)} columns could be the acceleration: choose with column=, from 1"
@@ -100,11 +91,19 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
 
 def _list_stated_steps(comments: str, dt: float | None) -> list[float]:
     """Return the steps stated by keyword and in the comments [s]."""
+    step_pattern = re.compile(
+        rf"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(ms)?",
+        re.IGNORECASE,
+    )
+    rate_pattern = re.compile(
+        rf"\bsampl\w*\s+(?:rate|freq\w*)\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*(?:Hz|sps)\b",
+        re.IGNORECASE,
+    )
     steps = [] if dt is None else [check_number(dt, "dt [s]")]
     steps += [
-        float(value) * (1e-3 if milli else 1.0) for value, milli in _STEP_PATTERN.findall(comments)
+        float(value) * (1e-3 if milli else 1.0) for value, milli in step_pattern.findall(comments)
     ]
-    steps += [1.0 / max(float(rate), 1e-9) for rate in _RATE_PATTERN.findall(comments)]
+    steps += [1.0 / max(float(rate), 1e-9) for rate in rate_pattern.findall(comments)]
     return steps
 
 

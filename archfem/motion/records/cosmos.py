@@ -5,9 +5,7 @@ from enum import IntEnum
 
 from archfem.motion.records.record_file import COUNT_PATTERN, Channel, RecordText, find_column_width
 
-_BLOCK_PATTERN = rf"^\s*({COUNT_PATTERN})\s+acceleration\s+pts\b(.*)$"
 _HEADER_PATTERN = rf"^\s*({COUNT_PATTERN})\s+%s-header values follow"
-_END_PATTERN = r"^\s*End-of-data for\s+Chan\s*(\S*)\s+acceleration"
 
 
 class _Position(IntEnum):
@@ -16,11 +14,6 @@ class _Position(IntEnum):
     AZIMUTH = 53
     STEP = 61
     PEAK = 63
-
-
-# Codes of the direction of a vertical sensor
-_VERTICAL_CODES = {400: "Up", 401: "Down", 402: "Vertical"}
-_UNKNOWN_VALUE = -999.0
 
 
 def recognises(text: RecordText) -> bool:
@@ -40,9 +33,14 @@ def read(text: RecordText) -> list[Channel]:
 
 def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     """Read the next channel after a line; return it and the line after its samples."""
+    block_pattern = rf"^\s*({COUNT_PATTERN})\s+acceleration\s+pts\b(.*)$"
+    end_pattern = r"^\s*End-of-data for\s+Chan\s*(\S*)\s+acceleration"
+    # codes of the direction of a vertical sensor
+    vertical_codes = {400: "Up", 401: "Down", 402: "Vertical"}
+    unknown_value = -999.0
     codes, line = _read_header(text, "Integer", start)
     values, line = _read_header(text, "Real", line)
-    line, block = text.find(_BLOCK_PATTERN, line)
+    line, block = text.find(block_pattern, line)
     count, rest = int(block[1]), block[2]
     unit = text.find_unit(
         rest, "no single unit of acceleration such as cm/sec2: not volume 2", line
@@ -52,12 +50,12 @@ def _read_channel(text: RecordText, start: int) -> tuple[Channel, int]:
     if length and abs(count * dt - float(length[1])) > 1.0 + dt:
         raise text.error(f"{count} samples at {dt:g} s do not last {length[1]} s", line)
     numbers, after = text.read_block(line + 1, count, find_column_width(rest))
-    if values[_Position.PEAK] != _UNKNOWN_VALUE:
+    if values[_Position.PEAK] != unknown_value:
         text.check_peak(numbers, values[_Position.PEAK])
-    end, code = text.find(_END_PATTERN, after)
+    end, code = text.find(end_pattern, after)
     if any(content.strip() for content in text.lines[after:end]):
         raise text.error(f"more follows after the {count} samples stated", after)
-    direction = _VERTICAL_CODES.get(int(codes[_Position.AZIMUTH]), code[1])
+    direction = vertical_codes.get(int(codes[_Position.AZIMUTH]), code[1])
     return Channel.from_direction(numbers * unit, dt, direction), end + 1
 
 

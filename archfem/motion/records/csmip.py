@@ -8,13 +8,6 @@ from archfem.motion.records.record_file import (
     find_column_width,
 )
 
-_BLOCK_PATTERN = (
-    rf"^\s*({COUNT_PATTERN})\s+POINTS OF ACCEL DATA EQUALLY SPACED AT\s+"
-    rf"({NUMBER_PATTERN})\s*SEC(.*)$"
-)
-_CHANNEL_PATTERN = r"\bCHAN\s+\d+:\s*(\S+(?: DEG)?)"
-_PEAK_PATTERN = rf"PEAK ACCELERATION\s*=\s*({NUMBER_PATTERN})"
-
 
 def recognises(text: RecordText) -> bool:
     """Return whether a line announces equally spaced points of accelerations."""
@@ -35,15 +28,21 @@ def read(text: RecordText) -> list[Channel]:
 
 def _read_channel(text: RecordText, start: int, end: int) -> Channel:
     """Read the channel between two lines."""
-    line, block = text.find(_BLOCK_PATTERN, start, end)
-    if text.contains(_BLOCK_PATTERN, end, line + 1):
+    block_pattern = (
+        rf"^\s*({COUNT_PATTERN})\s+POINTS OF ACCEL DATA EQUALLY SPACED AT\s+"
+        rf"({NUMBER_PATTERN})\s*SEC(.*)$"
+    )
+    channel_pattern = r"\bCHAN\s+\d+:\s*(\S+(?: DEG)?)"
+    peak_pattern = rf"PEAK ACCELERATION\s*=\s*({NUMBER_PATTERN})"
+    line, block = text.find(block_pattern, start, end)
+    if text.contains(block_pattern, end, line + 1):
         raise text.error("a second channel begins before the end of the first", line)
     unit = text.find_unit(block[3], "no single unit of acceleration such as CM/SEC/SEC", line)
     numbers, after = text.read_block(line + 1, int(block[1]), find_column_width(block[3]))
     if after < end and text.is_numeric(after):
         raise text.error(f"more numbers follow after the {block[1]} samples stated", after)
-    if text.contains(_PEAK_PATTERN, line, start):
-        text.check_peak(numbers, float(text.find(_PEAK_PATTERN, start, line)[1][1]))
-    direction = text.find(_CHANNEL_PATTERN, start, line)[1][1]
+    if text.contains(peak_pattern, line, start):
+        text.check_peak(numbers, float(text.find(peak_pattern, start, line)[1][1]))
+    direction = text.find(channel_pattern, start, line)[1][1]
     dt = text.check_step(float(block[2]), line)
     return Channel.from_direction(numbers * unit, dt, direction)

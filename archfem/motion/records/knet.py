@@ -5,8 +5,6 @@ from functools import partial
 from archfem.motion.records.record_file import NUMBER_PATTERN, Channel, RecordText
 
 _HEADER_LINES = 20  # lines
-# KiK-net numbers its components: 1 to 3 in the borehole, 4 to 6 at the surface.
-_VERTICAL_CODES = {"3": "U-D", "6": "U-D"}
 
 
 def recognises(text: RecordText) -> bool:
@@ -18,6 +16,8 @@ def recognises(text: RecordText) -> bool:
 
 def read(text: RecordText) -> list[Channel]:
     """Read the single component of the file and subtract its mean."""
+    # kiK-net numbers its components: 1 to 3 in the borehole, 4 to 6 at the surface
+    vertical_codes = {"3": "U-D", "6": "U-D"}
     # the number of samples is the product of frequency and duration in the header
     find = partial(text.find, stop=_HEADER_LINES)
     rate_line, rate = find(rf"^\s*Sampling Freq\(Hz\)\s+({NUMBER_PATTERN})\s*Hz")
@@ -36,4 +36,4 @@ def read(text: RecordText) -> list[Channel]:
     # the peak of the header relies on another estimate of the offset
     text.check_peak(samples, 0.01 * float(peak[1]), tolerance=0.02)
     dt = text.check_step(1.0 / frequency, rate_line)
-    return [Channel.from_direction(samples, dt, _VERTICAL_CODES.get(direction, direction))]
+    return [Channel.from_direction(samples, dt, vertical_codes.get(direction, direction))]

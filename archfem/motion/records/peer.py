@@ -6,13 +6,6 @@ from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Ch
 
 _HEADER_LINES = 12  # lines; files in the wild begin with blank lines or lack one of the four
 
-_VALUES_BEFORE_NAMES = re.compile(
-    rf"\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE
-)
-_VALUES_AFTER_NAMES = re.compile(
-    rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})", re.IGNORECASE
-)
-
 
 def recognises(text: RecordText) -> bool:
     """Return whether the header names both NPTS and DT."""
@@ -36,8 +29,14 @@ def read(text: RecordText) -> list[Channel]:
 
 def _find_count_and_step(text: RecordText) -> tuple[int, float, int]:
     """Return NPTS, DT [s] and the index of the last header line."""
+    values_before_names = re.compile(
+        rf"\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})[\s,]+NPTS[\s,]*DT\b", re.IGNORECASE
+    )
+    values_after_names = re.compile(
+        rf"\bNPTS[\s,]+DT\s*[=:]?\s*({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})", re.IGNORECASE
+    )
     for line, content in enumerate(text.lines[:_HEADER_LINES]):
-        together = _VALUES_BEFORE_NAMES.match(content) or _VALUES_AFTER_NAMES.search(content)
+        together = values_before_names.match(content) or values_after_names.search(content)
         if together:
             return int(together[1]), float(together[2]), line
     count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"

@@ -20,10 +20,6 @@ NUMBER_PATTERN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 # Pattern of a number of samples
 COUNT_PATTERN = r"\d{1,9}"
 
-_NUMERIC_LINE = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
-_ANY_DIGIT = re.compile(r"[0-9]")
-_RUN_TOGETHER = re.compile(r"(?<=[\d.])(?=[-+])")
-
 
 @dataclass(frozen=True)
 class RecordText:
@@ -56,8 +52,10 @@ class RecordText:
 
     def is_numeric(self, line: int) -> bool:
         """Return whether a line consists of numbers."""
+        numeric_line = re.compile(r"[\s\d+\-.,;EeDd]+", re.ASCII)
+        any_digit = re.compile(r"[0-9]")
         content = self.lines[line]
-        return bool(_NUMERIC_LINE.fullmatch(content) and _ANY_DIGIT.search(content))
+        return bool(numeric_line.fullmatch(content) and any_digit.search(content))
 
     def parse_row(self, line: int, width: int | None = None) -> list[float]:
         """Parse the numbers of one line."""
@@ -75,8 +73,9 @@ class RecordText:
 
     def _split_tokens(self, line: int, width: int | None) -> list[str]:
         """Split a line into the texts of numbers, with E for Fortran's D."""
+        run_together = re.compile(r"(?<=[\d.])(?=[-+])")
         content = self.lines[line].upper().replace("D", "E")
-        tokens = _RUN_TOGETHER.sub(" ", content).replace(",", " ").replace(";", " ").split()
+        tokens = run_together.sub(" ", content).replace(",", " ").replace(";", " ").split()
         if width and not all(re.fullmatch(NUMBER_PATTERN, token) for token in tokens):
             return [content[at : at + width] for at in range(0, len(content.rstrip()), width)]
         return tokens
@@ -189,12 +188,6 @@ def find_column_width(line: str) -> int | None:
     return int(match[1]) if match else None
 
 
-_DOWN_PATTERN = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
-_VERTICAL_PATTERN = re.compile(
-    r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
-)
-
-
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One component of a record."""
@@ -207,10 +200,14 @@ class Channel:
     @classmethod
     def from_direction(cls, samples: Array, dt: float, direction: str) -> "Channel":
         """Create a channel; a vertical component with positive downwards changes its sign."""
+        down_pattern = re.compile(r"\b(DWN|DOWN|DN)\b|DWN$", re.IGNORECASE)
+        vertical_pattern = re.compile(
+            r"\b(UP|UPDO|VERT|VERTICAL|V|VER|U-D|UD|Z|[A-Z]{2}Z)\b|UP$", re.IGNORECASE
+        )
         name = direction.strip()
-        if _DOWN_PATTERN.search(name):
+        if down_pattern.search(name):
             return cls(-samples, dt, f"{name}, turned up", True)
-        return cls(samples, dt, name, bool(_VERTICAL_PATTERN.search(name)))
+        return cls(samples, dt, name, bool(vertical_pattern.search(name)))
 
 
 # Longer units first: each match is removed before the search for the next.
@@ -221,15 +218,15 @@ _UNIT_PATTERNS = (
     (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
     (r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g\s*[)\]]|\bin\s+g\b", STANDARD_GRAVITY),
 )
-_UNIT_NAMES = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
 
 
 def parse_unit(name: str) -> float:
     """Return the value of a unit of acceleration by its name [m/s²]."""
+    unit_names = {"g": STANDARD_GRAVITY, "m/s2": 1.0, "cm/s2": 1e-2, "gal": 1e-2, "mm/s2": 1e-3}
     key = str(name).lower().replace("²", "2").replace("^", "").replace(" ", "")
-    if key not in _UNIT_NAMES:
-        raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(_UNIT_NAMES)}")
-    return _UNIT_NAMES[key]
+    if key not in unit_names:
+        raise InvalidInput(f"units {name!r} are unknown: use one of {', '.join(unit_names)}")
+    return unit_names[key]
 
 
 def find_units(header: str) -> set[float]:

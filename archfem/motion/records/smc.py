@@ -30,10 +30,6 @@ class _Real(IntEnum):
     MINIMUM = 31
 
 
-_UNKNOWN_VALUE = 1.0e38
-_VERTICAL_CODES = {0: "UP", 180: "DOWN"}  # degrees from the upward vertical
-
-
 def recognises(text: RecordText) -> bool:
     """Return whether the file starts with a type number and name, and has a line with a star."""
     first = re.match(r"\s*\d\s+[A-Z ]+$", text.lines[0].rstrip())
@@ -43,6 +39,8 @@ def recognises(text: RecordText) -> bool:
 
 def read(text: RecordText) -> list[Channel]:
     """Read the single component of the file."""
+    unknown_value = 1.0e38
+    vertical_codes = {0: "UP", 180: "DOWN"}  # degrees from the upward vertical
     if "ACCELEROGRAM" not in text.lines[0]:
         raise text.error(f"{text.lines[0].strip()!r} is not an accelerogram", 0)
     integers, line = text.read_block(_Line.INTEGERS, 48)
@@ -55,14 +53,14 @@ def read(text: RecordText) -> list[Channel]:
         raise text.error(f"{len(comments)} comment lines expected", _Line.COMMENTS)
     numbers = text.read_last_block(start, int(integers[_Integer.SAMPLE_COUNT]))
     peaks = [
-        abs(reals[at]) for at in (_Real.MAXIMUM, _Real.MINIMUM) if abs(reals[at]) < _UNKNOWN_VALUE
+        abs(reals[at]) for at in (_Real.MAXIMUM, _Real.MINIMUM) if abs(reals[at]) < unknown_value
     ]
     if peaks:
         text.check_peak(numbers, max(peaks))
-    if not 0.0 < reals[_Real.RATE] < _UNKNOWN_VALUE:
+    if not 0.0 < reals[_Real.RATE] < unknown_value:
         raise text.error("the real header does not state the sampling rate", _Line.REALS)
     written = re.search(r"component\s*=\s*(\S+)", " ".join(text.lines[: _Line.INTEGERS]))
-    direction = _VERTICAL_CODES.get(int(integers[_Integer.TILT]), written[1] if written else "")
+    direction = vertical_codes.get(int(integers[_Integer.TILT]), written[1] if written else "")
     return [
         Channel.from_direction(
             0.01 * numbers, text.check_step(1.0 / reals[_Real.RATE], _Line.REALS), direction
