@@ -4,6 +4,7 @@ import ast
 import inspect
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -70,9 +71,15 @@ def dotted(path):
 NAMES = {dotted(path): path for path in MODULES}
 
 
+@cache
+def nodes(path):
+    """Nodes of the syntax tree of a file, the module first."""
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def imported(path):
     """Dotted names of everything that a file imports, also inside its functions."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -143,10 +150,10 @@ def count_code_lines(node, lines):
 @pytest.mark.parametrize("name", NAMES)
 def test_modules_and_functions_are_small_and_documented(name):
     text = NAMES[name].read_text(encoding="utf-8")
-    tree, lines = ast.parse(text), text.splitlines()
+    tree, lines = nodes(NAMES[name])[0], text.splitlines()
     assert ast.get_docstring(tree)
     assert count_code_lines(tree, lines) <= MAX_CODE_LINES_PER_MODULE
-    for node in ast.walk(tree):
+    for node in nodes(NAMES[name]):
         if isinstance(node, ast.FunctionDef):
             length = count_code_lines(node, lines)
             assert length <= MAX_CODE_LINES_PER_FUNCTION, f"{name}.{node.name}: {length} lines"
@@ -168,7 +175,7 @@ def test_a_module_name_has_one_meaning():
 
 def imported_by_string(path):
     """Names of modules that `import_module` is called with; "*" stands for computed parts."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "import_module":
             match node.args[0]:
                 case ast.Constant(value=str(name)):
@@ -203,7 +210,7 @@ def test_late_bound_methods_resolve(method):
     classes = [
         node.name
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes(path)
         if isinstance(node, ast.ClassDef)
     ]
     assert classes.count(owner) == 1
