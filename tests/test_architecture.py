@@ -208,10 +208,7 @@ def test_late_bound_methods_resolve(method):
     bases = {base.__name__ for kind in kinds for base in getattr(kind, "__mro__", ())}
     assert owner in bases
     classes = [
-        node.name
-        for path in MODULES
-        for node in nodes(path)
-        if isinstance(node, ast.ClassDef)
+        node.name for path in MODULES for node in nodes(path) if isinstance(node, ast.ClassDef)
     ]
     assert classes.count(owner) == 1
     assert all(hasattr(kind, name) for kind in kinds if getattr(kind, "__name__", "") == owner)
