@@ -19,14 +19,11 @@ NAMES = sorted(
 FIRST = ("opensees_ring", "run")
 """Scripts that import OpenSees, which must be loaded before archfem and its MPI."""
 
-LONG = ("run", "study_kills")
-"""Scripts that take seconds: one runs five others of these, one starts a study of processes."""
+LONG = ("run", "study_efficiency", "study_kills")
+"""Scripts that take seconds: one runs five others of these, two start studies of processes."""
 
 
-def marked_names():
-    """Names of all scripts, of which long ones are slow tests."""
-    for name in NAMES:
-        yield pytest.param(name, marks=pytest.mark.slow if name in LONG else ())
+MARKED = [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +49,7 @@ def logging_levels():
 
 
 @pytest.mark.usefixtures("scripts", "logging_levels")
-@pytest.mark.parametrize("name", marked_names())
+@pytest.mark.parametrize("name", MARKED)
 def test_benchmark_starts(name, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     if name in FIRST and find_spec("openseespy"):

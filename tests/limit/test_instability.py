@@ -51,7 +51,7 @@ def test_a_smooth_ring_is_not_helped_by_thickness():
             radius=2.95,
             thickness=thickness,
             embrace=159.0,
-            voussoirs=17,
+            voussoirs=9,
             contact=af.Contact(1e11, 4e10, friction),
         )
 
