@@ -281,3 +281,17 @@ def check_overlaps(
         f"{1e3 * depth[worst]:.3g} mm deep at ({both.centroid.x:.3f}, {both.centroid.y:.3f}): "
         f"correct their outlines{remedy}"
     )
+
+
+def overlap_depths(outlines: Sequence[Array], body: NDArray[np.intp]) -> dict[tuple[int, int], float]:
+    """Return the depth of the overlap of each pair of outlines of different bodies [m]."""
+    import shapely
+
+    polygons = np.array([shapely.Polygon(points) for points in outlines])
+    a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+    counted = (a < b) & (body[a] != body[b])
+    a, b = a[counted], b[counted]
+    common = shapely.intersection(polygons[a], polygons[b])
+    length = shapely.length(common)
+    depth = 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)
+    return dict(zip(zip(a.tolist(), b.tolist(), strict=True), depth.tolist(), strict=True))

@@ -150,6 +150,40 @@ class Settlement:
         return motions
 
 
+@dataclass(frozen=True)
+class AttachedLoad:
+    """A load that stays with a point of a block along its motion: a floor, a tie, a vault's thrust.
+
+    Attributes:
+        block: number or name of the block that carries it.
+        point: where it acts, at rest (x, y) [m].
+        weight: that acts downwards and, as a mass, is accelerated with the block [N].
+        force: constant force without mass, up positive (2,) [N].
+
+    Raises:
+        InvalidInput: a value is no number, above 1e9 N, or the weight is negative.
+    """
+
+    block: int | str
+    point: tuple[float, float]
+    weight: float = 0.0
+    force: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check that the values are metres and newtons."""
+        if not isinstance(self.block, str):
+            check_integer(self.block, "attached load, block", minimum=0)
+        for name, unit in (("point", "m"), ("force", "N")):
+            pair = check_numbers(getattr(self, name), f"attached load, {name} (x, y) [{unit}]", 2)
+            object.__setattr__(self, name, pair)
+        check_number(self.weight, "attached load, weight [N]", minimum=0.0)
+        if max(self.weight, *map(abs, self.force)) > MAX_POINT_LOAD:
+            raise InvalidInput(
+                f"an attached load of {self.weight} N and {self.force} N is above "
+                f"{MAX_POINT_LOAD:g} N: give newtons"
+            )
+
+
 Action = BodyForce | PointLoad
 
 
