@@ -15,7 +15,7 @@ not. Where a joint slides and others hinge, α at rest can therefore be below th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import NamedTuple
@@ -28,9 +28,9 @@ from scipy.sparse import csgraph, csr_matrix
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
 from archfem.limit.linear_programme import NoEquilibrium
-from archfem.masonry.block import overlap_depths
+from archfem.masonry.block import largest_overlap
 from archfem.masonry.loads import AttachedLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_joint_names
 
 # Distance of points that touch, relative to the size of the structure [-]
 TOUCHING = 1e-6
@@ -626,28 +626,39 @@ class LinkageState:
         return forces
 
 
+@dataclass(frozen=True)
+class PathEvent:
+    """A change of the mechanism along its path, or its end.
+
+    Attributes:
+        place: number of the place where it happens.
+        text: what happens.
+    """
+
+    place: int
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class MechanismPath:
     """Path of a mechanism: factor and displacements from rest to the fall.
 
     Attributes:
-        structure: structure that moves.
+        blocks: blocks at rest, with their loads.
         factors: factor α of the horizontal forces at each place (n,) [-].
         displacements: of all blocks' centroids, and rotations (n, n_blocks, 3) [m, m, rad].
         velocity: velocities at rest (n_blocks, 3), the fastest corner at 1 m/s.
-        mechanisms: mechanisms that are followed, the first from rest on.
-        starts: number of the place from which each mechanism is followed.
-        events: why each mechanism after the first replaces the one before.
+        mechanisms: mechanisms that are followed one after the other.
+        events: events that change or end the mechanism.
         end: reason for which the path ends; `end.sentence` gives its meaning.
     """
 
-    structure: Structure
+    blocks: PlacedBlocks
     factors: Array
     displacements: Array
     velocity: Array
     mechanisms: tuple[Mechanism, ...]
-    starts: tuple[int, ...]
-    events: tuple[str, ...]
+    events: tuple[PathEvent, ...]
     end: PathEnd
 
 
@@ -663,118 +674,135 @@ class _Stop(Exception):
 class PathFollower:
     """Follows a mechanism from event to event."""
 
-    blocks: PlacedBlocks
+    blocks: PlacedBlocks  # at rest
     joints: Sequence[int]  # joints that may open or slip
     friction: Array  # coefficients, infinite where nothing slides (n_joints,)
+    factors: list[float] = field(default_factory=list)
+    displacements: list[Array] = field(default_factory=list)
+    events: list[PathEvent] = field(default_factory=list)
+    travel: float = 0.0  # of the fastest corner, so far [m]
 
     def follow(self, mechanism: Mechanism, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
-        self.factors: list[float] = []
-        self.displacements: list[Array] = []
-        self.travel = 0.0
-        state = LinkageState(Linkage(self.blocks, mechanism), self.blocks)
+        mechanisms, state = [mechanism], self._start(self.blocks, mechanism)
         velocity = state.velocity(state.linkage.first_velocity)
-        first = velocity
-        mechanisms, starts, events = [mechanism], [0], []
-        end = PathEnd.LOCKS
+        bodies = Bodies(self.blocks, mechanism.body)
+        first = np.zeros(3 * bodies.count) if velocity is None else velocity
         try:
-            while velocity is not None and len(events) <= max_events:
-                state, event = self._follow_linkage(state, velocity)
-                mechanism = self._renew(state.blocks)
-                events.append(event)
-                mechanisms.append(mechanism)
-                starts.append(len(self.factors))
-                state = LinkageState(Linkage(state.blocks, mechanism), state.blocks)
+            while len(mechanisms) <= max_events:
+                blocks = self._follow_linkage(state, velocity)
+                mechanisms.append(self._renew(blocks))
+                state = self._start(blocks, mechanisms[-1])
                 velocity = state.velocity(state.linkage.first_velocity)
+            raise DidNotConverge(
+                f"the mechanism changed {max_events} times before it fell, the last time as "
+                f"{self.events[-1].text}: check the joints there, or assess fewer blocks"
+            )
         except _Stop as stop:
             end = stop.end
-        if first is None:
-            motion = np.zeros_like(self.blocks.displacement)
-        else:
-            start = Bodies(self.blocks, mechanisms[0].body)
-            motion = (start.expansion @ first).reshape(-1, 3)
-        if not self.factors:
-            self.factors, self.displacements = [mechanism.factor], [self.blocks.displacement]
         return MechanismPath(
-            self.blocks.structure,
+            self.blocks,
             np.array(self.factors),
             np.array(self.displacements),
-            motion,
+            (bodies.expansion @ first).reshape(-1, 3),
             tuple(mechanisms),
-            tuple(starts),
-            tuple(events),
+            tuple(self.events),
             end,
         )
 
-    def _record(self, state: LinkageState, factor: float) -> None:
+    @staticmethod
+    def _start(blocks: PlacedBlocks, mechanism: Mechanism) -> LinkageState:
+        """Return the first state of the linkage of a mechanism."""
+        return LinkageState(Linkage(blocks, mechanism), blocks)
+
+    def _record(self, blocks: PlacedBlocks, factor: float) -> None:
         """Append a place to the path."""
         self.factors.append(factor)
-        self.displacements.append(state.blocks.displacement)
+        self.displacements.append(blocks.displacement)
 
     def _renew(self, blocks: PlacedBlocks) -> Mechanism:
         """Return the mechanism of limit analysis at the present places."""
         try:
             mechanism = find_mechanism(blocks, self.joints, self.friction)
         except NoEquilibrium as error:
+            self._record(blocks, 0.0)
             raise _Stop(PathEnd.FALLS) from error
         if mechanism is None:
             raise _Stop(PathEnd.LOCKS)
         if mechanism.factor <= 0.0:
+            self._record(blocks, 0.0)
             raise _Stop(PathEnd.FALLS)
         return mechanism
 
-    def _follow_linkage(self, state: LinkageState, velocity: Array) -> tuple[LinkageState, str]:
-        """Follow a linkage to its next event; return the state there and the event's name."""
+    def _follow_linkage(self, state: LinkageState, velocity: Array | None) -> PlacedBlocks:
+        """Follow a linkage to its next event and return the blocks there."""
         size = self.blocks.structure.size
+        if velocity is None:
+            self._record(state.blocks, state.linkage.mechanism.factor)
+            raise _Stop(PathEnd.LOCKS)
         factor = state.balance(velocity, self.friction)[0]
-        self._record(state, factor)
-        step, smallest = 1e-3 * size, 1e-9 * size
-        while True:
-            # a factor that changes by less than 2 % a step keeps the curve smooth
+        self._record(state.blocks, factor)
+        step = 1e-3 * size
+        while self.travel <= size:
             trial = state.advanced(velocity, step)
             ahead = None if trial is None else trial[0].balance(trial[1], self.friction)[0]
-            rough = ahead is None or abs(ahead - factor) > 0.02 * max(abs(self.factors[0]), 1e-3)
-            event = None if trial is None else self._event(*trial, step)
-            if (rough or event is not None) and step > smallest:
+            # a factor that changes by less than 2 % a step keeps the curve smooth
+            if ahead is None or abs(ahead - factor) > 0.02 * max(abs(self.factors[0]), 1e-3):
                 step *= 0.5
-                continue
+                if step > 1e-9 * size:
+                    continue
             if trial is None or ahead is None:
                 raise _Stop(PathEnd.LOCKS)
+            if self._event(*trial, step):
+                return self._finish(state, velocity, step)
             (state, velocity), factor = trial, ahead
             self.travel += step
-            if event is not None:
-                self._finish(state, factor, event)
-                return state, event
-            self._record(state, factor)
-            if self.travel > size:
-                raise _Stop(PathEnd.ENDURES)
+            self._record(state.blocks, factor)
             step = min(1.5 * step, 0.01 * size)
+        raise _Stop(PathEnd.ENDURES)
 
-    def _finish(self, state: LinkageState, factor: float, event: str) -> None:
-        """Record the place of an event; end the path there if the event ends it."""
-        self._record(state, 0.0 if event == "falls" else factor)
-        if event in ("falls", "collides"):
+    def _finish(self, state: LinkageState, velocity: Array, step: float) -> PlacedBlocks:
+        """Record the place of the first event within a step, and return the blocks there."""
+        shortest, event = 0.0, None
+        while step - shortest > 1e-9 * self.blocks.structure.size:
+            middle = 0.5 * (shortest + step)
+            trial = state.advanced(velocity, middle)
+            if trial is not None and not self._event(*trial, middle):
+                shortest = middle
+            else:
+                step = middle
+        trial = state.advanced(velocity, step)
+        if trial is None or not (event := self._event(*trial, step)):
+            raise _Stop(PathEnd.LOCKS)
+        self.travel += step
+        blocks = trial[0].blocks
+        self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
+        self.events.append(PathEvent(len(self.factors) - 1, event))
+        if event in (PathEnd.FALLS, PathEnd.COLLIDES):
             raise _Stop(PathEnd(event))
+        return blocks
 
-    def _event(self, state: LinkageState, velocity: Array, step: float) -> str | None:
-        """Return the name of the event that has happened at a state, or None."""
+    def _event(self, state: LinkageState, velocity: Array, step: float) -> str:
+        """Return the event that has happened at a state, or an empty text."""
         factor, normal_forces = state.balance(velocity, self.friction)
         if factor <= 0.0:
-            return "falls"
+            return PathEnd.FALLS
         blocks, near = state.blocks, TOUCHING * self.blocks.structure.size
+        names = [joint.name for joint in blocks.structure.joints]
         body, pairs = state.bodies.body, blocks.structure.pairs
-        apart = body[pairs[:, 0]] != body[pairs[:, 1]]
         # deeper than a step reaches, a corner is behind the face and not in it
         closed = (blocks.gaps < -0.5 * near) & (blocks.gaps > -4.0 * step - near)
-        if closed[:, apart].any():
-            return "a joint closes"
+        closes = closed.any(axis=(0, 2)) & (body[pairs[:, 0]] != body[pairs[:, 1]])
+        if closes.any():
+            return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
         unit = np.abs(blocks.dead[:, 1]).sum() / len(blocks.structure.free)
-        if (normal_forces < -1e-5 * unit).any():
-            return "a contact opens"
-        if any(self._is_off(blocks, contact, near) for contact in state.contacts if contact.slip):
-            return "a corner slides off its face"
-        depths = overlap_depths(blocks.outlines, body)
-        return "collides" if max(depths.values(), default=0.0) > 1e-5 * near / TOUCHING else None
+        for contact, force in zip(state.contacts, normal_forces, strict=True):
+            if force < -1e-5 * unit:  # well above the tolerance of the programme that follows
+                return f"a contact of {names[contact.joint]} opens"
+            if contact.slip and self._is_off(blocks, contact, near):
+                return f"a corner slides off its face at {names[contact.joint]}"
+        depth = largest_overlap(blocks.outlines, body)
+        return PathEnd.COLLIDES if depth > 1e-5 * blocks.structure.size else ""
 
     @staticmethod
     def _is_off(blocks: PlacedBlocks, contact: Contact, near: float) -> bool:
@@ -784,3 +812,27 @@ class PathFollower:
         along = (face[1] - face[0]) / blocks.structure.depths[contact.joint]
         share = (contact.point - face[0]) @ along
         return not -2.0 * near <= share <= blocks.structure.depths[contact.joint] + 2.0 * near
+
+    def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:
+        """Return the last place up to which the joints that the mechanism keeps closed hold."""
+        # Places are checked from rest on, then bisected between the last two.
+        places = np.unique(np.linspace(0, len(path.factors) - 1, samples).astype(int))
+        bad = next((k for k in places if not self._holds(path, k)), None)
+        if bad is None:
+            return len(path.factors) - 1
+        good = max(int(k) for k in (*places[places < bad], 0))
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if self._holds(path, middle) else (good, middle)
+        return good
+
+    def _holds(self, path: MechanismPath, place: int, tolerance: float = 1e-4) -> bool:
+        """Return whether limit analysis at a place gives the factor of the path."""
+        if path.factors[place] <= 0.0:
+            return True  # the fall itself
+        blocks = self.blocks.moved(path.displacements[place])
+        try:
+            mechanism = find_mechanism(blocks, self.joints, self.friction)
+        except NoEquilibrium:
+            return False
+        return mechanism is None or mechanism.factor >= (1.0 - tolerance) * path.factors[place]

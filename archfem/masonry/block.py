@@ -265,8 +265,7 @@ def check_overlaps(
     counted = (a < b) & ~(still[a] & still[b])
     a, b = a[counted], b[counted]
     common = shapely.intersection(polygons[a], polygons[b])
-    length = shapely.length(common)
-    depth = 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)
+    depth = _overlap_depths(common)
     if not np.any(depth > near):
         return
     worst = int(np.argmax(depth > near))
@@ -283,15 +282,20 @@ def check_overlaps(
     )
 
 
-def overlap_depths(outlines: Sequence[Array], body: NDArray[np.intp]) -> dict[tuple[int, int], float]:
-    """Return the depth of the overlap of each pair of outlines of different bodies [m]."""
+def largest_overlap(outlines: Sequence[Array], body: NDArray[np.intp]) -> float:
+    """Return the largest depth by which outlines of different bodies overlap [m]."""
     import shapely
 
     polygons = np.array([shapely.Polygon(points) for points in outlines])
     a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
     counted = (a < b) & (body[a] != body[b])
-    a, b = a[counted], b[counted]
-    common = shapely.intersection(polygons[a], polygons[b])
+    depths = _overlap_depths(shapely.intersection(polygons[a[counted]], polygons[b[counted]]))
+    return float(depths.max(initial=0.0))
+
+
+def _overlap_depths(common: NDArray[np.object_]) -> Array:
+    """Return the mean depths of overlaps, from their area and length [m]."""
+    import shapely
+
     length = shapely.length(common)
-    depth = 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)
-    return dict(zip(zip(a.tolist(), b.tolist(), strict=True), depth.tolist(), strict=True))
+    return np.asarray(2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0))
