@@ -57,6 +57,7 @@ from .motion.motion import Motion as Motion
 from .motion.response_spectra import response_spectrum as response_spectrum
 from .motion.suite import Suite as Suite
 from .statics.equilibrium import dead_load as dead_load
+from .statics.mechanism_assessment import kinematic_assessment as kinematic_assessment
 from .statics.modes import modes as modes
 from .statics.pushover import pushover as pushover
 from .studies.convergence import mesh_sensitivity as mesh_sensitivity

@@ -19,6 +19,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "History.player": "view.pages.player:player",
     "History.plot": "view.histories:draw_joints",
     "History.report": "cases.report.report:write_report_of_history",
+    "KinematicAssessment.plot": "view.collapse:draw_kinematic_assessment",
     "Modes.plot": "view.statics:draw_modes",
     "Motion.plot": "view.motions:draw_motion",
     "Pushover.plot": "view.statics:draw_pushover",

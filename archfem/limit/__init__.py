@@ -2,6 +2,8 @@
 
     backfill              earth pressure, load spreading, self-weight programme
     collapse              collapse_factor, stands, warnings
+    displaced_blocks      limit analysis of blocks at displaced places
+    finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
     mechanism_count       mechanisms by counting failed joints; duration and opening

@@ -4,6 +4,7 @@ from .backfill import jointed_fill as jointed_fill
 from .block import Block as Block
 from .construction import Stage as Stage
 from .construction import usual_stages as usual_stages
+from .loads import AttachedLoad as AttachedLoad
 from .loads import BodyForce as BodyForce
 from .loads import PointLoad as PointLoad
 from .loads import Settlement as Settlement

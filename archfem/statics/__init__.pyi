@@ -4,6 +4,11 @@ from .equilibrium import equilibrium_under as equilibrium_under
 from .equilibrium import self_weight as self_weight
 from .free_body import FreeBody as FreeBody
 from .free_body import forces_on as forces_on
+from .mechanism_assessment import LIMIT_STATES as LIMIT_STATES
+from .mechanism_assessment import AssessmentCheck as AssessmentCheck
+from .mechanism_assessment import KinematicAssessment as KinematicAssessment
+from .mechanism_assessment import LimitState as LimitState
+from .mechanism_assessment import assess_parts as assess_parts
 from .modes import Modes as Modes
 from .newton import Newton as Newton
 from .pushover import Pushover as Pushover

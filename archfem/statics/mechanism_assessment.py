@@ -1,0 +1,679 @@
+"""Kinematic assessment: a collapse mechanism against a design spectrum, by force and displacement.
+
+The mechanism becomes an oscillator of one degree of freedom. With the weights P of all that moves
+and their horizontal virtual displacements δ at rest, it has the participating mass and the share
+
+    M* = (Σ P δ)² / (g Σ P δ²),   e* = g M* / Σ P,
+
+and its spectral acceleration and displacement are those of a control point C along the finite path,
+
+    a* = α g / e*,   d* = d_C Σ P δ² / (δ_C Σ P δ).
+
+a*(d*) is the capacity curve; it begins at a₀* and vanishes at d₀*. C is the centroid that moves
+fastest along x at rest. The checks compare a₀* with the ground acceleration, raised by a behaviour
+factor, and a share of d₀* with the displacement spectrum at a secant period.
+
+References:
+    Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem._display import ResultDisplay
+from archfem._files import align_columns
+from archfem._typing import Array
+from archfem._validation import check_fields, check_number, is_one_of, validate_arguments
+from archfem.errors import InvalidInput
+from archfem.limit.collapse import collapse_factor
+from archfem.limit.displaced_blocks import Mechanism, PlacedBlocks, classify_motion, find_mechanism
+from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
+from archfem.limit.linear_programme import NoEquilibrium
+from archfem.masonry.loads import AttachedLoad, BodyForce
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import Structure, join_joint_names, join_names
+from archfem.motion.design_spectra import (
+    DesignSpectrum,
+    Eurocode8,
+    Eurocode2024,
+    Ntc2018,
+    damping_correction,
+)
+from archfem.motion.motion import Motion
+from archfem.motion.response_spectra import response_spectrum
+from archfem.units import STANDARD_GRAVITY
+
+
+@dataclass(frozen=True)
+class LimitState:
+    """Displacement check of a code: capacity, period and damping of the equivalent oscillator.
+
+    The capacity is d_u* = share d₀*. Its period is T = period_factor π √(d_T / a*(d_T)) with
+    d_T = secant_share d_u*, and the demand is the displacement spectrum up to T.
+
+    Attributes:
+        name: of the code and limit state.
+        share: capacity as a share of d₀* [-].
+        period_factor: factor of the period, in multiples of π; 2 is the secant period [-].
+        secant_share: displacement of the period as a share of d_u* [-].
+        damping: ratio to the critical of the demand's spectrum [-].
+        source: clause of the code, or another source.
+
+    Raises:
+        InvalidInput: a value is out of range.
+    """
+
+    name: str
+    share: float
+    period_factor: float
+    secant_share: float
+    damping: float
+    source: str
+
+    def __post_init__(self) -> None:
+        """Check that shares are up to 1 and the damping is a ratio."""
+        check_fields(self)
+        for key, most in (
+            *(("share", 1.0), ("secant_share", 1.0)),
+            *(("period_factor", 10.0), ("damping", 0.5)),
+        ):
+            if not 0.0 < check_number(getattr(self, key), f"{self.name}, {key} [-]") <= most:
+                raise InvalidInput(
+                    f"{self.name}, {key} = {getattr(self, key):.4g} is not above 0 and up to "
+                    f"{most:g}: give a ratio, such as 0.4 for 40 %"
+                )
+
+
+CIRCOLARE = "Circolare 7/2019"
+
+# Displacement checks by name. The 2019 values were read in a transcription of the Circolare.
+LIMIT_STATES: Mapping[str, LimitState] = {
+    state.name: state
+    for state in (
+        LimitState(
+            *("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
+            f"{CIRCOLARE}, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.10",
+        ),
+        LimitState(
+            *("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
+            f"{CIRCOLARE}, C8.7.1.2.1.6 and C8.7.1.2.1.8, eq. C8.7.1.11",
+        ),
+        LimitState(
+            *("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
+            "Circolare 617/2009, C8A.4.2.2 and C8A.4.2.3, from memory: its text was not read",
+        ),
+    )
+}
+
+
+@dataclass(frozen=True)
+class AssessmentCheck:
+    """One check: capacity against demand.
+
+    Attributes:
+        name: of the check.
+        capacity: acceleration [m/s²] or displacement [m] that is allowed.
+        demand: of the spectrum, in the same unit.
+        unit: "m/s²" or "m".
+        ratio: factor on the spectrum at which the check is just passed [-].
+        period: of the equivalent oscillator [s]; None for the check of accelerations.
+        source: clause of the code.
+    """
+
+    name: str
+    capacity: float
+    demand: float
+    unit: str
+    ratio: float
+    period: float | None
+    source: str
+
+    @property
+    def passes(self) -> bool:
+        """Whether the spectrum as given is withstood."""
+        return self.ratio >= 1.0
+
+    def __str__(self) -> str:
+        """Describe capacity, demand and outcome in one line."""
+        period = "" if self.period is None else f" at T = {self.period:.3f} s"
+        return (
+            f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
+            f"{self.unit}{period}: {'passes' if self.passes else 'fails'}, the spectrum may be "
+            f"{self.ratio:.3g} times as strong"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KinematicAssessment(ResultDisplay):
+    """Kinematic assessment of a mechanism.
+
+    Attributes:
+        structure: assessed structure.
+        spectrum: design spectrum or ground motion of the demand.
+        direction: sense of the horizontal forces along x, 1 or -1.
+        alpha_0: factor α₀ of the horizontal forces that sets the mechanism in motion [-]; infinite
+            where none does.
+        M_star: participating mass M* [kg].
+        e_star: participating share e* of the mass that moves [-].
+        a_0_star: spectral acceleration a₀* that sets it in motion, without the confidence factor
+            [m/s²].
+        d_0_star: spectral displacement d₀* at which α vanishes [m]; infinite where the path ends
+            before.
+        T_s: secant period 2π √(d_s* / a*(d_s*)) at d_s* = 0.16 d₀* [s]: 0.4 of the 0.4 d₀* of
+            NTC-2008; undefined (NaN) where d₀* is infinite.
+        curve: capacity curve over place: `d` [m], `a` [m/s²], `alpha` [-], and `d_control`, the
+            horizontal displacement of the control point [m].
+        linear: check of the acceleration with the behaviour factor.
+        displacement: check of the displacement; None where the mechanism cannot move.
+        limit_state: rules of the displacement check.
+        confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
+        control: name of the block whose centroid is the control point.
+        path: finite motion of the mechanism; None where nothing moves.
+        doubts: why the result may not hold.
+    """
+
+    structure: Structure
+    spectrum: DesignSpectrum | Motion
+    direction: float
+    alpha_0: float
+    M_star: float
+    e_star: float
+    a_0_star: float
+    d_0_star: float
+    T_s: float
+    curve: xr.Dataset
+    linear: AssessmentCheck
+    displacement: AssessmentCheck | None
+    limit_state: LimitState
+    confidence_factor: float
+    control: str
+    path: MechanismPath | None
+    doubts: tuple[str, ...]
+
+    @property
+    def hinges(self) -> tuple[tuple[int, str], ...]:
+        """Joints that turn at first, with the face where the blocks stay in contact."""
+        return tuple(
+            (contact.joint, end)
+            for contact, end in self._contacts
+            if contact.joint not in self.sliding
+        )
+
+    @cached_property
+    def sliding(self) -> tuple[int, ...]:
+        """Numbers of the joints that slide at first."""
+        return tuple(sorted({c.joint for c, _ in self._contacts if c.slip}))
+
+    @cached_property
+    def _contacts(self) -> list[tuple[Any, str]]:
+        """Contacts of the first mechanism, with the end of the joint where they are."""
+        if self.path is None:
+            return []
+        ends = self.structure.ends
+        return [
+            (c, ("intrados", "extrados")[int(np.linalg.norm(ends[c.joint] - c.point, axis=1).argmin())])
+            for c in self.path.mechanisms[0].contacts
+        ]
+
+    @property
+    def passes(self) -> bool:
+        """Whether the displacement check passes, or without it the linear one."""
+        check = self.linear if self.displacement is None else self.displacement
+        return check.passes
+
+    def demand(self, periods: Array) -> tuple[Array, Array]:
+        """Return spectral displacements [m] and accelerations [m/s²] of the demand.
+
+        Args:
+            periods: natural periods (n,) [s].
+
+        Returns:
+            Displacement and pseudo-acceleration spectrum at the damping of the limit state.
+        """
+        acceleration = spectral_acceleration(self.spectrum, periods, self.limit_state.damping)
+        return acceleration * (periods / (2.0 * np.pi)) ** 2, acceleration
+
+    def table(self) -> str:
+        """Return the quantities and both checks, a line each."""
+        g = STANDARD_GRAVITY
+        rows = [
+            ["alpha_0", f"{self.alpha_0:.4g}", "-"],
+            ["e_star", f"{self.e_star:.4g}", "-"],
+            ["M_star", f"{self.M_star:.4g}", "kg"],
+            ["a_0_star", f"{self.a_0_star:.4g}", f"m/s² ({self.a_0_star / g:.3f} g)"],
+            ["d_0_star", f"{self.d_0_star:.4g}", "m"],
+            ["T_s", f"{self.T_s:.4g}", "s"],
+        ]
+        for check in (self.linear, self.displacement):
+            if check is not None:
+                rows += [
+                    [f"{check.name}: capacity", f"{check.capacity:.4g}", check.unit],
+                    [f"{check.name}: demand", f"{check.demand:.4g}", check.unit],
+                    [f"{check.name}: ratio", f"{check.ratio:.4g}", "-"],
+                ]
+        return align_columns(["quantity", "value", "unit"], rows)
+
+    def _summary(self) -> str:
+        """Describe the result in one line."""
+        return (
+            f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
+            f"{self.a_0_star:.4g} m/s², d_0* {self.d_0_star:.4g} m, "
+            f"{'passes' if self.passes else 'fails'}"
+        )
+
+    def __str__(self) -> str:
+        """Describe mechanism, oscillator, checks and doubts, a line each."""
+        side = "right" if self.direction > 0.0 else "left"
+        lines = [f"kinematic assessment of {self.structure.name}, pushed to the {side}"]
+        if self.path is None:
+            lines.append("no horizontal force makes it a mechanism")
+        else:
+            lines += [self._mechanism_text(), f"{self._oscillator_text()}"]
+            changes = [event.text for event in self.path.events if event.text != self.path.end]
+            lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
+            lines.append(self.path.end.sentence)
+        lines += [str(check) for check in (self.linear, self.displacement) if check is not None]
+        return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in self.doubts)])
+
+    def _mechanism_text(self) -> str:
+        """Describe hinges and sliding joints."""
+        names = [joint.name for joint in self.structure.joints]
+        hinges = join_names([f"{names[k]} at the {end}" for k, end in self.hinges], "; ")
+        sliding = join_joint_names([names[k] for k in self.sliding])
+        return f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}"
+
+    def _oscillator_text(self) -> str:
+        """Describe the equivalent oscillator."""
+        return (
+            f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg, "
+            f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g), "
+            f"d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
+        )
+
+
+@validate_arguments
+def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are arguments)
+    structure: Structure,
+    spectrum: DesignSpectrum | Motion,
+    *,
+    direction: float = 1.0,
+    friction: str | None = "coulomb",
+    part: str | None = None,
+    blocks: Sequence[int | str] | None = None,
+    loads: Sequence[AttachedLoad] = (),
+    limit_state: str | LimitState = "NTC-2018 SLV",
+    q: float = 2.0,
+    confidence_factor: float = 1.35,
+) -> KinematicAssessment:
+    """Assess the collapse mechanism under horizontal forces against a spectrum at the ground.
+
+    The mechanism is that of `collapse_factor` under `BodyForce(direction)`, without cohesion. It is
+    followed along its finite motion (`archfem.limit.finite_mechanism`), which gives the capacity
+    curve a*(d*). Two checks follow, with the factors of the Italian code:
+
+    - *linear*: q a₀* / FC against the ground acceleration, that of the spectrum at T = 0;
+    - *displacement*: d_u* as a share of d₀* against the displacement spectrum at the period of the
+      limit state, with the accelerations of the curve divided by FC. A mechanism that the ground
+      acceleration does not set in motion, a₀* / FC above it, passes as well.
+
+    The mechanism must stand on the ground: spectra at a height of a building are not built here;
+    give one as a `TableSpectrum`, or a `Motion`.
+
+    Args:
+        structure: supports are its fixed blocks.
+        spectrum: elastic design spectrum, 5 % damped unless it has a `damping`, corrected to that
+            of the limit state by η = √(10/(5 + ξ)) >= 0.55; or a ground motion, whose response
+            spectrum is the demand. Beyond 4 s the spectral displacement of European codes is held.
+        direction: sense of the horizontal forces along x, 1 or -1.
+        friction: "coulomb", "nonassociated" or None for no sliding, as for `collapse_factor`.
+        part: name of a part; only joints that touch its blocks may move.
+        blocks: names or numbers of blocks; only joints that touch them may move.
+        loads: loads that stay with their blocks, such as floors and ties.
+        limit_state: rules of the displacement check: "NTC-2018 SLV" (d_u* = 0.4 d₀*, T = 1.68 π
+            √(d_u*/a*), 8 % damping; Circolare 7/2019, C8.7.1.2.1.6 and .8), "NTC-2018 SLC" (0.6,
+            1.56 π, 10 %; there), "NTC-2008 SLV" (0.4, secant period at 0.4 d_u*, 5 %; Circolare
+            617/2009, from memory), or a `LimitState` with rules of another code.
+        q: behaviour factor [-]; Circolare 7/2019, C8.7.1.2.1.7.
+        confidence_factor: FC [-], that of knowledge level LC1 where the strength of the masonry is
+            not taken into account, as here; Circolare 7/2019, C8.7.1.2.1.3. The value 1.35 of LC1
+            is from memory (C8.5.4.1).
+
+    Returns:
+        Oscillator, capacity curve and checks.
+
+    Raises:
+        InvalidInput: an argument is unknown or out of range, the structure does not stand, or it
+            has bodies that are too soft to be rigid.
+        DidNotConverge: the mechanism changes without end.
+
+    Note:
+        EN 1998-3 and ASCE 41 have checks of their own, whose texts could not be read: give their
+        factors as a `LimitState`.
+
+    References:
+        Circolare 21 January 2019 n. 7 C.S.LL.PP., C8.7.1.2.1.
+
+    Example:
+        >>> wall = af.column(breadth=0.6, heights=[2.4])
+        >>> found = af.kinematic_assessment(wall, af.Eurocode8(ag=0.2, ground="B"))
+        >>> round(found.alpha_0, 4), round(found.d_0_star, 4), found.displacement.passes
+        (0.25, 0.3, True)
+    """
+    rules = _parse_limit_state(limit_state)
+    if abs(direction) != 1.0:
+        raise InvalidInput(f"direction {direction!r}: give 1 to the right or -1 to the left")
+    for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
+        if not 1.0 <= check_number(value, f"{name} [-]") <= most:
+            raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
+    _check_structure(structure, friction, loads)
+    joints = _select_joints(structure, part, blocks)
+    placed = PlacedBlocks(
+        structure, np.zeros((len(structure.blocks), 3)), tuple(loads), float(direction)
+    )
+    coefficient = structure.friction if friction else np.full(len(structure.joints), np.inf)
+    mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
+    oscillator = _Oscillator(placed, None, 0)
+    if mechanism is not None:
+        follower = PathFollower(placed, joints, coefficient)
+        path = follower.follow(mechanism)
+        oscillator = _Oscillator(placed, path, follower.last_equilibrium(path))
+    return _check(oscillator, spectrum, rules, q, confidence_factor)
+
+
+def assess_parts(
+    structure: Structure, spectrum: DesignSpectrum | Motion, **options: Any
+) -> dict[str, KinematicAssessment]:
+    """Assess the mechanism of every part by itself.
+
+    Args:
+        structure: structure with named parts.
+        spectrum: as for `kinematic_assessment`.
+        options: other arguments of `kinematic_assessment`, but `part` and `blocks`.
+
+    Returns:
+        Assessment of each part that has blocks which move, by its name.
+
+    Raises:
+        InvalidInput: as for `kinematic_assessment`.
+    """
+    parts = dict.fromkeys(structure.blocks[number].part for number in structure.free)
+    return {
+        part: kinematic_assessment(structure, spectrum, part=part, **options) for part in parts
+    }
+
+
+def spectral_acceleration(
+    spectrum: DesignSpectrum | Motion, periods: Array, damping: float
+) -> Array:
+    """Return the horizontal pseudo-acceleration spectrum at a damping (n,) [m/s²]."""
+    if isinstance(spectrum, Motion):
+        return response_spectrum(spectrum, periods, damping)
+    factor = STANDARD_GRAVITY
+    if is_dataclass(spectrum) and "damping" in {each.name for each in fields(spectrum)}:
+        spectrum = replace(spectrum, damping=damping)
+    else:
+        factor *= damping_correction(damping)
+    # the spectral displacement is held beyond the longest period of European codes
+    longest = 4.0 if isinstance(spectrum, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
+    held = np.minimum(periods, longest)
+    beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
+    return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
+
+
+def _parse_limit_state(limit_state: str | LimitState) -> LimitState:
+    """Return the rules of a limit state."""
+    if isinstance(limit_state, LimitState):
+        return limit_state
+    if not is_one_of(limit_state, LIMIT_STATES):
+        raise InvalidInput(
+            f"limit_state {limit_state!r} is not known: use one of {list(LIMIT_STATES)}, or give "
+            "the rules of another code as a LimitState"
+        )
+    return LIMIT_STATES[limit_state]
+
+
+def _check_structure(
+    structure: Structure, friction: str | None, loads: Sequence[AttachedLoad]
+) -> None:
+    """Refuse structures and options that the method does not cover."""
+    if friction not in ("coulomb", "nonassociated", None):
+        raise InvalidInput(
+            f"friction {friction!r} is not known: use 'coulomb', 'nonassociated' or None"
+        )
+    if friction == "nonassociated" and loads:
+        raise InvalidInput(
+            "friction 'nonassociated' is not searched with attached loads: use 'coulomb'"
+        )
+    if (structure.tension > 0.0).any():
+        raise InvalidInput(
+            "joints have tensile strength, which breaks before a mechanism forms: give contacts "
+            "with tension 0"
+        )
+    soft = find_yielding_blocks(structure)
+    if soft:
+        names = [structure.blocks[number].name for number in sorted(soft)]
+        raise InvalidInput(
+            f"bodies are too soft to be rigid ({join_names(names)}): leave the fill out and attach "
+            "its weight to the stones as loads, or cut it into pieces (jointed_fill)"
+        )
+
+
+def _select_joints(
+    structure: Structure, part: str | None, blocks: Sequence[int | str] | None
+) -> list[int]:
+    """Return the joints that may open or slip."""
+    if part is not None and blocks is not None:
+        raise InvalidInput("part and blocks are both given: name either a part or its blocks")
+    if part is not None:
+        parts = list(dict.fromkeys(structure.blocks[k].part for k in structure.free))
+        if part not in parts:
+            raise InvalidInput(f"there is no part {part!r} that moves: use one of {parts}")
+        chosen = {k for k in structure.free if structure.blocks[k].part == part}
+    elif blocks is not None:
+        chosen = {structure.block_number(block) for block in blocks} & set(structure.free)
+        if not chosen:
+            raise InvalidInput(
+                f"blocks {list(blocks)} has none that moves: name some of "
+                f"{join_names([structure.blocks[k].name for k in structure.free])}"
+            )
+    else:
+        chosen = set(structure.free)
+    return [k for k, pair in enumerate(structure.pairs.tolist()) if chosen & set(pair)]
+
+
+def _find_first_mechanism(
+    placed: PlacedBlocks, joints: list[int], coefficient: Array, friction: str | None
+) -> Mechanism | None:
+    """Return the mechanism of least factor at rest; None where there is none."""
+    refusal = InvalidInput(
+        f"{placed.structure.name} does not stand under its own weight and the attached loads: "
+        "af.stands and `archfem check` say why"
+    )
+    try:
+        mechanism = find_mechanism(placed, joints, coefficient)
+        # The least factor in the other direction is below zero where it stands only if pushed.
+        opposite = find_mechanism(
+            replace(placed, direction=-placed.direction), joints, coefficient
+        )
+    except NoEquilibrium as error:
+        raise refusal from error
+    if any(found is not None and found.factor <= 1e-9 for found in (mechanism, opposite)):
+        raise refusal
+    if mechanism is None or friction != "nonassociated" or not mechanism.sliding_joints:
+        return mechanism
+    if len(joints) < len(placed.structure.joints):
+        raise InvalidInput(
+            "friction 'nonassociated' is searched for the whole structure only: leave out part "
+            "and blocks, or use 'coulomb'"
+        )
+    found = collapse_factor(
+        placed.structure, live=BodyForce(placed.direction), friction="nonassociated"
+    )
+    if not found.motion.any():
+        return mechanism
+    contacts = placed.touching(joints)
+    at_contacts = coefficient[[contact.joint for contact in contacts]]
+    return classify_motion(placed, joints, found.motion, at_contacts, contacts, found.factor)
+
+
+@dataclass(frozen=True, eq=False)
+class _Oscillator:
+    """Equivalent oscillator of a mechanism."""
+
+    placed: PlacedBlocks
+    path: MechanismPath | None
+    holds: int  # last place at which the joints that do not move hold
+
+    @cached_property
+    def weights(self) -> tuple[Array, Array]:
+        """Weights that move [N], and their virtual displacements along the forces [m/s]."""
+        assert self.path is not None
+        body = self.path.mechanisms[0].body
+        moving = [(k, place, weight) for k, place, weight in self.placed.masses if body[k] >= 0]
+        speeds = [
+            self.path.velocity[k, 0]
+            - self.path.velocity[k, 2] * (place[1] - self.placed.centroids[k, 1])
+            for k, place, _ in moving
+        ]
+        weights = np.array([weight for _, _, weight in moving])
+        return weights, self.placed.direction * np.array(speeds)
+
+    @cached_property
+    def control(self) -> int:
+        """Number of the block of the control point, the centroid fastest along x at rest."""
+        assert self.path is not None
+        free = np.array(self.placed.structure.free)
+        return int(free[np.abs(self.path.velocity[free, 0]).argmax()])
+
+    @cached_property
+    def e_star(self) -> float:
+        """Participating share of the weight that moves [-]."""
+        if self.path is None or not self.path.velocity.any():
+            return np.nan
+        weight, speed = self.weights
+        return float((weight @ speed) ** 2 / (weight.sum() * (weight @ speed**2)))
+
+    @cached_property
+    def curve(self) -> xr.Dataset:
+        """Capacity curve over the places of the path."""
+        factors, control, moved = np.zeros(0), np.zeros(0), np.zeros(0)
+        if self.path is not None:
+            factors = self.path.factors
+            control = self.placed.direction * self.path.displacements[:, self.control, 0]
+            moved = np.zeros(len(factors))
+            if self.path.velocity.any():
+                weight, speed = self.weights
+                own = self.placed.direction * self.path.velocity[self.control, 0]
+                moved = control / own * (weight @ speed**2) / (weight @ speed)
+        acceleration = factors * self.placed.structure.gravity / self.e_star
+        units = {"d": "m", "a": "m/s2", "alpha": "1", "d_control": "m"}
+        values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
+        return xr.Dataset(
+            {key: ("place", values[key], {"units": unit}) for key, unit in units.items()}
+        )
+
+    def doubts(self, factor: float) -> list[str]:
+        """Return why the curve may not hold."""
+        if self.path is None:
+            return []
+        found, collapse = [], self.path.mechanisms[0].factor
+        if factor < (1.0 - 1e-3) * collapse:
+            found.append(
+                f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}; "
+                "faces slide flat here"
+            )
+        if self.holds < len(self.path.factors) - 1:
+            found.append(
+                f"from d* = {float(self.curve['d'][self.holds]):.4g} m on joints that the "
+                "mechanism keeps closed do not hold: the curve beyond is that of a mechanism "
+                "which the code permits to assume, and an upper bound"
+            )
+        if self.path.end is not PathEnd.FALLS:
+            found.append(
+                f"alpha does not vanish: {self.path.end.sentence}; the displacement check counts "
+                "the end of the path as d_0*"
+            )
+        return found
+
+
+def _check(
+    oscillator: _Oscillator,
+    spectrum: DesignSpectrum | Motion,
+    rules: LimitState,
+    q: float,
+    confidence_factor: float,
+) -> KinematicAssessment:
+    """Return the assessment of an oscillator under a spectrum."""
+    curve, path, structure = oscillator.curve, oscillator.path, oscillator.placed.structure
+    moves = path is not None and len(curve["d"]) > 1
+    alpha_0 = float(curve["alpha"][0]) if path is not None else np.inf
+    a_0 = float(curve["a"][0]) if moves else np.inf
+    falls = moves and path is not None and path.end is PathEnd.FALLS
+    last = float(curve["d"][-1]) if moves else np.inf
+    ground = float(spectral_acceleration(spectrum, np.zeros(1), 0.05)[0])
+    linear = AssessmentCheck(
+        f"linear, q = {q:g}, FC = {confidence_factor:g}",
+        q * a_0 / confidence_factor,
+        ground,
+        "m/s²",
+        q * a_0 / confidence_factor / ground,
+        None,
+        f"{CIRCOLARE}, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8",
+    )
+    mass = oscillator.weights[0].sum() / structure.gravity if moves else 0.0
+    displacement = None
+    if moves:
+        starts = a_0 / confidence_factor / ground  # ratio at which the mechanism sets in motion
+        displacement = _check_displacement(curve, spectrum, rules, confidence_factor, starts)
+    return KinematicAssessment(
+        structure,
+        spectrum,
+        oscillator.placed.direction,
+        alpha_0,
+        oscillator.e_star * mass if moves else 0.0,
+        oscillator.e_star,
+        a_0,
+        last if falls else np.inf,
+        secant_period(curve, 0.16 * last) if falls else np.nan,
+        curve,
+        linear,
+        displacement,
+        rules,
+        confidence_factor,
+        structure.blocks[oscillator.control].name if moves else "",
+        path,
+        tuple(oscillator.doubts(alpha_0)),
+    )
+
+
+def secant_period(curve: xr.Dataset, displacement: float) -> float:
+    """Return the secant period of a capacity curve at a displacement [s]."""
+    acceleration = float(
+        np.interp(displacement, np.maximum.accumulate(curve["d"].values), curve["a"].values)
+    )
+    return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
+
+
+def _check_displacement(
+    curve: xr.Dataset,
+    spectrum: DesignSpectrum | Motion,
+    rules: LimitState,
+    confidence_factor: float,
+    starts: float,
+) -> AssessmentCheck:
+    """Check the displacement of a capacity curve against the spectrum."""
+    capacity = rules.share * float(curve["d"][-1])
+    secant = secant_period(curve, rules.secant_share * capacity)
+    # FC reduces the accelerations of the curve
+    period = rules.period_factor / 2.0 * np.sqrt(confidence_factor) * secant
+    # The largest spectral displacement up to the period; code spectra grow with it.
+    periods = period * np.linspace(0.0, 1.0, 41)[1:]
+    acceleration = spectral_acceleration(spectrum, periods, rules.damping)
+    demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
+    ratio = max(capacity / demand, starts)
+    return AssessmentCheck(rules.name, capacity, demand, "m", ratio, float(period), rules.source)
