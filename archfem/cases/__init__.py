@@ -1,6 +1,6 @@
 """Analyses as TOML files, and folders of their results.
 
-    analysis_keys   [analysis] and [limit]
+    analysis_keys   [analysis], [limit] and [assessment]
     case            Case: one analysis
     examples        shipped cases
     motion_keys     [motion] and [suite]

@@ -1,9 +1,10 @@
-"""Sections [analysis] and [limit] of case files: time stepping, damping, and limit analysis."""
+"""Sections [analysis], [limit] and [assessment]: time stepping, limit analysis, assessment."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_choice, check_table
 from archfem.dynamics.schemes import (
     HHT,
@@ -20,8 +21,16 @@ from archfem.dynamics.schemes import (
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import Fill
 from archfem.limit.collapse import Collapse, collapse_factor
-from archfem.masonry.loads import Action, BodyForce, PointLoad
+from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad
 from archfem.masonry.structure import Structure
+from archfem.motion.design_spectra import DesignSpectrum
+from archfem.motion.motion import Motion
+from archfem.statics.mechanism_assessment import (
+    KinematicAssessment,
+    LimitState,
+    assess_parts,
+    kinematic_assessment,
+)
 
 ANALYSIS_KEYS = {"dt": "s", "scheme": str, "alpha": "1", "damping": dict, "stop_at_mechanism": bool}
 DAMPING_KEYS = {
@@ -30,6 +39,15 @@ DAMPING_KEYS = {
 }
 LIMIT_KEYS = {"horizontal": "1", "vertical": "1", "point": dict, "friction": str, "fill": dict}
 POINT_LOAD_KEYS = {"x": "m", "force": ["N"]}
+ASSESSMENT_KEYS = {
+    **{"spectrum": dict, "direction": "1", "friction": str, "part": str, "blocks": [(int, str)]},
+    **{"loads": [dict], "limit_state": (str, dict), "q": "1", "confidence_factor": "1"},
+}
+ATTACHED_LOAD_KEYS = {"block": (int, str), "point": ["m"], "weight": "N", "force": ["N"]}
+LIMIT_STATE_KEYS = {
+    **{"name": str, "share": "1", "period_factor": "1", "secant_share": "1", "damping": "1"},
+    "source": str,
+}
 FILL_KEYS = {
     **{"friction_angle": "degree", "cohesion": "Pa", "mobilisation": "1", "active": "1"},
     **{"dispersal": str, "spread": "degree"},
@@ -162,3 +180,86 @@ def _point_load(table: Any) -> PointLoad:
             '{ x = "1.4 m", force = ["0 kN", "-1 kN"] }'
         )
     return PointLoad(point["x"], point["force"])
+
+
+@dataclass(frozen=True)
+class AssessmentSettings:
+    """Kinematic assessment of a case.
+
+    Attributes:
+        spectrum: spectrum of the demand, or None for that of the case's suite or motion.
+        directions: senses of the horizontal forces, 1 to the right and -1 to the left.
+        options: other arguments of `kinematic_assessment`.
+    """
+
+    spectrum: DesignSpectrum | None
+    directions: tuple[float, ...]
+    options: dict[str, Any]
+
+    def solve(
+        self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
+    ) -> dict[str, KinematicAssessment]:
+        """Assess the structure, or each part by itself, in each direction.
+
+        Args:
+            structure: structure of the case.
+            demand: spectrum of the suite, or motion, where the section has no spectrum.
+            parts: whether every part is assessed by itself.
+
+        Returns:
+            Assessments by direction, and part if `parts`.
+
+        Raises:
+            InvalidInput: there is no spectrum, or as for `kinematic_assessment`.
+        """
+        spectrum = self.spectrum if self.spectrum is not None else demand
+        if spectrum is None:
+            raise InvalidInput(
+                "an assessment needs a spectrum: write [assessment] with spectrum = { code = "
+                '"NTC-2018", ag = 0.25, f0 = 2.4, tc_star = 0.32, site = "B" }, or a motion'
+            )
+        found = {}
+        for direction in self.directions:
+            side, options = ("right", "left")[direction < 0.0], dict(self.options)
+            if parts:
+                each = assess_parts(structure, spectrum, direction=direction, **options)
+                found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
+            else:
+                found[side] = kinematic_assessment(
+                    structure, spectrum, direction=direction, **options
+                )
+        return found
+
+
+def parse_assessment(table: Any) -> AssessmentSettings:
+    """Return the kinematic assessment of a case."""
+    options = check_table(table, ASSESSMENT_KEYS, "assessment")
+    spectrum = None
+    if "spectrum" in options:
+        spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")
+    directions = (options.pop("direction"),) if "direction" in options else (1.0, -1.0)
+    if not set(directions) <= {1.0, -1.0}:
+        raise InvalidInput(
+            f"assessment.direction = {directions[0]:g}: give 1 for right or -1 for left, or leave "
+            "it out for both"
+        )
+    if "friction" in options:
+        laws = ("coulomb", "nonassociated", "none")
+        law = check_choice(options["friction"], laws, "assessment.friction")
+        options["friction"] = None if law == "none" else law
+    if isinstance(state := options.get("limit_state"), dict):
+        options["limit_state"] = _build("limit_state", LimitState, state, LIMIT_STATE_KEYS)
+    if "loads" in options:
+        options["loads"] = [
+            _build("loads", AttachedLoad, load, ATTACHED_LOAD_KEYS) for load in options["loads"]
+        ]
+    return AssessmentSettings(spectrum, directions, options)
+
+
+def _build(key: str, kind: Callable[..., Any], table: Table, keys: Table) -> Any:
+    """Return an object made of the keys of a table."""
+    section = f"assessment.{key}"
+    try:
+        return kind(**check_table(table, keys, section))
+    except TypeError as error:
+        raise InvalidInput(f"{section} = {dict(table)}: {error}; its keys are {list(keys)}") from error

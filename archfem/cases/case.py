@@ -14,9 +14,11 @@ import tomli_w
 
 from archfem._validation import check_type, validate_arguments
 from archfem.cases.analysis_keys import (
+    AssessmentSettings,
     LimitAnalysis,
     check_scheme,
     parse_analysis,
+    parse_assessment,
     parse_damping,
     parse_limit,
     parse_scheme,
@@ -56,7 +58,7 @@ OUTPUT_KEYS = {
 }
 TABLE_SECTIONS = (
     *("structure", "materials", "contacts", "model", "motion", "suite", "analysis"),
-    *("criteria", "limit", "dead_load", "output"),
+    *("criteria", "limit", "assessment", "dead_load", "output"),
 )
 
 
@@ -74,6 +76,7 @@ class Case:
         analysis: checked keys of [analysis]: time step, scheme, damping, when to stop.
         criteria: criteria of joint failure, and the number of failed joints of a mechanism.
         limit: limit analysis, or None.
+        assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         output: checked keys of [output]: records, pictures and films.
         settings: tables of the case as they were read, changes included.
         folder: folder that relative file names start from.
@@ -87,6 +90,7 @@ class Case:
     analysis: dict[str, Any]
     criteria: Criteria
     limit: LimitAnalysis | None
+    assessment: AssessmentSettings
     output: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
@@ -158,6 +162,7 @@ class Case:
                 **check_table(settings.get("criteria", {}), CRITERIA_KEYS, "criteria")
             ),
             limit=None if limit is None else parse_limit(limit),
+            assessment=parse_assessment(settings.get("assessment", {})),
             output=check_table(settings.get("output", {}), OUTPUT_KEYS, "output"),
             settings=dict(settings),
             folder=folder,

@@ -114,15 +114,18 @@ def parse_suite(table: Any) -> dict[str, Any]:
 
 def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
     """Return the target spectrum of a suite, or None."""
-    if "target" not in settings:
-        return None
-    values = dict(settings["target"])
-    code = check_choice(values.pop("code", None), TARGET_SPECTRA, "suite.target.code")
+    return build_spectrum(settings["target"], "suite.target") if "target" in settings else None
+
+
+def build_spectrum(table: Table, section: str) -> DesignSpectrum:
+    """Return the design spectrum of a table with its code."""
+    values = dict(table)
+    code = check_choice(values.pop("code", None), TARGET_SPECTRA, f"{section}.code")
     spectrum, keys = TARGET_SPECTRA[code]
     try:
-        return spectrum(**check_table(values, keys, "suite.target"))
+        return spectrum(**check_table(values, keys, section))
     except TypeError as error:
-        raise InvalidInput(f"suite.target of {code}: {error}") from error
+        raise InvalidInput(f"{section} of {code}: {error}") from error
 
 
 def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:

@@ -20,9 +20,10 @@ from archfem.limit.collapse import Collapse
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.stress import strength_use_table
-from archfem.view.collapse import draw_collapse, draw_fall
+from archfem.view.collapse import draw_collapse, draw_fall, draw_kinematic_assessment
 from archfem.view.histories import draw_envelope, draw_joints, most_stressed_joints
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.statics import draw_dead_load, draw_free_body, draw_modes
@@ -147,6 +148,18 @@ def write_limit(case: Case, collapse: Collapse, text: str, folder: Path) -> list
     """Write the result of limit analysis, and draw the mechanism over the structure."""
     figure = draw_collapse(case.structure, collapse)
     return [_write_text(text, folder / "limit.txt"), save(figure, folder / "collapse.png")]
+
+
+def write_assessments(
+    found: Mapping[str, KinematicAssessment], text: str, folder: Path
+) -> list[Path]:
+    """Write the results of kinematic assessments, and draw each."""
+    figures = [
+        save(draw_kinematic_assessment(result), folder / f"assessment_{place}.png")
+        for place, result in enumerate(found.values())
+        if result.path is not None
+    ]
+    return [_write_text(text, folder / "assessment.txt"), *figures]
 
 
 def write_dead_load(result: DeadLoadResult, folder: Path) -> list[Path]:

@@ -144,6 +144,10 @@ def _add_case_commands(commands: Any) -> None:
     add("check", "read a case, build its model and find its dead load", None)
     modes = add("modes", "frequencies, masses and shapes of vibrations about dead load")
     modes.add_argument("--count", type=int, default=6, help="how many modes (6)")
+    about = "kinematic assessment of the collapse mechanism against a design spectrum"
+    assess = add("assess", about, None)
+    assess.add_argument("--out", metavar="DIR", help="folder for text and pictures (none)")
+    assess.add_argument("--parts", action="store_true", help="each part by itself")
     add("mesh", "write the mesh of a case as a gmsh file", "FILE.msh")
     verdict = add("verdict", "does it fall, whatever its uncertain properties are?", None)
     verdict.add_argument("--out", metavar="DIR", help="folder for table and picture (none)")

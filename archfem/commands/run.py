@@ -1,4 +1,4 @@
-"""Commands on cases: run, check, modes, mesh, accuracy and report; motion and compile."""
+"""Commands on cases: run, check, modes, assess, mesh, accuracy, report; motion and compile."""
 
 import argparse
 import io
@@ -89,6 +89,24 @@ def modes(options: argparse.Namespace) -> None:
     computed = print_modes(at_rest, options.count, folder)
     first = range(1, min(len(computed.frequencies), 2) + 1)
     print_written([film_modes(computed, folder / "modes.gif", first)])
+
+
+def assess(options: argparse.Namespace) -> None:
+    """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
+    case = Case.read(options.case, options.changes)
+    demand = case.target
+    if demand is None and case.motion is not None:
+        demand = case.ground_motion()
+    found = case.assessment.solve(case.structure, demand, options.parts)
+    text = "\n\n".join(f"{name}: {result}" for name, result in found.items())
+    print(f"{case.title}\n{text}")
+    if options.out is not None:
+        from archfem.cases.result_folder import write_assessments
+
+        folder = create_result_folder(options.out)
+        if not (folder / "case.toml").is_file():  # a report reads the case from the folder
+            (folder / "case.toml").write_text(case.text(), encoding="utf-8")
+        print_written(write_assessments(found, text, folder))
 
 
 def mesh(options: argparse.Namespace) -> None:

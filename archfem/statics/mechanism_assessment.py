@@ -174,7 +174,7 @@ class KinematicAssessment(ResultDisplay):
         confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
-        doubts: why the result may not hold.
+        notes: what the result leaves out, and how far the curve holds.
     """
 
     structure: Structure
@@ -193,7 +193,7 @@ class KinematicAssessment(ResultDisplay):
     confidence_factor: float
     control: str
     path: MechanismPath | None
-    doubts: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def hinges(self) -> tuple[tuple[int, str], ...]:
@@ -267,18 +267,18 @@ class KinematicAssessment(ResultDisplay):
         )
 
     def __str__(self) -> str:
-        """Describe mechanism, oscillator, checks and doubts, a line each."""
+        """Describe mechanism, oscillator, checks and notes, a line each."""
         side = "right" if self.direction > 0.0 else "left"
         lines = [f"kinematic assessment of {self.structure.name}, pushed to the {side}"]
         if self.path is None:
             lines.append("no horizontal force makes it a mechanism")
         else:
-            lines += [self._mechanism_text(), f"{self._oscillator_text()}"]
+            lines += [self._mechanism_text(), self._oscillator_text()]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
             lines.append(self.path.end.sentence)
-        lines += [str(check) for check in (self.linear, self.displacement) if check is not None]
-        return "\n".join([*lines, *(f"in doubt: {doubt}" for doubt in self.doubts)])
+            lines += [str(check) for check in (self.linear, self.displacement) if check is not None]
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     def _mechanism_text(self) -> str:
         """Describe hinges and sliding joints."""
@@ -577,8 +577,8 @@ class _Oscillator:
             {key: ("place", values[key], {"units": unit}) for key, unit in units.items()}
         )
 
-    def doubts(self, factor: float) -> list[str]:
-        """Return why the curve may not hold."""
+    def notes(self, factor: float) -> list[str]:
+        """Return what the curve leaves out."""
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor
@@ -589,9 +589,9 @@ class _Oscillator:
             )
         if self.holds < len(self.path.factors) - 1:
             found.append(
-                f"from d* = {float(self.curve['d'][self.holds]):.4g} m on joints that the "
-                "mechanism keeps closed do not hold: the curve beyond is that of a mechanism "
-                "which the code permits to assume, and an upper bound"
+                f"beyond d* = {float(self.curve['d'][self.holds]):.3g} m joints open or slide that "
+                "the mechanism keeps closed: there the curve is an upper bound, which a time "
+                "history with large displacements can test"
             )
         if self.path.end is not PathEnd.FALLS:
             found.append(
@@ -647,7 +647,7 @@ def _check(
         confidence_factor,
         structure.blocks[oscillator.control].name if moves else "",
         path,
-        tuple(oscillator.doubts(alpha_0)),
+        tuple(oscillator.notes(alpha_0)),
     )
 
 

@@ -1,6 +1,7 @@
 """Figures of limit analysis and of collapse.
 
-Thrust line and mechanism of a limit analysis, capacity map of rings, and instants of a fall.
+Thrust line and mechanism of a limit analysis, kinematic assessment, capacity map of rings, and
+instants of a fall.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,12 +19,14 @@ from archfem.errors import InvalidInput
 from archfem.joints.resultants import thrust_line
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.structure import Structure, rigid_motion_matrix
+from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
 from archfem.view.structure import block_colours, draw_loads, draw_structure
 from archfem.view.style import (
     COLOUR_MAP,
     COLUMN_WIDTH,
+    LABEL_SIZE,
     TITLE_SIZE,
     Colour,
     add_legend,
@@ -79,6 +82,84 @@ def draw_collapse_result(found: Collapse) -> Figure:
             "this result does not contain its structure: use draw_collapse(structure, …)"
         )
     return draw_collapse(found.structure, found)
+
+
+def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
+    """Draw the mechanism at its displacement capacity, and the capacity curve with its demand.
+
+    Args:
+        found: an assessment with a mechanism.
+
+    Returns:
+        The figure: blocks at rest and at the displacement d_u* beside a*(d*), divided by the
+        confidence factor, over the spectrum of the demand.
+
+    Raises:
+        InvalidInput: no horizontal force makes the structure a mechanism.
+    """
+    if found.path is None or found.displacement is None:
+        raise InvalidInput("there is no motion to draw: no mechanism moves under horizontal forces")
+    wide, high = structure_figure(found.structure).get_size_inches()
+    figure = new_figure(max(wide, 0.75 * COLUMN_WIDTH) + 0.8 * COLUMN_WIDTH, max(high, 4.2))
+    widths = [max(wide, 0.75 * COLUMN_WIDTH), 0.8 * COLUMN_WIDTH]
+    left, right = figure.subplots(1, 2, width_ratios=widths)
+    _draw_displaced_mechanism(left, found)
+    _draw_capacity_curve(right, found)
+    return figure
+
+
+def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
+    """Draw the blocks at rest, and at the displacement capacity, true to scale."""
+    structure, path, check = found.structure, found.path, found.displacement
+    draw_structure(structure, axes=axes)
+    place = int(np.searchsorted(found.curve["d"].values, check.capacity))
+    place = min(place, len(path.displacements) - 1)
+    blocks = path.blocks.moved(path.displacements[place])
+    moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
+    style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": "mechanism at d_u*"}
+    outlines = [blocks.outlines[k] for k in moved]
+    add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
+    ends = {"intrados": 0, "extrados": 1}
+    points = [structure.ends[joint, ends[end]] for joint, end in found.hinges]
+    if points:
+        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "ms": 6.5, "zorder": 6}
+        axes.plot(*np.array(points).T, "o", label="hinge at rest", **style)
+    if found.sliding:
+        style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
+        lines = structure.ends[list(found.sliding)]
+        axes.add_collection(LineCollection(lines, label="sliding joint", **style))
+    axes.autoscale_view()
+    set_title(axes, f"{structure.name}: alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
+    axes.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower center", bbox_to_anchor=(0.5, -0.45))
+
+
+def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
+    """Draw the capacity curve, the displacement check, and the spectrum of the demand."""
+    check, curve = found.displacement, found.curve
+    reduced = curve["a"].values / found.confidence_factor
+    last = float(curve["d"][-1])
+    factor = f", FC = {found.confidence_factor:g}"
+    axes.plot(curve["d"], reduced, color=Colour.THRUST, lw=1.8, label=f"capacity a*(d*){factor}")
+    periods = check.period * np.geomspace(0.02, 4.0, 120)
+    displacement, acceleration = found.demand(periods)
+    damping = f"{100.0 * found.limit_state.damping:.0f} %"
+    style = {"color": Colour.GREY, "lw": 1.2, "label": f"spectrum, {damping} damped"}
+    axes.plot(displacement, acceleration, **style)
+    slope = (2.0 * np.pi / check.period) ** 2
+    top = 1.15 * max(reduced.max(), acceleration.max())
+    reach = min(1.1 * last, top / slope)
+    style = {"color": Colour.LOAD, "lw": 1.0, "ls": "--"}
+    axes.plot([0.0, reach], [0.0, slope * reach], label=f"T = {check.period:.2f} s", **style)
+    colour = Colour.MECHANISM if check.passes else Colour.HINGE
+    axes.axvline(check.capacity, color=colour, lw=1.2, label=f"capacity {check.capacity:.3f} m")
+    style = {"mfc": Colour.LOAD, "mec": "white", "ms": 7.0, "zorder": 5}
+    label = f"demand {check.demand:.3f} m"
+    axes.plot([check.demand], [slope * check.demand], "D", label=label, **style)
+    style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
+    axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
+    outcome = "passes" if check.passes else "fails"
+    set_title(axes, f"{check.name}: {outcome}, ratio {check.ratio:.2f}")
+    axes.legend(frameon=False, fontsize=LABEL_SIZE)
 
 
 def draw_capacity(

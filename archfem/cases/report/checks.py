@@ -164,4 +164,5 @@ def _is_source(path: Path) -> bool:
     """Return whether a report is written from a file."""
     figures = ("dead", "dead_stress", "free_body", "modes", "collapse", "accuracy", "verdict_range")
     text = path.suffix in (".nc", ".toml", ".txt")
-    return path.is_file() and (text or (path.suffix == ".png" and path.stem in figures))
+    drawn = path.stem in figures or path.stem.startswith("assessment_")
+    return path.is_file() and (text or (path.suffix == ".png" and drawn))

@@ -192,11 +192,12 @@ def _tabulate_materials(structure: Structure) -> list[Grid]:
 
 
 def build_dead_load_sections(data: ReportData) -> list[Section]:
-    """Build the sections on dead load, modes and limit analysis."""
+    """Build the sections on dead load, modes, limit analysis and kinematic assessment."""
     return [
         Section("Dead load", _build_dead_load(data)),
         Section("Modes", _build_modes(data)),
         Section("Limit analysis", _build_limit(data)),
+        Section("Kinematic assessment", _build_assessment(data)),
     ]
 
 
@@ -269,6 +270,19 @@ def _build_limit(data: ReportData) -> list[Any]:
     caption = "The mechanism of limit analysis, over the structure."
     missing = missing_note("limit analysis", remedy)
     return data.read_result("limit.txt", "collapse.png", caption, missing)
+
+
+def _build_assessment(data: ReportData) -> list[Any]:
+    """Build text and pictures of kinematic assessments from the files of the folder."""
+    text = data.read_text("assessment.txt")
+    if text is None:
+        remedy = "`archfem assess CASE.toml --out FOLDER` adds it to the folder."
+        return [missing_note("a kinematic assessment", remedy)]
+    caption = "Mechanism at the displacement capacity, and capacity curve with demand."
+    assert data.folder is not None  # the text is from there
+    names = sorted(path.name for path in data.folder.glob("assessment_*.png"))
+    figures = [figure for name in names for figure in data.read_figure(name, caption)]
+    return [TextBlock(text, "lines"), *figures]
 
 
 def build_ground_section(data: ReportData) -> Section:
