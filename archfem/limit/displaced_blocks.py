@@ -20,6 +20,7 @@ from scipy.sparse import csgraph, csr_matrix
 from archfem._typing import Array
 from archfem.errors import DidNotConverge
 from archfem.limit.linear_programme import NoEquilibrium
+from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.structure import Structure
 
@@ -70,8 +71,17 @@ class PlacedBlocks:
 
     structure: Structure
     displacement: Array  # of centroids, and rotations (n_blocks, 3) [m, m, rad]
+    corners: Array  # of each joint's faces at rest, lower and higher block (2, n_joints, 2, 2) [m]
     loads: tuple[AttachedLoad, ...] = ()
     direction: float = 1.0  # sense of the horizontal forces along x, 1 or -1
+
+    @classmethod
+    def at_rest(
+        cls, structure: Structure, loads: Sequence[AttachedLoad] = (), direction: float = 1.0
+    ) -> "PlacedBlocks":
+        """Return the blocks of a structure at rest."""
+        still = np.zeros((len(structure.blocks), 3))
+        return cls(structure, still, find_corners(structure), tuple(loads), direction)
 
     def moved(self, displacement: Array) -> "PlacedBlocks":
         """Return the blocks at other displacements from rest."""
@@ -142,14 +152,13 @@ class PlacedBlocks:
 
     @cached_property
     def faces(self) -> Array:
-        """Ends of the joints on lower and higher blocks (2, n_joints, 2, 2) [m]."""
-        joints = self.structure.joints
-        return np.array(
-            [
-                [self.places(joint.ends, joint.lower) for joint in joints],
-                [self.places(joint.ends, joint.higher) for joint in joints],
-            ]
-        )
+        """Present corners of the faces of lower and higher blocks (2, n_joints, 2, 2) [m]."""
+        block = self.structure.pairs.T
+        turns = self.displacement[block, 2, None]
+        arm = self.corners - self.rest[block][:, :, None]
+        x = np.cos(turns) * arm[..., 0] - np.sin(turns) * arm[..., 1]
+        y = np.sin(turns) * arm[..., 0] + np.cos(turns) * arm[..., 1]
+        return np.stack([x, y], axis=-1) + self.centroids[block][:, :, None]
 
     @cached_property
     def normals(self) -> Array:
@@ -192,6 +201,40 @@ class PlacedBlocks:
                     point, normal = self.faces[side, joint, end], self.normals[1 - side, joint]
                     contacts.append(Contact(joint, pair[side], pair[1 - side], point, normal))
         return contacts
+
+
+def find_corners(structure: Structure) -> Array:
+    """Return the corners of the faces at each joint, at rest (2, n_joints, 2, 2) [m].
+
+    A face that extends beyond the joint has its corner there, and the other block slides on it.
+    """
+    near = TOUCHING * structure.size
+    corners = np.empty((2, len(structure.joints), 2, 2))
+    for number, joint in enumerate(structure.joints):
+        spans = np.array(
+            [_face_span(structure.blocks[k], joint.ends, near) for k in structure.pairs[number]]
+        )
+        # Where both faces extend beyond an end of the joint, they do not touch there: it ends both.
+        beyond = np.abs(spans - [0.0, joint.depth]) > near
+        spans = np.where(beyond.all(axis=0), [0.0, joint.depth], spans)
+        corners[:, number] = joint.ends[0] + spans[..., None] * joint.tangent
+    return corners
+
+
+def _face_span(block: Block, line: Array, near: float) -> tuple[float, float]:
+    """Return where the face of a block along a line begins and ends, from the line's start [m]."""
+    depth = float(np.linalg.norm(line[1] - line[0]))
+    along = (line[1] - line[0]) / depth
+    arm = block.points - line[0]
+    share, height = arm @ along, arm @ [-along[1], along[0]]
+    low, high = 0.0, depth
+    for edge, (start, end) in enumerate(zip(share, np.roll(share, -1), strict=True)):
+        arc = block.centre is not None and edge in (0, 2)
+        on_line = max(abs(height[edge]), abs(height[edge + 1 - len(share)])) <= near
+        # an edge on the line belongs to the face where it overlaps the joint
+        if not arc and on_line and min(start, end) < depth - near and max(start, end) > near:
+            low, high = min(low, start, end), max(high, start, end)
+    return float(low), float(high)
 
 
 def rotation(turn: float) -> Array:

@@ -437,9 +437,9 @@ class PathFollower:
         """Return whether a corner has left the face on which it slides."""
         side = int(contact.face == blocks.structure.pairs[contact.joint, 1])
         face = blocks.faces[side, contact.joint]
-        along = (face[1] - face[0]) / blocks.structure.depths[contact.joint]
-        share = (contact.point - face[0]) @ along
-        return not -2.0 * near <= share <= blocks.structure.depths[contact.joint] + 2.0 * near
+        length = np.linalg.norm(face[1] - face[0])
+        share = (contact.point - face[0]) @ (face[1] - face[0]) / length
+        return not -2.0 * near <= share <= length + 2.0 * near
 
     def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:
         """Return the last place up to which the joints that the mechanism keeps closed hold."""

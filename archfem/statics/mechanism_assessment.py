@@ -372,9 +372,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             raise InvalidInput(f"{name} {value:.4g} is not between 1 and {most:g}")
     _check_structure(structure, friction, loads)
     joints = _select_joints(structure, part, blocks)
-    placed = PlacedBlocks(
-        structure, np.zeros((len(structure.blocks), 3)), tuple(loads), float(direction)
-    )
+    placed = PlacedBlocks.at_rest(structure, loads, float(direction))
     coefficient = structure.friction if friction else np.full(len(structure.joints), np.inf)
     mechanism = _find_first_mechanism(placed, joints, coefficient, friction)
     oscillator = _Oscillator(placed, None, 0)

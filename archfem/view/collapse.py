@@ -30,6 +30,7 @@ from archfem.view.style import (
     TITLE_SIZE,
     Colour,
     add_legend,
+    add_legend_below,
     add_polygons,
     annotate,
     new_figure,
@@ -105,6 +106,8 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=widths)
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
+    handles, labels = left.get_legend_handles_labels()
+    add_legend_below(figure, handles=handles, labels=labels)
     return figure
 
 
@@ -130,7 +133,6 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
         axes.add_collection(LineCollection(lines, label="sliding joint", **style))
     axes.autoscale_view()
     set_title(axes, f"{structure.name}: alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
-    axes.legend(frameon=False, fontsize=LABEL_SIZE, loc="lower center", bbox_to_anchor=(0.5, -0.45))
 
 
 def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
@@ -140,7 +142,7 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     last = float(curve["d"][-1])
     factor = f", FC = {found.confidence_factor:g}"
     axes.plot(curve["d"], reduced, color=Colour.THRUST, lw=1.8, label=f"capacity a*(d*){factor}")
-    periods = check.period * np.geomspace(0.02, 4.0, 120)
+    periods = np.geomspace(0.02 * check.period, max(4.0, check.period), 160)  # as codes, to 4 s
     displacement, acceleration = found.demand(periods)
     damping = f"{100.0 * found.limit_state.damping:.0f} %"
     style = {"color": Colour.GREY, "lw": 1.2, "label": f"spectrum, {damping} damped"}
